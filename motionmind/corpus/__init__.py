@@ -1,0 +1,1 @@
+"""A corpus: clips of movement with their provenance, in memory and on disk."""

@@ -1,0 +1,1 @@
+"""Orientations to states and back."""

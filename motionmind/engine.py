@@ -1,0 +1,1 @@
+"""The one door: learn from clips, load, tween."""

@@ -1,0 +1,34 @@
+"""The errors that MotionMind raises on purpose, and the warning it gives when it mends something.
+
+Every message says what was wrong, where (file, line, joint, frame) and what would be right.
+"""
+
+from __future__ import annotations
+
+
+class MotionMindError(Exception):
+    """Root of all errors that bad input can cause; the command line prints it in one line, exit code 2."""
+
+
+class FormatError(MotionMindError):
+    """A file that cannot be read as what it claims to be."""
+
+    def __init__(self, message: str, *, path: object | None = None, line: int | None = None) -> None:
+        where = "" if path is None else f"{path}: " if line is None else f"{path}:{line}: "
+        super().__init__(f"{where}{message}")
+
+
+class SkeletonError(MotionMindError):
+    """A skeleton that is no tree, or movement on another skeleton than the one that was expected."""
+
+
+class CorpusError(MotionMindError):
+    """A corpus that does not exist, holds nothing to learn from, or cannot be read."""
+
+
+class NoPathError(MotionMindError):
+    """No sequence of moves joins A to B under the rules that were asked for; the message is the diagnosis."""
+
+
+class MotionMindWarning(UserWarning):
+    """Something was mended while reading (a quaternion normalised, a header count corrected): says what, where."""

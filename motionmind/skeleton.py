@@ -1,0 +1,207 @@
+"""Skeletons: joints in topological order, each with its parent and its place in the parent's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.errors import SkeletonError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A tree of joints. Metres; Y up; a person at rest faces +Z, so that +X is to the person's left.
+
+    Attributes:
+        name: what the skeleton is called, such as "human23".
+        names: the joints' names [J], each after its parent; the first is the root.
+        parents: index of each joint's parent [J], -1 for the root.
+        offsets: place of each joint in its parent's frame [J, 3], metres (the root's is 0).
+        tips: place of each leaf's far end (fingertip, toe tip, crown) in the leaf's own frame [J, 3], metres;
+            0 where there is none.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array
+    tips: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        offsets = np.array(self.offsets, dtype=np.float64).reshape(-1, 3)
+        tips = np.zeros((count, 3)) if len(self.tips) == 0 else np.array(self.tips, dtype=np.float64)
+        if count == 0:
+            raise SkeletonError(f"skeleton {self.name!r} has no joints")
+        if len(self.parents) != count or offsets.shape != (count, 3) or tips.shape != (count, 3):
+            raise SkeletonError(
+                f"skeleton {self.name!r}: {count} joints need as many parents, offsets and tips, "
+                f"not {len(self.parents)}, {len(offsets)} and {len(tips)}"
+            )
+        twice = sorted({name for name in self.names if self.names.count(name) > 1})
+        if twice:
+            raise SkeletonError(f"skeleton {self.name!r} names {', '.join(twice)} more than once")
+        if self.parents[0] != -1:
+            raise SkeletonError(f"skeleton {self.name!r}: the first joint must be the root, with parent -1")
+        for child, parent in enumerate(self.parents[1:], start=1):
+            if not 0 <= parent < child:
+                raise SkeletonError(f"skeleton {self.name!r}: the parent of {self.names[child]!r} must stand before it")
+        if not (np.isfinite(offsets).all() and np.isfinite(tips).all()):
+            raise SkeletonError(f"skeleton {self.name!r} has an offset that is not a finite number")
+        offsets.setflags(write=False)
+        tips.setflags(write=False)
+        object.__setattr__(self, "offsets", offsets)
+        object.__setattr__(self, "tips", tips)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        """Same joints, same tree, same proportions."""
+        return (
+            isinstance(other, Skeleton)
+            and self.difference(other) is None
+            and np.array_equal(self.offsets, other.offsets)
+            and np.array_equal(self.tips, other.tips)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def index(self, joint: str) -> int:
+        """Index of the joint called `joint`; SkeletonError names the joints there are."""
+        if joint not in self.names:
+            raise SkeletonError(f"no joint {joint!r} in {self.name}; its joints are {', '.join(self.names)}")
+        return self.names.index(joint)
+
+    def children(self, joint: int) -> list[int]:
+        """Indices of the joints whose parent is `joint`."""
+        return [child for child, parent in enumerate(self.parents) if parent == joint]
+
+    def difference(self, other: Skeleton) -> str | None:
+        """How the tree of `other` differs from this one, in words; None where names and parents are the same.
+
+        Proportions do not count: orientations mean the same on a taller body.
+        """
+        missing = [name for name in self.names if name not in other.names]
+        extra = [name for name in other.names if name not in self.names]
+        if missing or extra:
+            parts = [f"lacks {_some(missing)}"] * bool(missing) + [f"adds {_some(extra)}"] * bool(extra)
+            return f"{other.name} {' and '.join(parts)}"
+        for name in self.names:
+            mine, theirs = self._parent_name(name), other._parent_name(name)
+            if mine != theirs:
+                return f"{name} hangs from {theirs} in {other.name}, from {mine} in {self.name}"
+        if self.names != other.names:
+            return f"{other.name} lists the same joints in another order"
+        return None
+
+    def _parent_name(self, joint: str) -> str:
+        parent = self.parents[self.index(joint)]
+        return "nothing" if parent < 0 else self.names[parent]
+
+    @property
+    def height(self) -> float:
+        """Vertical extent in metres of the body at rest (identity rotations), tips included."""
+        positions = self.positions(np.tile(rot.IDENTITY, (len(self), 1)), np.zeros(3))
+        heights = np.concatenate([positions[:, 1], (positions + self.tips)[:, 1]])
+        return float(np.ptp(heights))
+
+    def global_rotations(self, rotations: Array) -> Array:
+        """Rotations [..., J, 4] of each joint's frame against the world, from local ones [..., J, 4]."""
+        out = np.empty_like(rotations)
+        for joint, parent in enumerate(self.parents):
+            local = rotations[..., joint, :]
+            out[..., joint, :] = local if parent < 0 else rot.mul(out[..., parent, :], local)
+        return out
+
+    def local_rotations(self, turned: Array) -> Array:
+        """Local rotations [..., J, 4] from global ones; the inverse of `global_rotations`."""
+        parents = np.array(self.parents[1:], dtype=np.intp)
+        local = rot.inv_mul(turned[..., parents, :], turned[..., 1:, :])
+        return np.concatenate([turned[..., :1, :], local], axis=-2)
+
+    def positions(self, rotations: Array, root: Array) -> Array:
+        """Forward kinematics: joint positions [..., J, 3] in metres.
+
+        `rotations` [..., J, 4] are local, `root` [..., 3] is the root's position.
+        """
+        return self._positions(self.global_rotations(rotations), root)
+
+    def positions_and_tips(self, rotations: Array, root: Array) -> Array:
+        """Positions [..., J + J, 3] in metres of all joints, then of all tips (a joint without one twice)."""
+        turned = self.global_rotations(rotations)
+        positions = self._positions(turned, root)
+        return np.concatenate([positions, positions + rot.mul_vec(turned, self.tips)], axis=-2)
+
+    def _positions(self, turned: Array, root: Array) -> Array:
+        out = np.empty((*turned.shape[:-1], 3))
+        for joint, parent in enumerate(self.parents):
+            if parent < 0:
+                out[..., joint, :] = root
+            else:
+                arm = rot.mul_vec(turned[..., parent, :], self.offsets[joint])
+                out[..., joint, :] = out[..., parent, :] + arm
+        return out
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+# The tree of [I98] figure 4 with hands and toes. At rest: a T-pose facing +Z, every joint's axes the world's.
+# (joint, parent, offset in metres); segment lengths for a height of 1.70 m after Drillis and Contini, "Body segment
+# parameters" (1966), as given in Winter, "Biomechanics and Motor Control of Human Movement" (2009), fig. 4.1:
+# thigh .245 H, shank .246 H, ankle height .039 H, upper arm .186 H, forearm .146 H, hand .108 H, hips .191 H apart
+# outside to outside (half of it between the joints), shoulders .259 H apart.
+_LIMB = (
+    ("hip", "pelvis", (0.085, -0.070, 0.0)),
+    ("knee", "hip", (0.0, -0.417, 0.0)),
+    ("ankle", "knee", (0.0, -0.418, 0.0)),
+    ("toes", "ankle", (0.0, -0.066, 0.130)),
+)
+_TRUNK = (
+    ("lumbar", "pelvis", (0.0, 0.085, 0.0)),
+    ("thorax", "lumbar", (0.0, 0.145, 0.0)),
+    ("cervical", "thorax", (0.0, 0.260, 0.0)),
+    ("atlantal", "cervical", (0.0, 0.100, 0.015)),
+)
+_ARM = (
+    ("clavicle", "thorax", (0.030, 0.205, 0.0)),
+    ("shoulder", "clavicle", (0.150, 0.0, 0.0)),
+    ("elbow", "shoulder", (0.316, 0.0, 0.0)),
+    ("wrist", "elbow", (0.248, 0.0, 0.0)),
+    ("fingers", "wrist", (0.090, 0.0, 0.0)),
+)
+_TIPS = {"toes": (0.0, 0.0, 0.065), "atlantal": (0.0, 0.180, 0.0), "fingers": (0.094, 0.0, 0.0)}
+
+
+@cache
+def human23() -> Skeleton:
+    """The default body: 23 joints, 1.70 m, at rest in a T-pose facing +Z with all joint axes the world's."""
+    rows: list[tuple[str, str, tuple[float, float, float]]] = [("pelvis", "", (0.0, 0.0, 0.0))]
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        rows += [_sided(side, sign, row) for row in _LIMB]
+    rows += _TRUNK
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        rows += [_sided(side, sign, row) for row in _ARM]
+    names = tuple(name for name, _, _ in rows)
+    tips = np.zeros((len(rows), 3))
+    for i, name in enumerate(names):
+        x, y, z = _TIPS.get(name.split("_")[-1], (0.0, 0.0, 0.0))
+        tips[i] = (-x if name.startswith("right") else x, y, z)
+    parents = tuple(names.index(parent) if parent else -1 for _, parent, _ in rows)
+    return Skeleton("human23", names, parents, np.array([offset for _, _, offset in rows]), tips)
+
+
+def _sided(
+    side: str, sign: float, row: tuple[str, str, tuple[float, float, float]]
+) -> tuple[str, str, tuple[float, float, float]]:
+    joint, parent, (x, y, z) = row
+    shared = {"pelvis", "thorax"}
+    return f"{side}_{joint}", parent if parent in shared else f"{side}_{parent}", (sign * x, y, z)
