@@ -1,0 +1,72 @@
+"""Bridges: unattested moves between states that lie close together on SO(3), for where a corpus has no way through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.grammar.transitions import Transitions
+
+NEAREST = 3  # states to which a bridge leads from each state
+WITHIN = 45.0  # degrees that such a bridge may span
+
+
+@dataclass(frozen=True, eq=False)
+class Bridges:
+    """Unattested moves, flat as in Transitions: B in all.
+
+    Attributes:
+        indptr: bridges of each state [G + 1].
+        targets: the state that a bridge leads to, increasing within a row [B].
+        degrees: the angle that it spans [B].
+    """
+
+    indptr: NDArray[np.int64]
+    targets: NDArray[np.int32]
+    degrees: NDArray[np.float64]
+
+
+def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Bridges:
+    """Bridges between the states of each lane, whose orientations are `centres` [G, 4].
+
+    From every state to its three nearest within 45 degrees, and, both ways, along a minimum spanning tree of the
+    lane's states by angle, so that every state can be reached from every other. What is attested is no bridge.
+    """
+    indptr, targets, degrees = [np.zeros(1, np.int64)], [], []
+    for lane, size in enumerate(transitions.sizes()):
+        first = transitions.starts[lane]
+        angles = np.degrees(_angles(centres[first : first + size]))
+        near = _nearest(angles) | _spanning_tree(angles)
+        rows = transitions.indptr[first : first + size + 1]
+        attested = transitions.targets[rows[0] : rows[-1]]
+        near[np.repeat(np.arange(size), np.diff(rows)), attested] = False
+        source, target = np.nonzero(near)
+        indptr.append(np.cumsum(np.bincount(source, minlength=size)) + indptr[-1][-1])
+        targets.append(target.astype(np.int32))
+        degrees.append(angles[source, target])
+    return Bridges(np.concatenate(indptr), np.concatenate(targets), np.concatenate(degrees))
+
+
+def _angles(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angle between all pairs of orientations [S, S]; arccos serves, for states are no less than degrees apart."""
+    return 2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0))
+
+
+def _nearest(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+    near = np.zeros(angles.shape, dtype=bool)
+    others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
+    order = np.argsort(others, axis=1, kind="stable")[:, :NEAREST]
+    np.put_along_axis(near, order, np.take_along_axis(others, order, 1) <= WITHIN, axis=1)
+    return near
+
+
+def _spanning_tree(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
+    # The offset keeps edges of zero length, which a sparse matrix would drop, and leaves the tree what it is.
+    tree = minimum_spanning_tree(angles + 1.0).toarray() > 0.0
+    return np.asarray(tree | tree.T)
+
+

@@ -1,0 +1,130 @@
+"""How joints coordinate: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
+
+A pgmpy network is the model of record. A joint's conditional distribution is estimated from the corpus's postures with a
+Dirichlet prior of `PSEUDO_COUNT` virtual postures spread as the joint's marginal is, so that a pair that was never seen
+together costs what its parts cost: dear, but possible. With N the corpus's counts, m the marginal and a the pseudo-count,
+
+    P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
+
+and -log P separates into a term of c and a term of p wherever N(p, c) = 0. The search reads it in that form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pgmpy.models import DiscreteBayesianNetwork
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PSEUDO_COUNT = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Coordination:
+    """-log P(state | parent's state) in nats for all lanes, flat; G states, V pair rows, Q pairs seen.
+
+    A lane has one pair row for each state of its parent, `pair_starts[lane] + parent's state`; lanes without a parent
+    have none. A pair that is not listed costs `child_costs` of the state + `parent_costs` of the pair row.
+
+    Attributes:
+        parents: parent lane [L], or -1.
+        pair_starts: first pair row of each lane [L + 1].
+        pair_ptr: pairs of each pair row [V + 1].
+        pair_states: the lane's state in a pair, increasing within a pair row [Q].
+        pair_costs: -log P [Q].
+        child_costs: -log(a m(c)) for each state, 0 in lanes without a parent [G].
+        parent_costs: log(N(p) + a) for each pair row [V].
+    """
+
+    parents: Ints
+    pair_starts: Ints
+    pair_ptr: Ints
+    pair_states: NDArray[np.int32]
+    pair_costs: Floats
+    child_costs: Floats
+    parent_costs: Floats
+
+    def table(self, lane: int, starts: Ints) -> Floats:
+        """-log P(c | p) of one lane [states of the parent, states of the lane], nats."""
+        rows = slice(self.pair_starts[lane], self.pair_starts[lane + 1])
+        out = self.parent_costs[rows, None] + self.child_costs[starts[lane] : starts[lane + 1]]
+        for p, row in enumerate(range(rows.start, rows.stop)):
+            listed = slice(self.pair_ptr[row], self.pair_ptr[row + 1])
+            out[p, self.pair_states[listed]] = self.pair_costs[listed]
+        return np.asarray(out)
+
+
+def fit_network(
+    names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints
+) -> DiscreteBayesianNetwork:
+    """The pgmpy network over joints `names` [J] with `parents` [J], from `states` [N, J] of a corpus's postures.
+
+    Every joint is a node, with its states 0 .. S - 1 as state names; `get_cpds("left_knee")` is P(left_knee | left_hip).
+    """
+    import pandas as pd
+    from pgmpy.models import DiscreteBayesianNetwork
+    from pgmpy.parameter_estimator import DiscreteBayesianEstimator
+
+    network = DiscreteBayesianNetwork()
+    network.add_nodes_from(names)
+    network.add_edges_from((names[p], name) for name, p in zip(names, parents, strict=True) if p >= 0)
+    prior = {}
+    for j, name in enumerate(names):
+        marginal = np.bincount(states[:, j], minlength=sizes[j]) / len(states)
+        columns = sizes[parents[j]] if parents[j] >= 0 else 1
+        prior[name] = np.repeat(PSEUDO_COUNT * marginal[:, None], columns, axis=1)
+    estimator = DiscreteBayesianEstimator(
+        state_names={name: list(range(sizes[j])) for j, name in enumerate(names)},
+        prior_type="dirichlet",
+        pseudo_counts=prior,
+    )
+    frame = pd.DataFrame({name: states[:, j] for j, name in enumerate(names)})
+    network.add_cpds(*estimator.fit(network, frame).parameters_)
+    return network
+
+
+def compile_network(
+    network: DiscreteBayesianNetwork, names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints
+) -> Coordination:
+    """The flat form of a network's CPDs, in the order of `names`; `states` [N, J] tell which pairs were seen.
+
+    Lanes that are no node of the network are coupled to nothing.
+    """
+    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    child_costs = np.zeros(starts[-1])
+    pair_starts, pair_counts = [0], []
+    pair_states, pair_costs, parent_costs = [], [], []
+    coupled = np.array([p if name in network else -1 for name, p in zip(names, parents, strict=True)], dtype=np.int64)
+    for j, parent in enumerate(coupled):
+        if parent < 0:
+            pair_starts.append(pair_starts[-1])
+            continue
+        cpd = network.get_cpds(names[j])
+        values = cpd.get_values()  # [states of j, states of the parent]
+        if cpd.variables != [names[j], names[parent]] or values.shape != (sizes[j], sizes[parent]):
+            raise ValueError(f"the CPD of {names[j]} is over {cpd.variables} {values.shape}, not it and its parent")
+        keys = np.unique(states[:, parent].astype(np.int64) * sizes[j] + states[:, j])
+        p, c = keys // sizes[j], keys % sizes[j]
+        pair_counts.append(np.bincount(p, minlength=sizes[parent]))
+        pair_states.append(c)
+        pair_costs.append(-np.log(values[c, p]))
+        marginal = np.bincount(states[:, j], minlength=sizes[j]) / len(states)
+        child_costs[starts[j] : starts[j + 1]] = -np.log(PSEUDO_COUNT * marginal)
+        parent_costs.append(np.log(np.bincount(states[:, parent], minlength=sizes[parent]) + PSEUDO_COUNT))
+        pair_starts.append(pair_starts[-1] + sizes[parent])
+    return Coordination(
+        coupled,
+        np.array(pair_starts, dtype=np.int64),
+        np.concatenate([[0], np.cumsum(np.concatenate([np.zeros(0, np.int64), *pair_counts]))]).astype(np.int64),
+        np.concatenate([np.zeros(0), *pair_states]).astype(np.int32),
+        np.concatenate([np.zeros(0), *pair_costs]),
+        child_costs,
+        np.concatenate([np.zeros(0), *parent_costs]),
+    )

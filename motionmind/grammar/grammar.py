@@ -1,0 +1,61 @@
+"""All that is learned from a corpus, and the costs that the search reads from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.grammar.bridges import Bridges, find_bridges
+from motionmind.grammar.coordination import Coordination, compile_network, fit_network
+from motionmind.grammar.transitions import Transitions, Weights, count_transitions
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grammar:
+    """How each lane moves, where it may be bridged, and how lanes coordinate.
+
+    Attributes:
+        lanes: names [L]: the skeleton's joints, then "facing" where the body's turn travels as a lane of its own.
+        centres: orientation of each state of each lane [G, 4].
+        transitions: the joint graphs.
+        bridges: unattested moves between neighbours.
+        coordination: the compiled network.
+    """
+
+    lanes: tuple[str, ...]
+    centres: Floats
+    transitions: Transitions
+    bridges: Bridges
+    coordination: Coordination
+
+
+def learn(
+    lanes: tuple[str, ...],
+    parents: Ints,
+    centres: Floats,
+    states: NDArray[np.int32],
+    sizes: Ints,
+    begins: Ints,
+    seconds: Floats,
+) -> Grammar:
+    """Learn from a corpus's postures.
+
+    Args:
+        lanes: names [L]; one called "facing" is pooled over where it turns from and coordinates with nothing.
+        parents: parent lane [L], or -1.
+        centres: orientation of each state, lane after lane [sum of sizes, 4].
+        states: state of each lane in each posture [N, L]; every state of a joint occurs.
+        sizes: number of states in each lane [L].
+        begins: postures from which a move leads to the next [M].
+        seconds: duration of those moves [M].
+    """
+    joints = len(lanes) - (lanes[-1] == "facing")
+    transitions = count_transitions(states, sizes, begins, seconds, pooled=joints if joints < len(lanes) else None)
+    network = fit_network(lanes[:joints], parents[:joints], states[:, :joints], sizes[:joints])
+    coordination = compile_network(network, lanes, parents, states, sizes)
+    return Grammar(lanes, centres, transitions, find_bridges(centres, transitions), coordination)

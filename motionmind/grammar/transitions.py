@@ -1,0 +1,125 @@
+"""Joint graphs: which state follows which in a corpus, how often, and who attests it.
+
+A *lane* is a joint, or the body's facing where that travels on its own. States are numbered from 0 in each lane; state
+s of lane j has the row `starts[j] + s` in flat arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Weights = Literal["conditional", "printed"]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Transitions:
+    """The joint graphs of L lanes, flat: G states in all, E attested transitions in all.
+
+    Attributes:
+        starts: first row of each lane [L + 1].
+        indptr: transitions of each state [G + 1].
+        targets: the state that a transition leads to, increasing within a row [E].
+        counts: how often it was seen [E].
+        visits: how many postures are in each state [G].
+        attests: index of the first posture from which the transition was made [E].
+        seconds: its mean duration [E].
+    """
+
+    starts: Ints
+    indptr: Ints
+    targets: Indices
+    counts: Floats
+    visits: Floats
+    attests: Indices
+    seconds: Floats
+
+    @property
+    def sources(self) -> Ints:
+        """Row of the state that each transition leaves [E]."""
+        return np.repeat(np.arange(len(self.visits)), np.diff(self.indptr))
+
+    def sizes(self) -> Ints:
+        """Number of states in each lane [L]."""
+        return np.diff(self.starts)
+
+    def weights(self, scheme: Weights) -> Floats:
+        """Weight in nats of each transition s -> s' [E].
+
+        `conditional` is -log P(s' | s) = log C(s) - log C(s, s'), C(s) counted over the transitions that leave s
+        ([I98] 2.2.1); `printed` is -log f(s) + log f(s') - log f(s, s') with relative frequencies, as [C98] and
+        [TR97] print it.
+        """
+        sources = self.sources
+        if scheme == "conditional":
+            leaving = np.bincount(sources, weights=self.counts, minlength=len(self.visits))
+            return np.asarray(np.log(leaving[sources]) - np.log(self.counts))
+        lane = np.searchsorted(self.starts, sources, side="right") - 1
+        lane_of_row = np.repeat(np.arange(len(self.starts) - 1), self.sizes())
+        visited = self.visits / np.bincount(lane_of_row, weights=self.visits)[lane_of_row]
+        moved = self.counts / np.bincount(lane, weights=self.counts)[lane]
+        return np.asarray(-np.log(visited[sources]) + np.log(visited[self.starts[lane] + self.targets]) - np.log(moved))
+
+    def edge(self, lane: int, state: int, target: int) -> int:
+        """Index of the transition from `state` to `target` in a lane; -1 where it is not attested."""
+        row = self.starts[lane] + state
+        first, last = self.indptr[row], self.indptr[row + 1]
+        at = int(first + np.searchsorted(self.targets[first:last], target))
+        return at if at < last and self.targets[at] == target else -1
+
+
+def count_transitions(
+    states: NDArray[np.int32], sizes: Ints, begins: Ints, seconds: Floats, pooled: int | None = None
+) -> Transitions:
+    """Count the transitions of all lanes.
+
+    Args:
+        states: state of each lane in each posture [N, L].
+        sizes: number of states in each lane [L].
+        begins: postures from which a move leads to the next posture, none across clips [M].
+        seconds: duration of those moves [M].
+        pooled: a lane whose states are equal steps of a circle: what is counted is by how many steps it turns, pooled
+            over where it turns from, and holds from every state alike.
+    """
+    lanes, size = states.shape[1], np.asarray(sizes, dtype=np.int64)
+    sources, targets, counts, attests, durations, visits = [], [], [], [], [], []
+    for lane in range(lanes):
+        src, dst = states[begins, lane].astype(np.int64), states[begins + 1, lane].astype(np.int64)
+        if lane == pooled:
+            src, dst = np.zeros_like(src), (dst - src) % size[lane]
+        keys, first, which, count = np.unique(
+            src * size[lane] + dst, return_index=True, return_inverse=True, return_counts=True
+        )
+        mean = np.bincount(which, weights=seconds, minlength=len(keys)) / count
+        source, target, visited = keys // size[lane], keys % size[lane], states[:, lane]
+        if lane == pooled:
+            turned = (np.arange(size[lane])[:, None] + target[None, :]) % size[lane]
+            order = np.argsort(turned, axis=1)
+            source, target = np.repeat(np.arange(size[lane]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
+            first, count, mean = (array[order].ravel() for array in (first, count, mean))
+            visits.append(np.full(size[lane], len(visited) / size[lane]))
+        else:
+            visits.append(np.bincount(visited, minlength=size[lane]))
+        sources.append(source)
+        targets.append(target)
+        counts.append(count)
+        attests.append(begins[first])
+        durations.append(mean)
+    starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+    rows = np.concatenate([starts[lane] + source for lane, source in enumerate(sources)])
+    leaving = np.bincount(rows, minlength=starts[-1])
+    return Transitions(
+        starts,
+        np.concatenate([[0], np.cumsum(leaving)]).astype(np.int64),
+        np.concatenate(targets).astype(np.int32),
+        np.concatenate(counts).astype(np.float64),
+        np.concatenate(visits).astype(np.float64),
+        np.concatenate(attests).astype(np.int32),
+        np.concatenate(durations).astype(np.float64),
+    )

@@ -1,0 +1,308 @@
+"""Memory-bounded A* over the variables of a grid, one at a time (operator decomposition).
+
+A node fixes the variables up to one; its *frontier* is the last position chosen in each lane, which is all that the
+rest depends on, so nodes with the same variable and frontier are the same node. f grows by `bound.step`.
+
+When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
+backed up into it; it is opened again with that f, so nothing is lost from the proof. Sources: Standley, "Finding optimal
+solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition); Russell, "Efficient memory-bounded search
+methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified memory-bounded A star (SMA*+)", GCAI 2017. Leaves are
+forgotten by halves, not one by one, which keeps the cost of forgetting constant per node.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.search.bound import Messages, step
+from motionmind.search.jit import jit
+from motionmind.search.problem import Floats, Grid, Ints
+
+# Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
+SAME = 1e-9
+
+_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what the counters count
+
+
+class _Nodes(NamedTuple):
+    """Up to N nodes and what finds them. `count` holds the counters above."""
+
+    var: NDArray[np.int32]  # the last variable that is fixed [N]
+    frontier: NDArray[np.uint16]  # last choice in each lane, as an index into its domain [N, L]
+    f: Floats  # cost so far + bound on the cost to go [N]
+    key: Floats  # what orders the open list: f, or the greater f backed up from forgotten children [N]
+    parent: NDArray[np.int32]  # [N]
+    children: NDArray[np.int32]  # number of children in memory [N]
+    slot: NDArray[np.int32]  # place in the heap, -1 where closed [N]
+    following: NDArray[np.int32]  # next node of the same bucket, -1 at the end [N]
+    bucket: NDArray[np.int32]  # first node of each bucket [a power of two]
+    heap: NDArray[np.int32]  # open nodes, a binary heap [N]
+    free: NDArray[np.int32]  # stack of unused nodes [N]
+    count: Ints
+
+
+@jit
+def search(
+    grid: Grid, m: Messages, bound: float, cost: float, path: Ints, budget: int, expansions: int
+) -> tuple[float, float, int, int]:
+    """Search for a path that costs less than `cost`; write the best to `path` [n] (positions).
+
+    Returns its cost (or `cost`), a lower bound on the cost of every path, the number of expansions (at most
+    `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `m` proves from the start.
+    """
+    nodes = _root(grid, bound, budget)
+    lower = cost
+    while nodes.count[_HEAPED] > 0:
+        node = nodes.heap[0]
+        if nodes.key[node] >= cost - SAME:
+            break
+        if nodes.count[_EXPANDED] >= expansions:
+            lower = nodes.key[node]
+            break
+        _close(nodes, node)
+        nodes.count[_EXPANDED] += 1
+        cost, complete = _expand(grid, m, nodes, node, cost, path)
+        if not complete:
+            lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.count[_HEAPED] else np.inf)
+            break
+        _release(nodes, node)
+    return cost, min(lower, cost), nodes.count[_EXPANDED], nodes.count[_PEAK]
+
+
+@jit
+def _expand(grid: Grid, m: Messages, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
+    """Generate the children of a node that may lead below `cost`; the cost then known, and whether all found room."""
+    lanes = grid.lanes
+    i = nodes.var[node] + 1
+    lane = i % lanes
+    parent = grid.parents[lane]
+    before = grid.dom_ptr[i - lanes] + nodes.frontier[node, lane]
+    above = grid.dom_ptr[i - lane + parent] + nodes.frontier[node, parent] if parent >= 0 else -1
+    floor = nodes.key[node]  # forgetting may back a greater key up into the node before its last child has come
+    for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
+        x = grid.row_to[e]
+        f = nodes.f[node] + step(grid, m, i, before, above, e)
+        key = max(f, floor)
+        if key >= cost - SAME:
+            continue
+        choice = x - grid.dom_ptr[i]
+        if i == len(grid.dom_ptr) - 2:
+            cost = f
+            _trace(grid, nodes, node, path)
+            path[i] = x
+            continue
+        twin = _find(nodes, node, i, choice, lane)
+        if twin >= 0:
+            if nodes.f[twin] <= f:
+                continue
+            if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
+                other = nodes.parent[twin]
+                _forsake(nodes, twin)
+                if other != node:
+                    _release(nodes, other)
+        if nodes.count[_FREE] == 0 and not _forget(nodes, node):
+            nodes.key[node] = floor
+            return cost, False
+        _add(nodes, node, i, choice, lane, f, key)
+    return cost, True
+
+
+@jit
+def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
+    """Room for `budget` nodes, and the one that fixes every lane at its start, open."""
+    buckets = 1
+    while buckets < budget:
+        buckets *= 2
+    nodes = _Nodes(
+        np.empty(budget, np.int32),
+        np.zeros((budget, grid.lanes), np.uint16),
+        np.empty(budget),
+        np.empty(budget),
+        np.full(budget, -1, np.int32),
+        np.zeros(budget, np.int32),
+        np.full(budget, -1, np.int32),
+        np.full(budget, -1, np.int32),
+        np.full(buckets, -1, np.int32),
+        np.empty(budget, np.int32),
+        np.arange(budget - 1, -1, -1).astype(np.int32),
+        np.zeros(5, np.int64),
+    )
+    nodes.count[_FREE] = budget - 1
+    nodes.count[_NODES] = nodes.count[_PEAK] = 1
+    nodes.var[0], nodes.f[0], nodes.key[0] = grid.lanes - 1, bound, bound
+    _open(nodes, 0)
+    return nodes
+
+
+@jit
+def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
+    """Write the positions that a node and its ancestors chose."""
+    while node >= 0:
+        i = nodes.var[node]
+        path[i] = grid.dom_ptr[i] + nodes.frontier[node, i % grid.lanes]
+        node = nodes.parent[node]
+
+
+@jit
+def _forget(nodes: _Nodes, current: int) -> bool:
+    """Forget the worse half of the leaves, backing their keys up into their parents; whether any could be forgotten."""
+    leaves = np.empty(nodes.count[_HEAPED], np.int32)
+    count = 0
+    for k in range(nodes.count[_HEAPED]):
+        node = nodes.heap[k]
+        if nodes.children[node] == 0 and nodes.parent[node] >= 0 and node != current:
+            leaves[count] = node
+            count += 1
+    order = np.argsort(-nodes.key[leaves[:count]], kind="mergesort")
+    for k in order[: (count + 1) // 2]:
+        node = leaves[k]
+        parent = nodes.parent[node]
+        closed = nodes.slot[parent] < 0
+        nodes.key[parent] = nodes.key[node] if closed else min(nodes.key[parent], nodes.key[node])
+        _forsake(nodes, node)
+        if closed:
+            _open(nodes, parent)
+        else:
+            _rise(nodes, nodes.slot[parent])
+    return count > 0
+
+
+@jit
+def _release(nodes: _Nodes, node: int) -> None:
+    """Free a closed node that has no children, for nothing below the known cost lies behind it; and so its ancestors."""
+    while node > 0 and nodes.slot[node] < 0 and nodes.children[node] == 0:
+        parent = nodes.parent[node]
+        _drop(nodes, node)
+        node = parent
+
+
+@jit
+def _forsake(nodes: _Nodes, leaf: int) -> None:
+    """Free an open leaf."""
+    _close(nodes, leaf)
+    _drop(nodes, leaf)
+
+
+# --- nodes and the table that finds them -----------------------------------------------------------------------------
+
+
+@jit
+def _hash(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
+    """Bucket of the frontier of `node` with `choice` in `lane`: FNV-1a over its entries."""
+    h = np.uint64(14695981039346656037) ^ np.uint64(var)
+    for k in range(nodes.frontier.shape[1]):
+        h = (h ^ np.uint64(choice if k == lane else nodes.frontier[node, k])) * np.uint64(1099511628211)
+    h ^= h >> np.uint64(32)
+    return np.int64(h & np.uint64(len(nodes.bucket) - 1))
+
+
+@jit
+def _find(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
+    """The node in memory that fixes `var` with the frontier of `node` and `choice` in `lane`; -1 if none does."""
+    twin = nodes.bucket[_hash(nodes, node, var, choice, lane)]
+    while twin >= 0:
+        same = nodes.var[twin] == var and nodes.frontier[twin, lane] == choice
+        for k in range(nodes.frontier.shape[1]):
+            if not same:
+                break
+            same = k == lane or nodes.frontier[twin, k] == nodes.frontier[node, k]
+        if same:
+            return twin
+        twin = nodes.following[twin]
+    return -1
+
+
+@jit
+def _add(nodes: _Nodes, node: int, var: int, choice: int, lane: int, f: float, key: float) -> None:
+    """A new open child of `node`."""
+    nodes.count[_FREE] -= 1
+    child = nodes.free[nodes.count[_FREE]]
+    nodes.count[_NODES] += 1
+    nodes.count[_PEAK] = max(nodes.count[_PEAK], nodes.count[_NODES])
+    nodes.frontier[child] = nodes.frontier[node]
+    nodes.frontier[child, lane] = choice
+    nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
+    nodes.parent[child], nodes.children[child] = node, 0
+    nodes.children[node] += 1
+    home = _hash(nodes, child, var, choice, lane)
+    nodes.following[child] = nodes.bucket[home]
+    nodes.bucket[home] = child
+    _open(nodes, child)
+
+
+@jit
+def _drop(nodes: _Nodes, node: int) -> None:
+    """Take a closed node without children out of memory."""
+    lane = nodes.var[node] % nodes.frontier.shape[1]
+    home = _hash(nodes, node, nodes.var[node], nodes.frontier[node, lane], lane)
+    if nodes.bucket[home] == node:
+        nodes.bucket[home] = nodes.following[node]
+    else:
+        earlier = nodes.bucket[home]
+        while nodes.following[earlier] != node:
+            earlier = nodes.following[earlier]
+        nodes.following[earlier] = nodes.following[node]
+    nodes.children[nodes.parent[node]] -= 1
+    nodes.free[nodes.count[_FREE]] = node
+    nodes.count[_FREE] += 1
+    nodes.count[_NODES] -= 1
+
+
+# --- the open list: a binary heap that knows where each node stands ---------------------------------------------------
+
+
+@jit
+def _before(nodes: _Nodes, a: int, b: int) -> bool:
+    """Lower key first; of equal keys the deeper node, then the one of lower number, so that ties fall the same way."""
+    if nodes.key[a] != nodes.key[b]:
+        return nodes.key[a] < nodes.key[b]
+    if nodes.var[a] != nodes.var[b]:
+        return nodes.var[a] > nodes.var[b]
+    return a < b
+
+
+@jit
+def _open(nodes: _Nodes, node: int) -> None:
+    k = nodes.count[_HEAPED]
+    nodes.count[_HEAPED] += 1
+    nodes.heap[k], nodes.slot[node] = node, k
+    _rise(nodes, k)
+
+
+@jit
+def _close(nodes: _Nodes, node: int) -> None:
+    nodes.count[_HEAPED] -= 1
+    k, last = nodes.slot[node], nodes.heap[nodes.count[_HEAPED]]
+    nodes.slot[node] = -1
+    if last != node:
+        nodes.heap[k], nodes.slot[last] = last, k
+        _rise(nodes, k)
+        _sink(nodes, nodes.slot[last])
+
+
+@jit
+def _rise(nodes: _Nodes, k: int) -> None:
+    node = nodes.heap[k]
+    while k > 0 and _before(nodes, node, nodes.heap[(k - 1) // 2]):
+        nodes.heap[k] = nodes.heap[(k - 1) // 2]
+        nodes.slot[nodes.heap[k]] = k
+        k = (k - 1) // 2
+    nodes.heap[k], nodes.slot[node] = node, k
+
+
+@jit
+def _sink(nodes: _Nodes, k: int) -> None:
+    node, size = nodes.heap[k], nodes.count[_HEAPED]
+    while 2 * k + 1 < size:
+        child = 2 * k + 1
+        if child + 1 < size and _before(nodes, nodes.heap[child + 1], nodes.heap[child]):
+            child += 1
+        if not _before(nodes, nodes.heap[child], node):
+            break
+        nodes.heap[k] = nodes.heap[child]
+        nodes.slot[nodes.heap[k]] = k
+        k = child
+    nodes.heap[k], nodes.slot[node] = node, k

@@ -1,0 +1,262 @@
+"""A lower bound on the cost of a grid, and on the cost to go from any partial path: sequential tree-reweighted messages.
+
+Source: Kolmogorov, "Convergent tree-reweighted message passing for energy minimization", IEEE TPAMI 28(10), 2006.
+Variables are ordered by move, then by lane. Each carries gamma = 1 / max(edges in, edges out); a sweep visits all in
+order, or in reverse, and sends from variable a along each edge (a, b) that leads on
+
+    M(a -> b)(x_b) = min over x_a of  gamma_a * theta_a(x_a) - M(b -> a)(x_a) + theta_ab(x_a, x_b)
+
+where theta_a is the variable's own cost plus all messages to it, less its minimum. What is taken out so that theta and
+messages have the minimum 0 are the *constants* of the variable; after a backward sweep their sum is a lower bound.
+
+Then, for values chosen for all variables up to i, the cost of the rest is at least
+
+    h = sum of M(b -> a)(x_a) over edges with a chosen and b not  +  sum of the constants of the variables after i.
+
+Proof, from the last variable back: for an unchosen b the backward messages that b sent are minima over x_b of
+gamma_b * theta_b - M(a -> b) + theta_ab, one for each of its n <= 1 / gamma_b edges in. As theta_b >= 0, the sum of
+gamma_b * theta_b over them is at most theta_b, which is b's own cost plus the messages into b (those from before
+cancel with the M(a -> b) that are taken off) less b's constant. So they add up to at most b's own cost, its edges in,
+the messages that came back to b, less its constants; and so on to the last. Whatever the forward messages were.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind.search.jit import jit
+from motionmind.search.problem import Floats, Grid, Ints
+
+
+class Messages(NamedTuple):
+    """Messages of a grid, P positions and U coupling rows, and what the backward sweep took out.
+
+    Attributes:
+        down_row: to each position from its lane's variable one move before [P].
+        up_row: to each position from its lane's variable one move after [P].
+        down_col: to each position from its parent variable [P].
+        up_col: to each position of its parent variable from a variable, by coupling row [U].
+        constants: taken out at each variable [n].
+        ahead: a position's own cost plus all messages to it from later variables, less its variable's constant [P]:
+            what assigning it adds to f, but for its edges in and what they had promised.
+    """
+
+    down_row: Floats
+    up_row: Floats
+    down_col: Floats
+    up_col: Floats
+    constants: Floats
+    ahead: Floats
+
+
+@jit
+def no_messages(grid: Grid) -> Messages:
+    """Messages of zero: the bound they give is the sum of each variable's minimum."""
+    count = len(grid.dom)
+    return Messages(
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(grid.up_ptr[-1]),
+        np.zeros(len(grid.dom_ptr) - 1),
+        np.zeros(count),
+    )
+
+
+@jit
+def _ahead(grid: Grid, m: Messages, i: int) -> None:
+    """A variable's own cost and all that later variables sent to it, into `ahead`."""
+    lanes, lane = grid.lanes, i % grid.lanes
+    first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
+    for p in range(first, last):
+        m.ahead[p] = grid.unary[p] + m.up_row[p]
+    if i >= lanes:
+        for child in range(lane + 1, lanes):
+            if grid.parents[child] == lane:
+                base = grid.up_ptr[i - lane + child]
+                for p in range(first, last):
+                    m.ahead[p] += m.up_col[base + p - first]
+
+
+@jit
+def _theta(grid: Grid, m: Messages, i: int) -> Floats:
+    """gamma times the variable's own cost plus all messages to it, their minimum (the variable's constant) taken out."""
+    lanes, lane = grid.lanes, i % grid.lanes
+    first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
+    _ahead(grid, m, i)
+    theta = np.empty(last - first)
+    for p in range(first, last):
+        theta[p - first] = m.ahead[p] + m.down_row[p] + m.down_col[p]
+    least = np.min(theta)
+    m.constants[i] = least
+    edges_in = 0 if i < lanes else 1 if grid.parents[lane] < 0 else 2
+    edges_out = 1 if i < lanes * grid.moves else 0
+    if i >= lanes:
+        for child in range(lane + 1, lanes):
+            if grid.parents[child] == lane:
+                edges_out += 1
+    gamma = 1.0 / max(edges_in, edges_out, 1)
+    for k in range(last - first):
+        theta[k] = gamma * (theta[k] - least)
+    return theta
+
+
+@jit
+def forward(grid: Grid, m: Messages) -> None:
+    """One sweep from the first variable to the last: each sends to its lane's next move and to its children."""
+    lanes = grid.lanes
+    for i in range(len(grid.dom_ptr) - 1):
+        lane = i % lanes
+        first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
+        theta = _theta(grid, m, i)
+        if i < lanes * grid.moves:
+            begin, end = grid.dom_ptr[i + lanes], grid.dom_ptr[i + lanes + 1]
+            for x in range(begin, end):
+                m.down_row[x] = np.inf
+            for p in range(first, last):
+                value = theta[p - first] - m.up_row[p]
+                for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
+                    x = grid.row_to[e]
+                    m.down_row[x] = min(m.down_row[x], value + grid.row_cost[e])
+            _settle(m.down_row, begin, end)
+        if i >= lanes:
+            for child in range(lane + 1, lanes):
+                if grid.parents[child] == lane:
+                    below = i - lane + child
+                    begin, end, base = grid.dom_ptr[below], grid.dom_ptr[below + 1], grid.up_ptr[below]
+                    least = np.inf
+                    for k in range(last - first):
+                        least = min(least, theta[k] - m.up_col[base + k])
+                    for x in range(begin, end):
+                        m.down_col[x] = least
+                    for k in range(last - first):
+                        value = theta[k] - m.up_col[base + k]
+                        for q in range(grid.col_ptr[base + k], grid.col_ptr[base + k + 1]):
+                            x = grid.col_to[q]
+                            m.down_col[x] = min(m.down_col[x], value + grid.col_cost[q])
+                    _settle(m.down_col, begin, end)
+
+
+@jit
+def backward(grid: Grid, m: Messages) -> float:
+    """One sweep from the last variable to the first; the lower bound that it proves."""
+    lanes = grid.lanes
+    bound = 0.0
+    for i in range(len(grid.dom_ptr) - 2, -1, -1):
+        lane = i % lanes
+        first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
+        theta = _theta(grid, m, i)
+        if i >= lanes:
+            before = i - lanes
+            for p in range(grid.dom_ptr[before], grid.dom_ptr[before + 1]):
+                least = np.inf
+                for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
+                    x = grid.row_to[e]
+                    least = min(least, grid.row_cost[e] + theta[x - first] - m.down_row[x])
+                m.up_row[p] = least
+            m.constants[i] += _settle(m.up_row, grid.dom_ptr[before], grid.dom_ptr[before + 1])
+            if grid.parents[lane] >= 0:
+                least = np.inf
+                for x in range(first, last):
+                    least = min(least, theta[x - first] - m.down_col[x])
+                for u in range(grid.up_ptr[i], grid.up_ptr[i + 1]):
+                    value = least
+                    for q in range(grid.col_ptr[u], grid.col_ptr[u + 1]):
+                        x = grid.col_to[q]
+                        value = min(value, grid.col_cost[q] + theta[x - first] - m.down_col[x])
+                    m.up_col[u] = value
+                m.constants[i] += _settle(m.up_col, grid.up_ptr[i], grid.up_ptr[i + 1])
+        for p in range(first, last):
+            m.ahead[p] -= m.constants[i]
+        bound += m.constants[i]
+    return bound
+
+
+@jit
+def _settle(message: Floats, begin: int, end: int) -> float:
+    """Take its minimum out of a message and return it."""
+    least = np.inf
+    for x in range(begin, end):
+        least = min(least, message[x])
+    for x in range(begin, end):
+        message[x] -= least
+    return least
+
+
+@jit
+def discount(grid: Grid, u: int, x: int) -> float:
+    """The discount for position `x` in coupling row `u`; 0 for a pair that is not listed."""
+    low, high = grid.col_ptr[u], grid.col_ptr[u + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if grid.col_to[middle] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return grid.col_cost[low] if low < grid.col_ptr[u + 1] and grid.col_to[low] == x else 0.0
+
+
+@jit
+def step(grid: Grid, m: Messages, i: int, before: int, above: int, e: int) -> float:
+    """What f grows by when variable i takes the position that edge `e` leads to.
+
+    `before` is the position of its lane one move earlier, `above` that of its parent variable (-1 without one): the
+    cost of the position and of its edges in, plus what later variables have sent back to it, less what its edges in
+    had promised and the variable's constant. At least 0 but for rounding.
+    """
+    x = grid.row_to[e]
+    grown = grid.row_cost[e] + m.ahead[x] - m.up_row[before]
+    if above >= 0:
+        u = grid.up_ptr[i] + above - grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
+        grown += discount(grid, u, x) - m.up_col[u]
+    return grown
+
+
+@jit
+def descend(grid: Grid, m: Messages, path: Ints, start: int) -> float:
+    """Complete `path` [n] (positions) from variable `start` on, each with the position that f grows least by; f's growth.
+
+    It never fails: every position of a domain leads on along its lane, and couplings forbid nothing.
+    """
+    lanes = grid.lanes
+    grown = 0.0
+    for i in range(start, len(grid.dom_ptr) - 1):
+        parent, before = grid.parents[i % lanes], path[i - lanes]
+        above = path[i - i % lanes + parent] if parent >= 0 else -1
+        least = np.inf
+        for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
+            value = step(grid, m, i, before, above, e)
+            if value < least:
+                least, path[i] = value, grid.row_to[e]
+        grown += least
+    return grown
+
+
+@jit
+def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> tuple[float, float]:
+    """Run up to `sweeps` pairs of sweeps; the bound, and the cost of the best path met on the way, written to `path` [n].
+
+    Stops when the bound reaches that cost or `enough`, or when eight pairs have raised it by less than a thousandth of
+    what separates it from that cost.
+    """
+    lanes = grid.lanes
+    trial = np.zeros(len(path), np.int64)
+    for lane in range(lanes):
+        path[lane] = trial[lane] = grid.dom_ptr[lane]
+    bound, cost, earlier = -np.inf, np.inf, -np.inf
+    for sweep in range(sweeps):
+        forward(grid, m)
+        bound = backward(grid, m)
+        found = bound + descend(grid, m, trial, lanes)
+        if found < cost:
+            cost = found
+            path[:] = trial
+        if bound >= min(cost, enough) - 1e-9:
+            break
+        if sweep % 8 == 7:
+            if bound - earlier < 1e-3 * (min(cost, enough) - bound):
+                break
+            earlier = bound
+    return bound, cost

@@ -1,0 +1,60 @@
+"""From a grammar to what the search reads: every edge and coupling with its cost in nats."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.transitions import Weights
+from motionmind.search.problem import Model
+
+
+def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None) -> Model:
+    """The costs of a grammar.
+
+    Args:
+        grammar: what was learned.
+        weights: how transitions are weighed.
+        coordination: lambda, the factor of the network's -log P.
+        bridge_price: nats for each degree that a bridge spans; None leaves bridges out.
+    """
+    graph, bridges, net = grammar.transitions, grammar.bridges, grammar.coordination
+    rows, targets, costs = graph.sources, graph.targets, graph.weights(weights)
+    if bridge_price is not None:
+        bridged = np.repeat(np.arange(len(bridges.indptr) - 1), np.diff(bridges.indptr))
+        rows = np.concatenate([rows, bridged])
+        targets = np.concatenate([targets, bridges.targets])
+        costs = np.concatenate([costs, bridge_price * bridges.degrees])
+        order = np.lexsort([targets, rows])
+        rows, targets, costs = rows[order], targets[order], costs[order]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(graph.visits)))]).astype(np.int64)
+
+    unary, alone = coordination * net.child_costs, np.zeros(len(graph.visits))
+    discounts = np.zeros(len(net.pair_costs))
+    for lane, parent in enumerate(net.parents):
+        if parent < 0:
+            continue
+        mine = slice(graph.starts[lane], graph.starts[lane + 1])
+        above = slice(graph.starts[parent], graph.starts[parent + 1])
+        pair_rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
+        unary[above] += coordination * net.parent_costs[pair_rows]
+        pairs = slice(net.pair_ptr[pair_rows.start], net.pair_ptr[pair_rows.stop])
+        row_of_pair = np.repeat(net.parent_costs[pair_rows], np.diff(net.pair_ptr[pair_rows.start : pair_rows.stop + 1]))
+        separable = net.child_costs[mine][net.pair_states[pairs]] + row_of_pair
+        discounts[pairs] = coordination * np.minimum(net.pair_costs[pairs] - separable, 0.0)
+        least = net.child_costs[mine] + net.parent_costs[pair_rows].min()
+        np.minimum.at(least, net.pair_states[pairs], net.pair_costs[pairs])
+        alone[mine] = coordination * least
+    return Model(
+        graph.starts,
+        net.parents,
+        indptr,
+        targets,
+        costs,
+        unary,
+        alone,
+        net.pair_starts,
+        net.pair_ptr,
+        net.pair_states,
+        discounts,
+    )

@@ -1,0 +1,276 @@
+"""What is minimised: chains of states, one a lane, that run in lockstep and are coupled by a tree at every move.
+
+A lane is one joint's joint graph (or the body's facing). For T moves there is a variable (t, lane) for t = 0 .. T,
+whose domain holds the states that lie on some walk of exactly T moves from the lane's start to its goal. Along a lane
+consecutive variables are coupled by the lane's edges (an absent edge is forbidden); at every t >= 1 each lane is
+coupled to its parent in the tree. The search knows nothing of bodies beyond this.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.search.jit import jit
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Indices = NDArray[np.int32]
+
+
+class Model(NamedTuple):
+    """Costs in nats of moves and of standing together, for L lanes with S_j states, G = sum S_j.
+
+    State s of lane j has the row `starts[j] + s` in what is listed by state.
+
+    The coupling of a lane to its parent costs `unary` (its part that separates into one term a state, summed over
+    all couplings that a state takes part in) plus a discount below 0 for the listed pairs, 0 for all others. That is
+    the form of a table whose unseen pairs back off to marginals, and makes a message linear in the pairs seen.
+
+    Attributes:
+        starts: first row of each lane [L + 1].
+        parents: parent lane [L], smaller than the lane, or -1.
+        indptr: edges of each state [G + 1]; `targets` and `costs` from `indptr[row]` to `indptr[row + 1]`.
+        targets: state that an edge leads to [E], increasing within a row.
+        costs: cost of the edge [E].
+        unary: cost of being in a state at any t >= 1 [G].
+        alone: a lower bound on a state's share of the couplings, when nothing is known of the other lanes [G]:
+            the least that the coupling to its parent can cost.
+        pair_starts: first pair row of each lane [L + 1]; a lane has one pair row for each state of its parent.
+        pair_ptr: pairs of each pair row [sum + 1].
+        pair_states: the lane's state in a listed pair [Q], increasing within a pair row.
+        pair_costs: its discount, below 0 [Q].
+    """
+
+    starts: Ints
+    parents: Ints
+    indptr: Ints
+    targets: Indices
+    costs: Floats
+    unary: Floats
+    alone: Floats
+    pair_starts: Ints
+    pair_ptr: Ints
+    pair_states: Indices
+    pair_costs: Floats
+
+
+class Grid(NamedTuple):
+    """The problem for a fixed number of moves, as flat arrays. Variable i = t * L + lane; a position is one state of one
+    variable's domain, numbered through all variables.
+
+    Attributes:
+        lanes: L.
+        moves: T.
+        parents: parent lane [L] or -1.
+        dom_ptr: positions of variable i are `dom_ptr[i]` to `dom_ptr[i + 1]` [(T + 1) L + 1].
+        dom: the state at each position [P].
+        unary: cost of each position [P].
+        row_ptr: edges from each position to the next move's variable [P + 1].
+        row_to: position that an edge leads to [R].
+        row_cost: cost of the edge [R].
+        up_ptr: first coupling row of variable i [(T + 1) L + 1]; it has one for each position of its parent variable.
+        col_ptr: listed pairs of each coupling row [U + 1].
+        col_to: the variable's position in a listed pair [Q], increasing within a row.
+        col_cost: its discount, below 0 [Q].
+    """
+
+    lanes: int
+    moves: int
+    parents: Ints
+    dom_ptr: Ints
+    dom: Indices
+    unary: Floats
+    row_ptr: Ints
+    row_to: Indices
+    row_cost: Floats
+    up_ptr: Ints
+    col_ptr: Ints
+    col_to: Indices
+    col_cost: Floats
+
+
+def with_waits(model: Model, goal: Ints, wait: float) -> Model:
+    """The model in which every lane may wait at its goal for `wait` a move, or hold there if that is cheaper."""
+    rows = model.starts[:-1] + goal
+    at = np.array([_insertion(model, row, state) for row, state in zip(rows, goal, strict=True)], dtype=np.int64)
+    held = (at < model.indptr[rows + 1]) & (model.targets[np.minimum(at, len(model.targets) - 1)] == goal)
+    costs = model.costs.copy()
+    costs[at[held]] = np.minimum(costs[at[held]], wait)
+    added = np.zeros(len(model.indptr), dtype=np.int64)
+    added[rows[~held] + 1] = 1
+    return model._replace(
+        indptr=model.indptr + np.cumsum(added),
+        targets=np.insert(model.targets, at[~held], goal[~held].astype(np.int32)),
+        costs=np.insert(costs, at[~held], wait),
+    )
+
+
+def _insertion(model: Model, row: int, state: int) -> int:
+    first, last = model.indptr[row], model.indptr[row + 1]
+    return int(first + np.searchsorted(model.targets[first:last], state))
+
+
+@jit
+def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
+    """V[k, row]: the least that exactly k moves from a state to its lane's goal cost a lane on its own [moves + 1, G].
+
+        V[0, goal] = 0,   V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + V[k - 1, s']
+
+    Infinite where no such walk exists. Summed over lanes it bounds the cost of T moves from below, since each
+    coupling is counted once, at the least it can cost its lane.
+    """
+    value = np.full((moves + 1, model.starts[-1]), np.inf)
+    for lane in range(len(model.parents)):
+        first, last = model.starts[lane], model.starts[lane + 1]
+        value[0, first + goal[lane]] = 0.0
+        for k in range(1, moves + 1):
+            for row in range(first, last):
+                best = np.inf
+                for e in range(model.indptr[row], model.indptr[row + 1]):
+                    target = first + model.targets[e]
+                    best = min(best, model.costs[e] + model.alone[target] + value[k - 1, target])
+                value[k, row] = best
+    return value
+
+
+@jit
+def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
+    """U[t, row]: the least that exactly t moves from its lane's start to a state cost a lane on its own [T + 1, G]."""
+    value = np.full((moves + 1, model.starts[-1]), np.inf)
+    for lane in range(len(model.parents)):
+        first, last = model.starts[lane], model.starts[lane + 1]
+        value[0, first + start[lane]] = 0.0
+        for t in range(moves):
+            for row in range(first, last):
+                if value[t, row] < np.inf:
+                    for e in range(model.indptr[row], model.indptr[row + 1]):
+                        target = first + model.targets[e]
+                        cost = value[t, row] + model.costs[e] + model.alone[target]
+                        value[t + 1, target] = min(value[t + 1, target], cost)
+    return value
+
+
+@jit
+def build_grid(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> Grid:
+    """The problem of exactly `moves` moves from `start` [L] to the goal that `to_go` leads to.
+
+    A state is in a domain if some walk of exactly T moves passes through it then, and if the cheapest such walk,
+    beside the other lanes' cheapest, costs less than `below` (a path's cost already known, or infinity): no better
+    path is lost. `to_go` is `costs_to_go` for at least T moves.
+    """
+    lanes = len(model.parents)
+    dom_ptr, dom, place = _domains(model, start, moves, to_go, below)
+    row_ptr, row_to, row_cost = _rows(model, dom_ptr, dom, place)
+    up_ptr, col_ptr, col_to, col_cost = _columns(model, dom_ptr, dom, place)
+    unary = np.zeros(len(dom))
+    for i in range(lanes, (moves + 1) * lanes):
+        for p in range(dom_ptr[i], dom_ptr[i + 1]):
+            unary[p] = model.unary[model.starts[i % lanes] + dom[p]]
+    return Grid(
+        lanes, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
+    )
+
+
+@jit
+def _domains(
+    model: Model, start: Ints, moves: int, to_go: Floats, below: float
+) -> tuple[Ints, Indices, NDArray[np.int32]]:
+    """The states of each variable, and the position [T + 1, G] of each state at each move, -1 where it has none."""
+    lanes, rows = len(model.parents), model.starts[-1]
+    so_far = _costs_so_far(model, start, moves)
+    spare = below
+    for lane in range(lanes):
+        spare -= to_go[moves, model.starts[lane] + start[lane]]
+    place = np.full((moves + 1, rows), -1, np.int32)
+    dom_ptr = np.zeros((moves + 1) * lanes + 1, np.int64)
+    count = 0
+    for i in range((moves + 1) * lanes):
+        t, lane = i // lanes, i % lanes
+        first, least = model.starts[lane], to_go[moves, model.starts[lane] + start[lane]]
+        # Of what the kept states before lead to. The margin grows with t so that rounding cannot keep a state and
+        # drop all that follow it.
+        led_to = np.zeros(model.starts[lane + 1] - first, np.bool_)
+        if t == 0:
+            led_to[start[lane]] = True
+        for row in range(first, model.starts[lane + 1]):
+            if t > 0 and place[t - 1, row] >= 0:
+                for e in range(model.indptr[row], model.indptr[row + 1]):
+                    led_to[model.targets[e]] = True
+        for state in range(len(led_to)):
+            if led_to[state]:
+                through = so_far[t, first + state] + to_go[moves - t, first + state]
+                if through < np.inf and through - least <= spare + 1e-9 * (t + 1):
+                    place[t, first + state] = count
+                    count += 1
+        dom_ptr[i + 1] = count
+    dom = np.empty(count, np.int32)
+    for t in range(moves + 1):
+        for lane in range(lanes):
+            for row in range(model.starts[lane], model.starts[lane + 1]):
+                if place[t, row] >= 0:
+                    dom[place[t, row]] = row - model.starts[lane]
+    return dom_ptr, dom, place
+
+
+@jit
+def _rows(
+    model: Model, dom_ptr: Ints, dom: Indices, place: NDArray[np.int32]
+) -> tuple[Ints, NDArray[np.int32], Floats]:
+    """The edges from each position to those of the same lane at the next move."""
+    lanes, variables = len(model.parents), len(dom_ptr) - 1
+    ptr = np.zeros(len(dom) + 1, np.int64)
+    to, cost = np.empty(0, np.int32), np.empty(0)
+    for fill in range(2):
+        for i in range(variables - lanes):
+            first = model.starts[i % lanes]
+            for p in range(dom_ptr[i], dom_ptr[i + 1]):
+                count = 0
+                for e in range(model.indptr[first + dom[p]], model.indptr[first + dom[p] + 1]):
+                    x = place[i // lanes + 1, first + model.targets[e]]
+                    if x >= 0:
+                        if fill:
+                            to[ptr[p] + count], cost[ptr[p] + count] = x, model.costs[e]
+                        count += 1
+                if not fill:
+                    ptr[p + 1] = count
+        if not fill:
+            ptr = np.cumsum(ptr)
+            to, cost = np.empty(ptr[-1], np.int32), np.empty(ptr[-1])
+    return ptr, to, cost
+
+
+@jit
+def _columns(
+    model: Model, dom_ptr: Ints, dom: Indices, place: NDArray[np.int32]
+) -> tuple[Ints, Ints, NDArray[np.int32], Floats]:
+    """The listed pairs that couple each variable to its parent variable, by the parent's position."""
+    lanes, variables = len(model.parents), len(dom_ptr) - 1
+    up_ptr = np.zeros(variables + 1, np.int64)
+    for i in range(variables):
+        above = i - i % lanes + model.parents[i % lanes]
+        coupled = i >= lanes and model.parents[i % lanes] >= 0
+        up_ptr[i + 1] = up_ptr[i] + (dom_ptr[above + 1] - dom_ptr[above] if coupled else 0)
+    ptr = np.zeros(up_ptr[-1] + 1, np.int64)
+    to, cost = np.empty(0, np.int32), np.empty(0)
+    for fill in range(2):
+        for i in range(lanes, variables):
+            lane, t = i % lanes, i // lanes
+            first = dom_ptr[i - lane + model.parents[lane]]
+            for u in range(up_ptr[i], up_ptr[i + 1]):
+                row = model.pair_starts[lane] + dom[first + u - up_ptr[i]]
+                count = 0
+                for q in range(model.pair_ptr[row], model.pair_ptr[row + 1]):
+                    x = place[t, model.starts[lane] + model.pair_states[q]]
+                    if x >= 0:
+                        if fill:
+                            to[ptr[u] + count], cost[ptr[u] + count] = x, model.pair_costs[q]
+                        count += 1
+                if not fill:
+                    ptr[u + 1] = count
+        if not fill:
+            ptr = np.cumsum(ptr)
+            to, cost = np.empty(ptr[-1], np.int32), np.empty(ptr[-1])
+    return up_ptr, ptr, to, cost

@@ -1,0 +1,120 @@
+"""The search over all numbers of moves, and the certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.search import astar, bound
+from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
+
+PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """The best path found and how close to the best it provably is.
+
+    Attributes:
+        path: states [T + 1, L].
+        cost: its cost in nats.
+        lower_bound: no path within the rules costs less than this, in nats.
+        status: "optimal" where both agree to 1e-6 nats, else "bounded".
+        expansions: nodes expanded by A*.
+        peak_nodes: the greatest number of nodes held at once.
+        seconds: of the parts "problem", "bound" and "search"; a measurement, and no part of the proof.
+    """
+
+    path: NDArray[np.int32]
+    cost: float
+    lower_bound: float
+    status: Literal["optimal", "bounded"]
+    expansions: int
+    peak_nodes: int
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What the search may do and what that costs beside the model's own costs.
+
+    Attributes:
+        wait: beta, nats for each move that a lane waits at its goal.
+        per_move: tau, nats for each move.
+        shortest: least number of moves.
+        longest: greatest number of moves.
+        node_budget: nodes that A* may hold at once; it stops after as many expansions.
+        sweeps: pairs of sweeps of the bound at most, for each number of moves.
+    """
+
+    wait: float
+    per_move: float
+    shortest: int
+    longest: int
+    node_budget: int
+    sweeps: int = 60
+
+
+def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
+    """The best path from states `start` [L] to `goal` [L] over all numbers of moves; None where there is none.
+
+    Numbers of moves are looked at in the order of what the lanes cost on their own. Each is bounded, then searched, and
+    only as long as its bound is below the best path found; so the least bound of all proves the answer.
+    """
+    clock = _Clock()
+    held = with_waits(model, goal, rules.wait)
+    to_go = costs_to_go(held, goal, rules.longest)
+    alone = to_go[:, model.starts[:-1] + start].sum(axis=1) + rules.per_move * np.arange(rules.longest + 1)
+    clock.lap("problem")
+
+    best, path, expansions, peak = np.inf, np.zeros((0, len(start)), dtype=np.int32), 0, 0
+    lower = np.where(np.arange(rules.longest + 1) >= rules.shortest, alone, np.inf)
+    for moves in np.argsort(lower, kind="stable"):
+        if not lower[moves] < best - PROVEN:
+            break
+        toll = rules.per_move * int(moves)
+        grid = build_grid(held, start, int(moves), to_go, best - toll)
+        clock.lap("problem")
+        messages = bound.no_messages(grid)
+        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
+        proven, cost = bound.tighten(grid, messages, chosen, rules.sweeps, best - toll)
+        clock.lap("bound")
+        cost = min(cost, best - toll)
+        improved = cost < best - toll
+        if proven < cost - PROVEN and expansions < rules.node_budget:
+            found, proven, expanded, held_nodes = astar.search(
+                grid, messages, proven, cost, chosen, rules.node_budget, rules.node_budget - expansions
+            )
+            expansions, peak = expansions + expanded, max(peak, held_nodes)
+            improved, cost = improved or found < cost, found
+            clock.lap("search")
+        if improved:
+            best, path = cost + toll, _states(grid, chosen)
+        lower[moves] = max(lower[moves], proven + toll)
+    if not np.isfinite(best):
+        return None
+    least = min(float(lower.min()), best)
+    proven_best = best - least <= PROVEN
+    return Certificate(path, best, least, "optimal" if proven_best else "bounded", expansions, peak, clock.seconds)
+
+
+def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
+    """States [T + 1, L] of a path of positions."""
+    return grid.dom[chosen].reshape(grid.moves + 1, grid.lanes)
+
+
+class _Clock:
+    """Seconds spent since the last lap, added up by name."""
+
+    def __init__(self) -> None:
+        self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
+        self._last = perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = perf_counter()
+        self.seconds[name] += now - self._last
+        self._last = now
