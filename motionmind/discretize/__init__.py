@@ -1,1 +1,26 @@
-"""Orientations to states and back."""
+"""Orientations to states and back: four kinds of discretization, one representation once fitted."""
+
+from motionmind.discretize.codebook import Codebook
+from motionmind.discretize.expert import ExpertLibrary
+from motionmind.discretize.grids import EulerGrid, QuaternionGrid
+from motionmind.discretize.library import Library, parse_library, read_library, write_library
+from motionmind.discretize.protocol import Discretization
+from motionmind.discretize.spec import KINDS, from_spec, make, to_spec
+from motionmind.discretize.states import StateSpace
+
+__all__ = [
+    "KINDS",
+    "Codebook",
+    "Discretization",
+    "EulerGrid",
+    "ExpertLibrary",
+    "Library",
+    "QuaternionGrid",
+    "StateSpace",
+    "from_spec",
+    "make",
+    "parse_library",
+    "read_library",
+    "to_spec",
+    "write_library",
+]

@@ -27,6 +27,11 @@ class Bridges:
     targets: NDArray[np.int32]
     degrees: NDArray[np.float64]
 
+    def span(self, row: int, target: int) -> float:
+        """Degrees that the bridge from the state of `row` to `target` spans."""
+        first, last = self.indptr[row], self.indptr[row + 1]
+        return float(self.degrees[first + np.searchsorted(self.targets[first:last], target)])
+
 
 def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Bridges:
     """Bridges between the states of each lane, whose orientations are `centres` [G, 4].
@@ -51,7 +56,7 @@ def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Brid
 
 def _angles(centres: NDArray[np.float64]) -> NDArray[np.float64]:
     """Angle between all pairs of orientations [S, S]; arccos serves, for states are no less than degrees apart."""
-    return 2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0))
+    return np.asarray(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
 
 
 def _nearest(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -68,5 +73,3 @@ def _spanning_tree(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
     # The offset keeps edges of zero length, which a sparse matrix would drop, and leaves the tree what it is.
     tree = minimum_spanning_tree(angles + 1.0).toarray() > 0.0
     return np.asarray(tree | tree.T)
-
-

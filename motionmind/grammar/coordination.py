@@ -1,8 +1,9 @@
 """How joints coordinate: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
 
-A pgmpy network is the model of record. A joint's conditional distribution is estimated from the corpus's postures with a
-Dirichlet prior of `PSEUDO_COUNT` virtual postures spread as the joint's marginal is, so that a pair that was never seen
-together costs what its parts cost: dear, but possible. With N the corpus's counts, m the marginal and a the pseudo-count,
+A pgmpy network is the model of record. A joint's conditional distribution is estimated from the corpus's postures
+with a Dirichlet prior of `PSEUDO_COUNT` virtual postures spread as the joint's marginal is, so that a pair that was
+never seen together costs what its parts cost: dear, but possible. With N the corpus's counts, m the marginal and a the
+pseudo-count,
 
     P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
 
@@ -66,7 +67,7 @@ def fit_network(
 ) -> DiscreteBayesianNetwork:
     """The pgmpy network over joints `names` [J] with `parents` [J], from `states` [N, J] of a corpus's postures.
 
-    Every joint is a node, with its states 0 .. S - 1 as state names; `get_cpds("left_knee")` is P(left_knee | left_hip).
+    Every joint is a node, its states 0 .. S - 1 the state names; `get_cpds("left_knee")` is P(left_knee | left_hip).
     """
     import pandas as pd
     from pgmpy.models import DiscreteBayesianNetwork

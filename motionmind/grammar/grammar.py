@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from motionmind.grammar.bridges import Bridges, find_bridges
 from motionmind.grammar.coordination import Coordination, compile_network, fit_network
-from motionmind.grammar.transitions import Transitions, Weights, count_transitions
+from motionmind.grammar.transitions import Transitions, count_transitions
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -102,7 +102,7 @@ def count_transitions(
             turned = (np.arange(size[lane])[:, None] + target[None, :]) % size[lane]
             order = np.argsort(turned, axis=1)
             source, target = np.repeat(np.arange(size[lane]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
-            first, count, mean = (array[order].ravel() for array in (first, count, mean))
+            first, count, mean = first[order].ravel(), count[order].ravel(), mean[order].ravel()
             visits.append(np.full(size[lane], len(visited) / size[lane]))
         else:
             visits.append(np.bincount(visited, minlength=size[lane]))

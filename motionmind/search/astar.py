@@ -4,10 +4,12 @@ A node fixes the variables up to one; its *frontier* is the last position chosen
 rest depends on, so nodes with the same variable and frontier are the same node. f grows by `bound.step`.
 
 When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
-backed up into it; it is opened again with that f, so nothing is lost from the proof. Sources: Standley, "Finding optimal
-solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition); Russell, "Efficient memory-bounded search
-methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified memory-bounded A star (SMA*+)", GCAI 2017. Leaves are
-forgotten by halves, not one by one, which keeps the cost of forgetting constant per node.
+backed up into it; it is opened again with that f, so nothing is lost from the proof. Leaves are forgotten by halves,
+not one by one, which keeps the cost of forgetting constant per node.
+
+Sources: Standley, "Finding optimal solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition);
+Russell, "Efficient memory-bounded search methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified
+memory-bounded A star (SMA*+)", GCAI 2017.
 """
 
 from __future__ import annotations
@@ -24,11 +26,11 @@ from motionmind.search.problem import Floats, Grid, Ints
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
 
-_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what the counters count
+_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what is tallied
 
 
 class _Nodes(NamedTuple):
-    """Up to N nodes and what finds them. `count` holds the counters above."""
+    """Up to N nodes and what finds them. `tally` holds the counters above."""
 
     var: NDArray[np.int32]  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each lane, as an index into its domain [N, L]
@@ -41,7 +43,7 @@ class _Nodes(NamedTuple):
     bucket: NDArray[np.int32]  # first node of each bucket [a power of two]
     heap: NDArray[np.int32]  # open nodes, a binary heap [N]
     free: NDArray[np.int32]  # stack of unused nodes [N]
-    count: Ints
+    tally: Ints
 
 
 @jit
@@ -55,21 +57,21 @@ def search(
     """
     nodes = _root(grid, bound, budget)
     lower = cost
-    while nodes.count[_HEAPED] > 0:
+    while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
         if nodes.key[node] >= cost - SAME:
             break
-        if nodes.count[_EXPANDED] >= expansions:
+        if nodes.tally[_EXPANDED] >= expansions:
             lower = nodes.key[node]
             break
         _close(nodes, node)
-        nodes.count[_EXPANDED] += 1
+        nodes.tally[_EXPANDED] += 1
         cost, complete = _expand(grid, m, nodes, node, cost, path)
         if not complete:
-            lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.count[_HEAPED] else np.inf)
+            lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
         _release(nodes, node)
-    return cost, min(lower, cost), nodes.count[_EXPANDED], nodes.count[_PEAK]
+    return cost, min(lower, cost), nodes.tally[_EXPANDED], nodes.tally[_PEAK]
 
 
 @jit
@@ -103,7 +105,7 @@ def _expand(grid: Grid, m: Messages, nodes: _Nodes, node: int, cost: float, path
                 _forsake(nodes, twin)
                 if other != node:
                     _release(nodes, other)
-        if nodes.count[_FREE] == 0 and not _forget(nodes, node):
+        if nodes.tally[_FREE] == 0 and not _forget(nodes, node):
             nodes.key[node] = floor
             return cost, False
         _add(nodes, node, i, choice, lane, f, key)
@@ -130,8 +132,8 @@ def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
         np.arange(budget - 1, -1, -1).astype(np.int32),
         np.zeros(5, np.int64),
     )
-    nodes.count[_FREE] = budget - 1
-    nodes.count[_NODES] = nodes.count[_PEAK] = 1
+    nodes.tally[_FREE] = budget - 1
+    nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
     nodes.var[0], nodes.f[0], nodes.key[0] = grid.lanes - 1, bound, bound
     _open(nodes, 0)
     return nodes
@@ -149,9 +151,9 @@ def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
 @jit
 def _forget(nodes: _Nodes, current: int) -> bool:
     """Forget the worse half of the leaves, backing their keys up into their parents; whether any could be forgotten."""
-    leaves = np.empty(nodes.count[_HEAPED], np.int32)
+    leaves = np.empty(nodes.tally[_HEAPED], np.int32)
     count = 0
-    for k in range(nodes.count[_HEAPED]):
+    for k in range(nodes.tally[_HEAPED]):
         node = nodes.heap[k]
         if nodes.children[node] == 0 and nodes.parent[node] >= 0 and node != current:
             leaves[count] = node
@@ -172,7 +174,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
 
 @jit
 def _release(nodes: _Nodes, node: int) -> None:
-    """Free a closed node that has no children, for nothing below the known cost lies behind it; and so its ancestors."""
+    """Free a closed node without children, for nothing below the known cost lies behind it; and so its ancestors."""
     while node > 0 and nodes.slot[node] < 0 and nodes.children[node] == 0:
         parent = nodes.parent[node]
         _drop(nodes, node)
@@ -196,7 +198,7 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
     for k in range(nodes.frontier.shape[1]):
         h = (h ^ np.uint64(choice if k == lane else nodes.frontier[node, k])) * np.uint64(1099511628211)
     h ^= h >> np.uint64(32)
-    return np.int64(h & np.uint64(len(nodes.bucket) - 1))
+    return int(h & np.uint64(len(nodes.bucket) - 1))
 
 
 @jit
@@ -210,7 +212,7 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
                 break
             same = k == lane or nodes.frontier[twin, k] == nodes.frontier[node, k]
         if same:
-            return twin
+            return int(twin)
         twin = nodes.following[twin]
     return -1
 
@@ -218,10 +220,10 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
 @jit
 def _add(nodes: _Nodes, node: int, var: int, choice: int, lane: int, f: float, key: float) -> None:
     """A new open child of `node`."""
-    nodes.count[_FREE] -= 1
-    child = nodes.free[nodes.count[_FREE]]
-    nodes.count[_NODES] += 1
-    nodes.count[_PEAK] = max(nodes.count[_PEAK], nodes.count[_NODES])
+    nodes.tally[_FREE] -= 1
+    child = nodes.free[nodes.tally[_FREE]]
+    nodes.tally[_NODES] += 1
+    nodes.tally[_PEAK] = max(nodes.tally[_PEAK], nodes.tally[_NODES])
     nodes.frontier[child] = nodes.frontier[node]
     nodes.frontier[child, lane] = choice
     nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
@@ -246,9 +248,9 @@ def _drop(nodes: _Nodes, node: int) -> None:
             earlier = nodes.following[earlier]
         nodes.following[earlier] = nodes.following[node]
     nodes.children[nodes.parent[node]] -= 1
-    nodes.free[nodes.count[_FREE]] = node
-    nodes.count[_FREE] += 1
-    nodes.count[_NODES] -= 1
+    nodes.free[nodes.tally[_FREE]] = node
+    nodes.tally[_FREE] += 1
+    nodes.tally[_NODES] -= 1
 
 
 # --- the open list: a binary heap that knows where each node stands ---------------------------------------------------
@@ -258,24 +260,24 @@ def _drop(nodes: _Nodes, node: int) -> None:
 def _before(nodes: _Nodes, a: int, b: int) -> bool:
     """Lower key first; of equal keys the deeper node, then the one of lower number, so that ties fall the same way."""
     if nodes.key[a] != nodes.key[b]:
-        return nodes.key[a] < nodes.key[b]
+        return bool(nodes.key[a] < nodes.key[b])
     if nodes.var[a] != nodes.var[b]:
-        return nodes.var[a] > nodes.var[b]
+        return bool(nodes.var[a] > nodes.var[b])
     return a < b
 
 
 @jit
 def _open(nodes: _Nodes, node: int) -> None:
-    k = nodes.count[_HEAPED]
-    nodes.count[_HEAPED] += 1
+    k = nodes.tally[_HEAPED]
+    nodes.tally[_HEAPED] += 1
     nodes.heap[k], nodes.slot[node] = node, k
     _rise(nodes, k)
 
 
 @jit
 def _close(nodes: _Nodes, node: int) -> None:
-    nodes.count[_HEAPED] -= 1
-    k, last = nodes.slot[node], nodes.heap[nodes.count[_HEAPED]]
+    nodes.tally[_HEAPED] -= 1
+    k, last = nodes.slot[node], nodes.heap[nodes.tally[_HEAPED]]
     nodes.slot[node] = -1
     if last != node:
         nodes.heap[k], nodes.slot[last] = last, k
@@ -295,7 +297,7 @@ def _rise(nodes: _Nodes, k: int) -> None:
 
 @jit
 def _sink(nodes: _Nodes, k: int) -> None:
-    node, size = nodes.heap[k], nodes.count[_HEAPED]
+    node, size = nodes.heap[k], nodes.tally[_HEAPED]
     while 2 * k + 1 < size:
         child = 2 * k + 1
         if child + 1 < size and _before(nodes, nodes.heap[child + 1], nodes.heap[child]):

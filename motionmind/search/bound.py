@@ -1,4 +1,4 @@
-"""A lower bound on the cost of a grid, and on the cost to go from any partial path: sequential tree-reweighted messages.
+"""A lower bound on the cost of a grid, and on the cost to go from any partial path: tree-reweighted messages.
 
 Source: Kolmogorov, "Convergent tree-reweighted message passing for energy minimization", IEEE TPAMI 28(10), 2006.
 Variables are ordered by move, then by lane. Each carries gamma = 1 / max(edges in, edges out); a sweep visits all in
@@ -82,7 +82,7 @@ def _ahead(grid: Grid, m: Messages, i: int) -> None:
 
 @jit
 def _theta(grid: Grid, m: Messages, i: int) -> Floats:
-    """gamma times the variable's own cost plus all messages to it, their minimum (the variable's constant) taken out."""
+    """gamma times the variable's own cost plus all messages to it, their minimum (its constant) taken out."""
     lanes, lane = grid.lanes, i % grid.lanes
     first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
     _ahead(grid, m, i)
@@ -195,7 +195,7 @@ def discount(grid: Grid, u: int, x: int) -> float:
             low = middle + 1
         else:
             high = middle
-    return grid.col_cost[low] if low < grid.col_ptr[u + 1] and grid.col_to[low] == x else 0.0
+    return float(grid.col_cost[low]) if low < grid.col_ptr[u + 1] and grid.col_to[low] == x else 0.0
 
 
 @jit
@@ -207,7 +207,7 @@ def step(grid: Grid, m: Messages, i: int, before: int, above: int, e: int) -> fl
     had promised and the variable's constant. At least 0 but for rounding.
     """
     x = grid.row_to[e]
-    grown = grid.row_cost[e] + m.ahead[x] - m.up_row[before]
+    grown = float(grid.row_cost[e] + m.ahead[x] - m.up_row[before])
     if above >= 0:
         u = grid.up_ptr[i] + above - grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
         grown += discount(grid, u, x) - m.up_col[u]
@@ -216,7 +216,7 @@ def step(grid: Grid, m: Messages, i: int, before: int, above: int, e: int) -> fl
 
 @jit
 def descend(grid: Grid, m: Messages, path: Ints, start: int) -> float:
-    """Complete `path` [n] (positions) from variable `start` on, each with the position that f grows least by; f's growth.
+    """Complete `path` [n] (positions) from variable `start` on, by the least growth of f each time; the sum of it.
 
     It never fails: every position of a domain leads on along its lane, and couplings forbid nothing.
     """
@@ -236,10 +236,10 @@ def descend(grid: Grid, m: Messages, path: Ints, start: int) -> float:
 
 @jit
 def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> tuple[float, float]:
-    """Run up to `sweeps` pairs of sweeps; the bound, and the cost of the best path met on the way, written to `path` [n].
+    """Run up to `sweeps` pairs of sweeps; the bound, and the cost of the best path met on the way.
 
-    Stops when the bound reaches that cost or `enough`, or when eight pairs have raised it by less than a thousandth of
-    what separates it from that cost.
+    The path is written to `path` [n] (positions). Stops when the bound reaches that cost or `enough`, or when eight
+    pairs have raised it by less than a thousandth of what separates it from the lower of the two.
     """
     lanes = grid.lanes
     trial = np.zeros(len(path), np.int64)

@@ -25,7 +25,7 @@ def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price:
         rows = np.concatenate([rows, bridged])
         targets = np.concatenate([targets, bridges.targets])
         costs = np.concatenate([costs, bridge_price * bridges.degrees])
-        order = np.lexsort([targets, rows])
+        order = np.lexsort((targets, rows))
         rows, targets, costs = rows[order], targets[order], costs[order]
     indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(graph.visits)))]).astype(np.int64)
 
@@ -39,22 +39,26 @@ def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price:
         pair_rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
         unary[above] += coordination * net.parent_costs[pair_rows]
         pairs = slice(net.pair_ptr[pair_rows.start], net.pair_ptr[pair_rows.stop])
-        row_of_pair = np.repeat(net.parent_costs[pair_rows], np.diff(net.pair_ptr[pair_rows.start : pair_rows.stop + 1]))
+        row_of_pair = np.repeat(
+            net.parent_costs[pair_rows], np.diff(net.pair_ptr[pair_rows.start : pair_rows.stop + 1])
+        )
         separable = net.child_costs[mine][net.pair_states[pairs]] + row_of_pair
         discounts[pairs] = coordination * np.minimum(net.pair_costs[pairs] - separable, 0.0)
         least = net.child_costs[mine] + net.parent_costs[pair_rows].min()
         np.minimum.at(least, net.pair_states[pairs], net.pair_costs[pairs])
         alone[mine] = coordination * least
+    # Copies, for what was loaded is mapped read-only, and that would be another type to compile for.
+    starts, parents, pair_starts, pair_ptr = map(np.array, (graph.starts, net.parents, net.pair_starts, net.pair_ptr))
     return Model(
-        graph.starts,
-        net.parents,
+        starts,
+        parents,
         indptr,
         targets,
         costs,
         unary,
         alone,
-        net.pair_starts,
-        net.pair_ptr,
-        net.pair_states,
+        pair_starts,
+        pair_ptr,
+        np.array(net.pair_states),
         discounts,
     )

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import platformdirs
 
@@ -27,6 +27,5 @@ import numba  # noqa: E402  (it reads the variable set above when it is imported
 
 
 def jit(function: _F) -> _F:
-    """Compile `function` to machine code on its first call; IEEE arithmetic as written, so results are the same bytes."""
-    compiled: _F = numba.njit(cache=True, error_model="numpy")(function)
-    return compiled
+    """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time."""
+    return cast(_F, numba.njit(cache=True, error_model="numpy")(function))

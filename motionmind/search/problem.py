@@ -58,8 +58,9 @@ class Model(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """The problem for a fixed number of moves, as flat arrays. Variable i = t * L + lane; a position is one state of one
-    variable's domain, numbered through all variables.
+    """The problem for a fixed number of moves, as flat arrays.
+
+    Variable i = t * L + lane; a position is one state of one variable's domain, numbered through all variables.
 
     Attributes:
         lanes: L.
@@ -96,7 +97,9 @@ def with_waits(model: Model, goal: Ints, wait: float) -> Model:
     """The model in which every lane may wait at its goal for `wait` a move, or hold there if that is cheaper."""
     rows = model.starts[:-1] + goal
     at = np.array([_insertion(model, row, state) for row, state in zip(rows, goal, strict=True)], dtype=np.int64)
-    held = (at < model.indptr[rows + 1]) & (model.targets[np.minimum(at, len(model.targets) - 1)] == goal)
+    held = np.zeros(len(rows), dtype=bool)
+    listed = at < model.indptr[rows + 1]
+    held[listed] = model.targets[at[listed]] == goal[listed]
     costs = model.costs.copy()
     costs[at[held]] = np.minimum(costs[at[held]], wait)
     added = np.zeros(len(model.indptr), dtype=np.int64)

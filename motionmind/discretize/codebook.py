@@ -1,0 +1,135 @@
+"""States learned from the movement itself, as few as an angular tolerance allows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.discretize.protocol import check_range, per_joint_values, samples
+from motionmind.discretize.states import StateSpace, distinct, nearest
+
+Array = NDArray[np.float64]
+
+# Rounds of centring. On the dance in the table below, at 5 Hz and 15 degrees, the first takes 19 % off the mean error,
+# five take 31 %, five more another 1 %.
+_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Codebook:
+    """A learned codebook: every orientation of the corpus lies within `tolerance` degrees of its state.
+
+    For each joint: states are opened by farthest-point traversal (Gonzalez, "Clustering to minimize the maximum
+    intercluster distance", Theor. Comput. Sci. 38:293, 1985) until no sample is further than the tolerance from
+    all of them; then each is moved to the mean of its samples, wholly or part of the way, as long as none of them
+    is left outside the tolerance (Lloyd's step under a constraint), a few times over.
+
+    Why this and not leader clustering or a greedy set cover. Twenty clips of one dancer, 23 joints, the pelvis
+    without its heading, means over joints; "out" is distinct successors per state, "joinable" the share of 2000
+    posture pairs that every joint can join by attested transitions:
+
+        postures, tolerance      method                      most  total   out  mean error  joinable
+        5 Hz, 784, 15 degrees    leader, in order of time     199    828  4.53        5.55     0.913
+                                 leader, densest first        179    796  5.03        5.10     0.913
+                                 greedy cover                 168    689  4.72        6.17     0.913
+                                 greedy cover, centred        168    689  5.00        5.01     0.925
+                                 farthest point               200    838  4.46        6.04     0.924
+                                 farthest point, centred      200    838  5.16        4.18     0.918
+          at 16.5 degrees        farthest point, centred      173    726  5.03        4.61     0.927
+        5 Hz, 784, 20 degrees    greedy cover, centred        112    437  4.49        6.34     0.928
+                                 farthest point, centred      131    547  4.80        5.31     0.928
+        10 Hz, 1560, 10 degrees  greedy cover, centred        431   1626  5.35        3.46     0.926
+                                 farthest point, centred      496   1935  5.40        2.98     0.909
+          at 11 degrees          farthest point, centred      439   1675  5.28        3.39     0.925
+        10 Hz, 1560, 5 degrees   greedy cover, centred        888   3879  5.66        1.72     0.849
+                                 farthest point, centred      929   4252  5.51        1.55     0.824
+
+    A cover needs a sixth fewer states at the same tolerance, but at the same number of states it errs as much and
+    branches as much: the two trade along one curve. The cover wants every pair of samples (6e9 per joint at 78,000
+    postures), this N times S; and the leaders depend on the order in which clips are read, this does not: samples
+    are sorted first. States are numbered in the order they were opened: state 0 is the sample nearest to the mean.
+
+    Attributes:
+        tolerance: degrees, 0.01 to 180.
+        per_joint: degrees for single joints; "hip" means both hips.
+    """
+
+    tolerance: float = 15.0
+    per_joint: Mapping[str, float] = field(default_factory=dict)
+    kind: ClassVar[str] = "codebook"
+
+    def __post_init__(self) -> None:
+        check_range("tolerance in degrees", {"": self.tolerance, **self.per_joint}, 0.01, 180.0)
+
+    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+        """The states for `names` [J] that cover `rotations` [N, J, 4]; see `Discretization.fit`."""
+        rotations = samples(names, rotations)
+        tolerances = per_joint_values(names, self.tolerance, self.per_joint)
+        centres = [codebook(rotations[:, j], tolerances[j]) for j in range(len(names))]
+        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=tolerances)
+
+    def to_spec(self) -> dict[str, object]:
+        """The tolerances, as `from_spec` reads them."""
+        return {"kind": self.kind, "tolerance": self.tolerance, "per_joint": dict(self.per_joint)}
+
+
+def codebook(rotations: Array, tolerance: float) -> Array:
+    """Centres [S, 4] within `tolerance` degrees of every one of one joint's `rotations` [N, 4]."""
+    q = rot.canonical(rotations)
+    q = q[np.lexsort(q.T)]
+    limit = float(np.cos(0.5 * np.radians(tolerance)))
+    opened = farthest_points(q, limit)
+    centres = opened
+    for _ in range(_ROUNDS):
+        centres = _centred(q, centres, limit)
+    states, _ = nearest(q, centres)
+    centres = centres[np.unique(states)]
+    # Crowds on both sides of a border could pull two centres onto one point. Opened states never meet: they are
+    # samples further apart than the tolerance.
+    return centres if len(distinct(centres)) == len(centres) else opened
+
+
+def farthest_points(q: Array, limit: float) -> Array:
+    """Members [S, 4] of `q` [N, 4] such that |q . member| >= `limit` for all q: each is the farthest from those
+    before it, the first the one nearest to the mean. They lie further apart than the limit."""
+    # Coordinates in rows: a product with one centre then runs along memory (twice as fast).
+    rows = np.ascontiguousarray(q.T)
+    # The mean rotation is the largest eigenvector of the samples' scatter: Markley et al., "Averaging quaternions",
+    # J. Guid. Control Dyn. 30:1193 (2007).
+    mean = np.linalg.eigh(rows @ q)[1][:, -1]
+    chosen = [int(np.argmax(np.abs(mean @ rows)))]
+    closest = np.abs(q[chosen[0]] @ rows)
+    product = np.empty_like(closest)
+    farthest = int(np.argmin(closest))
+    while closest[farthest] < limit:
+        chosen.append(farthest)
+        np.matmul(q[farthest], rows, out=product)
+        np.maximum(closest, np.abs(product, out=product), out=closest)
+        farthest = int(np.argmin(closest))
+    return q[chosen]
+
+
+def _centred(q: Array, centres: Array, limit: float) -> Array:
+    """`centres` [S, 4], each moved to the mean of the samples `q` [N, 4] it is nearest to, or as far towards it
+    as keeps them all within the limit: a half, a quarter of the way, or not at all."""
+    states, _ = nearest(q, centres)
+    # One hemisphere per cell: within it the normalised sum is the mean to third order in the cell's radius.
+    signed = q * np.where(np.sum(q * centres[states], axis=-1) < 0.0, -1.0, 1.0)[:, None]
+    total = np.stack([np.bincount(states, signed[:, k], minlength=len(centres)) for k in range(4)], axis=-1)
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    mean = np.where(length > 1e-9, total / np.maximum(length, 1e-9), centres)
+    moved = centres.copy()
+    waiting = np.ones(len(centres), dtype=bool)
+    for share in (1.0, 0.5, 0.25):
+        tried = rot.normalise(centres + share * (mean - centres))
+        worst = np.ones(len(centres))
+        np.minimum.at(worst, states, np.abs(np.sum(q * tried[states], axis=-1)))
+        inside = waiting & (worst >= limit)
+        moved[inside] = tried[inside]
+        waiting &= ~inside
+    return moved

@@ -1,0 +1,123 @@
+"""States on a grid: of quaternion coefficients, as in the papers, or of Euler angles. Only cells that occur."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.discretize.protocol import check_range, per_joint_values, samples
+from motionmind.discretize.states import StateSpace, distinct, nearest
+from motionmind.errors import MotionMindError
+
+Array = NDArray[np.float64]
+
+# Beyond a step of 1 a quaternion can round to zero; beyond a third of a turn cells overlap more than they divide.
+_WIDEST_STEP = 0.9
+_WIDEST_CELL = 120.0
+
+
+@dataclass(frozen=True)
+class QuaternionGrid:
+    """Rounding of quaternion coefficients to multiples of `step`, as in Bradley and Stuart, Chaos 8:800 (1998).
+
+    A state is a cell that some orientation of the corpus falls into, made a unit quaternion again; an orientation
+    belongs to the nearest state. Rounding is off by step / 2 in each of four coefficients, so by `step` at most in
+    all, which turns a unit vector by asin(step) and the rotation by twice that: `step = sin(tolerance / 2)` keeps
+    every orientation of the corpus within `tolerance` of its state.
+
+    Attributes:
+        step: the grid's step, a number without unit, 0.00001 to 0.9.
+        per_joint: steps for single joints; "hip" means both hips.
+    """
+
+    step: float = 0.13
+    per_joint: Mapping[str, float] = field(default_factory=dict)
+    kind: ClassVar[str] = "quaternion"
+
+    def __post_init__(self) -> None:
+        check_range("quaternion step", {"": self.step, **self.per_joint}, 1e-5, _WIDEST_STEP)
+
+    @staticmethod
+    def step_for(tolerance: float) -> float:
+        """The step that keeps every orientation within `tolerance` degrees of its state."""
+        return min(_WIDEST_STEP, float(np.sin(0.5 * np.radians(tolerance))))
+
+    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+        """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
+        rotations = samples(names, rotations)
+        steps = per_joint_values(names, self.step, self.per_joint)
+        centres = [self._cells(rotations[:, j], steps[j]) for j in range(len(names))]
+        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=np.degrees(2.0 * np.arcsin(steps)))
+
+    def to_spec(self) -> dict[str, object]:
+        """The steps, as `from_spec` reads them."""
+        return {"kind": self.kind, "step": self.step, "per_joint": dict(self.per_joint)}
+
+    @staticmethod
+    def _cells(q: Array, step: float) -> Array:
+        cells = np.unique(np.rint(rot.canonical(q) / step), axis=0)
+        return _occurring(q, rot.normalise(cells))
+
+
+@dataclass(frozen=True)
+class EulerGrid:
+    """Rounding of Euler angles to multiples of `degrees`: "5-degree steps" is `EulerGrid(5)`.
+
+    A state is a cell that some orientation of the corpus falls into; an orientation belongs to the nearest state,
+    by the angle between the rotations and not between their Euler angles, which near gimbal lock say little.
+
+    With three errors of up to h = degrees / 2 the half angle between an orientation and its cell's has a cosine of
+    at least cos(h/2)^3 - sin(h/2)^2 (the first and last axis may meet, the middle one stands square on both),
+    hence an angle of at most sqrt(5) h: `degrees = tolerance * 2 / sqrt(5)` keeps every orientation of the corpus
+    within `tolerance` of its state.
+
+    Attributes:
+        degrees: the cells' width, 0.001 to 120.
+        order: the axes of the intrinsic turns, x, y and z once each (see `rotations.from_euler`).
+        per_joint: widths for single joints; "hip" means both hips.
+    """
+
+    degrees: float = 15.0
+    order: str = "ZXY"
+    per_joint: Mapping[str, float] = field(default_factory=dict)
+    kind: ClassVar[str] = "euler"
+
+    def __post_init__(self) -> None:
+        check_range("width of Euler cells in degrees", {"": self.degrees, **self.per_joint}, 0.001, _WIDEST_CELL)
+        if not isinstance(self.order, str) or sorted(self.order.lower()) != ["x", "y", "z"]:
+            raise MotionMindError(f"the rotation order must name x, y and z once each, not {self.order!r}")
+
+    @staticmethod
+    def degrees_for(tolerance: float) -> float:
+        """The width that keeps every orientation within `tolerance` degrees of its state."""
+        return min(_WIDEST_CELL, float(tolerance * 2.0 / np.sqrt(5.0)))
+
+    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+        """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
+        rotations = samples(names, rotations)
+        widths = per_joint_values(names, self.degrees, self.per_joint)
+        centres = [self._cells(rotations[:, j], np.radians(widths[j])) for j in range(len(names))]
+        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=widths * np.sqrt(5.0) / 2.0)
+
+    def to_spec(self) -> dict[str, object]:
+        """The widths and the order, as `from_spec` reads them."""
+        return {"kind": self.kind, "degrees": self.degrees, "order": self.order, "per_joint": dict(self.per_joint)}
+
+    def _cells(self, q: Array, width: float) -> Array:
+        # The canonical one of q and -q: both have the same angles, but perhaps not to the last bit.
+        cells = np.unique(np.rint(rot.to_euler(self.order, rot.canonical(q)) / width), axis=0)
+        return _occurring(q, rot.from_euler(self.order, cells * width))
+
+
+def _occurring(q: Array, cells: Array) -> Array:
+    """Those of `cells` [S, 4] that are the nearest to some of `q` [N, 4]: a state that nothing visits is none.
+
+    Taking the others away changes nobody's nearest state.
+    """
+    cells = distinct(rot.canonical(cells))
+    return cells[np.unique(nearest(q, cells)[0])]

@@ -1,0 +1,249 @@
+"""Expert libraries: files in which a person names the states of a body's joints.
+
+A library is TOML:
+
+    format = "motionmind-library"
+    version = 1
+    title = "..."          # title, author and licence may be left out
+    author = "..."
+    licence = "..."
+    skeleton = "human23"
+
+    [hip]                                    # both hips; written for the left one
+    "rest" = ""                              # the identity: as in the skeleton's rest
+    "devant 90 turned out" = "x -90, y 45"   # turns in degrees, each about the axes as the last has left them
+    "as recorded" = [0.0, 0.0, 0.383, 0.924] # or a quaternion x, y, z, w
+
+A table is called after a joint, or after a pair of joints without their side. A pair is written for the left; the
+right has the same states in a mirror (x and -x exchanged).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.corpus.bundled import bundled
+from motionmind.discretize.protocol import joints_meant, nameable
+from motionmind.discretize.turns import format_turns, parse_turns
+from motionmind.errors import FormatError
+from motionmind.formats.files import FilePath, read_bytes, write_atomically
+from motionmind.formats.text import meant
+from motionmind.skeleton import human23
+
+Array = NDArray[np.float64]
+
+FORMAT = "motionmind-library"
+VERSION = 1
+# Two states of a joint that lie closer than this many degrees are one state with two names.
+SAME_DEGREES = 0.01
+
+_TEXTS = ("title", "author", "licence", "skeleton")
+_SKELETONS = {"human23": human23}
+
+
+@dataclass(frozen=True)
+class Library:
+    """States that people named, by joint or pair of joints.
+
+    Attributes:
+        tables: per joint, or pair of joints ("hip"), the orientation of each state by name, as written: turns, or
+            a quaternion x, y, z, w. Order is kept: it numbers the states.
+        title, author, licence: what it is, whose, and under which terms.
+        skeleton: the skeleton whose rest the orientations start from.
+        path: where it was read from, for messages.
+    """
+
+    tables: Mapping[str, Mapping[str, str | tuple[float, ...]]]
+    title: str = ""
+    author: str = ""
+    licence: str = ""
+    skeleton: str = "human23"
+    path: str = field(default="library", compare=False)
+    _rotations: dict[str, Array] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check it all, so that what is built can be used; FormatError names table and entry."""
+        if not self.tables:
+            raise FormatError("no joint has a table of states", path=self.path)
+        for text in (*(getattr(self, key) for key in _TEXTS), *self.tables):
+            self._check_text(text)
+        rotations = {table: self._read_table(table) for table in self.tables}
+        object.__setattr__(self, "_rotations", rotations)
+        if self.skeleton in _SKELETONS:
+            self.tables_of(_SKELETONS[self.skeleton]().names)
+
+    def rotations(self, table: str) -> Array:
+        """Orientations [S, 4] of the states in `table`, as written: for the left, where it is a pair."""
+        return self._rotations[table]
+
+    def tables_of(self, names: Sequence[str]) -> dict[int, str]:
+        """The table of each joint in `names` that has one, by the joint's index.
+
+        FormatError where a table means none of the joints, or a joint is meant twice.
+        """
+        owner: dict[int, str] = {}
+        for table in self.tables:
+            joints = joints_meant(table, names)
+            if not joints:
+                hint = meant(table, nameable(names)) or f"; there are {', '.join(names)}"
+                raise FormatError(f"[{table}]: no such joint{hint}", path=self.path)
+            for j in joints:
+                if j in owner:
+                    raise FormatError(f"{names[j]} is in [{owner[j]}] and in [{table}]; keep one", path=self.path)
+                owner[j] = table
+        return owner
+
+    def of_joint(self, table: str, joint: str) -> Array:
+        """Orientations [S, 4] that `table` gives to `joint`, in a mirror where it is the right one of a pair."""
+        q = self.rotations(table)
+        return rot.mirror(q) if table != joint and joint.startswith("right_") else q
+
+    def _check_text(self, text: str) -> None:
+        """JSON can carry halves of characters, which no file in UTF-8 can hold."""
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise FormatError(f"{text!r:.60} is not text", path=self.path) from None
+
+    def _read_table(self, table: str) -> Array:
+        entries = self.tables[table]
+        if not isinstance(entries, Mapping) or not entries:
+            raise FormatError(f"[{table}] must be a table of states, with one at least", path=self.path)
+        states = np.stack([self._read_entry(table, name, value) for name, value in entries.items()])
+        names = list(entries)
+        for n in range(1, len(states)):
+            apart = np.degrees(rot.angle(states[:n], states[n]))
+            if apart.min() < SAME_DEGREES:
+                twin = names[int(np.argmin(apart))]
+                raise FormatError(
+                    f'[{table}] "{names[n]}": the same orientation as "{twin}"; states must differ by '
+                    f"{SAME_DEGREES} degrees at least",
+                    path=self.path,
+                )
+        return states
+
+    def _read_entry(self, table: str, name: str, value: object) -> Array:
+        self._check_text(name)
+        where = f'[{table}] "{name}": '
+        if not name.strip():
+            raise FormatError(f"{where}a state needs a name", path=self.path)
+        if isinstance(value, str):
+            try:
+                return parse_turns(value)
+            except ValueError as error:
+                raise FormatError(f"{where}{error}", path=self.path) from None
+        numbers = isinstance(value, (list, tuple)) and all(type(v) in (int, float) for v in value)
+        if not numbers or len(value) != 4:  # type: ignore[arg-type]
+            raise FormatError(
+                f"{where}must be turns such as 'x -90, y 45' or a quaternion [x, y, z, w], not {value!r:.60}",
+                path=self.path,
+            )
+        try:
+            q = np.array(value, dtype=np.float64)
+        except OverflowError:
+            q = np.full(4, np.inf)
+        if not np.isfinite(q).all() or np.abs(q).max() > 1e100:
+            raise FormatError(f"{where}a quaternion needs finite numbers", path=self.path)
+        if not np.linalg.norm(q) > 1e-3:
+            raise FormatError(f"{where}a quaternion of length zero is no rotation", path=self.path)
+        return rot.normalise(q)
+
+
+def parse_library(text: str, *, path: str = "library") -> Library:
+    """The library that the TOML `text` describes; every fault is a FormatError that names table and entry."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"not TOML: {error}", path=path) from None
+    return library_from_mapping(data, path=path)
+
+
+def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -> Library:
+    """The library in `data`, the mapping that TOML or JSON of a library file gives."""
+    if data.get("format") != FORMAT:
+        raise FormatError(f'not a library of states: it must say format = "{FORMAT}"', path=path)
+    version = data.get("version")
+    if type(version) is not int or version != VERSION:
+        raise FormatError(f"version must be {VERSION}, the one known here, not {version!r:.40}", path=path)
+    texts = {}
+    for key in _TEXTS:
+        value = data.get(key, "human23" if key == "skeleton" else "")
+        if not isinstance(value, str):
+            raise FormatError(f"{key} must be text, not {value!r:.40}", path=path)
+        texts[key] = value
+    tables: dict[str, Mapping[str, str | tuple[float, ...]]] = {}
+    for key, table in data.items():
+        if key in (*_TEXTS, "format", "version"):
+            continue
+        if not isinstance(table, Mapping):
+            known = ", ".join(("format", "version", *_TEXTS))
+            raise FormatError(f"{key!r} is neither a joint's table nor one of {known}", path=path)
+        tables[key] = {name: tuple(v) if isinstance(v, list) else v for name, v in table.items()}
+    return Library(tables, **texts, path=path)
+
+
+def library_to_mapping(library: Library) -> dict[str, object]:
+    """The same as plain JSON values; the inverse of `library_from_mapping`."""
+    head: dict[str, object] = {"format": FORMAT, "version": VERSION}
+    head.update({key: getattr(library, key) for key in _TEXTS})
+    for table, entries in library.tables.items():
+        head[table] = {name: value if isinstance(value, str) else list(value) for name, value in entries.items()}
+    return head
+
+
+def read_library(name_or_path: FilePath) -> Library:
+    """The library in a file, or the bundled one of that name ("human23")."""
+    path = Path(name_or_path)
+    # A bare word is a name: a folder that happens to be called so must not change what is read.
+    if path.suffix != ".toml" and len(path.parts) == 1:
+        folder = bundled("discretization")
+        known = sorted(file.stem for file in folder.glob("*.toml"))
+        if str(path) not in known:
+            raise FormatError(
+                f"no library {str(path)!r}; bundled are {', '.join(known) or 'none'}, a file of your own ends in .toml"
+            )
+        path = folder / f"{path}.toml"
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise FormatError("not a text file in UTF-8", path=path) from None
+    return parse_library(text, path=str(path))
+
+
+def write_library(path: FilePath, library: Library) -> None:
+    """Write a library as a person would: turns where hundredths of a degree are exact, else quaternions.
+
+    The same states come back with `read_library`; comments of a file that was read are not kept.
+    """
+    write_atomically(path, format_library(library).encode())
+
+
+def format_library(library: Library) -> str:
+    """The text of a library file; the inverse of `parse_library`."""
+    lines = [f'format = "{FORMAT}"', f"version = {VERSION}"]
+    lines += [f"{key} = {_quoted(getattr(library, key))}" for key in _TEXTS]
+    for table, entries in library.tables.items():
+        lines += ["", f"[{table if _bare(table) else _quoted(table)}]"]
+        for (name, value), q in zip(entries.items(), library.rotations(table), strict=True):
+            turns = value if isinstance(value, str) else format_turns(q)
+            # A quaternion as it was given: normalised again and again, it would creep.
+            text = f"[{', '.join(repr(float(v)) for v in value)}]" if turns is None else _quoted(turns)
+            lines.append(f"{_quoted(name)} = {text}")
+    return "\n".join(lines) + "\n"
+
+
+def _bare(key: str) -> bool:
+    return key != "" and key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+
+
+def _quoted(text: str) -> str:
+    """A TOML basic string."""
+    escapes = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+    return '"' + "".join(escapes.get(c, c if c.isprintable() else f"\\U{ord(c):08X}") for c in text) + '"'

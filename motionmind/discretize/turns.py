@@ -1,0 +1,55 @@
+"""Orientations as people write them: turns about named axes, one after the other."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+
+Array = NDArray[np.float64]
+
+_TURN = re.compile(r"([xyzXYZ])\s*([+-]?(?:\d+(?:\.\d*)?|\.\d+))", re.ASCII)
+
+
+def parse_turns(text: str) -> Array:
+    """The rotation [4] that a text such as "x -90, y 45" describes: turns in degrees, in sequence.
+
+    Each turn is about an axis of the frame as the turns before it have left it (intrinsic). The empty text is the
+    identity. ValueError where the text is none.
+    """
+    letters, angles = "", []
+    for part in text.split(",") if text.strip() else []:
+        match = _TURN.fullmatch(part.strip())
+        if match is None:
+            raise ValueError(f"{part.strip()!r} is no turn; write an axis and degrees, such as 'x -90'")
+        angle = float(match[2])
+        if not abs(angle) <= 360.0:
+            raise ValueError(f"{part.strip()!r} turns by more than 360 degrees")
+        letters += match[1]
+        angles.append(math.radians(angle))
+    return rot.normalise(rot.from_euler(letters, np.array(angles)))
+
+
+def format_turns(q: Array) -> str | None:
+    """The shortest turns in hundredths of a degree that are the rotation `q` [4]; None where none are exactly it.
+
+    The inverse of `parse_turns` up to sign and 1e-9 radians.
+    """
+    tries = [""]
+    for order in ("xyz", "yxz", "zxy", "xzy", "yzx", "zyx"):
+        angles = np.degrees(rot.to_euler(order, q))
+        turns = [f"{axis} {_number(angle)}" for axis, angle in zip(order, angles, strict=True) if _number(angle) != "0"]
+        tries.append(", ".join(turns))
+    for text in sorted(tries, key=len):
+        if rot.angle(parse_turns(text), q) < 1e-9:
+            return text
+    return None
+
+
+def _number(angle: float) -> str:
+    text = f"{angle:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

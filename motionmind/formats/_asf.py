@@ -1,0 +1,208 @@
+"""Acclaim's skeleton file (ASF): bones, their frames and their channels; see `asf_amc` for what they mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.errors import FormatError
+from motionmind.formats.files import FilePath
+from motionmind.formats.text import MOST_JOINTS, listed, meant, read_lines, shown, to_number, to_numbers
+from motionmind.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+_INCH = 0.0254
+_CHANNEL = re.compile(r"[TR][XYZ]|L")
+
+
+@dataclass
+class Bone:
+    """The root, or one bone of :bonedata; lengths in the file's unit, angles in radians."""
+
+    name: str
+    line: int
+    direction: Array = field(default_factory=lambda: np.zeros(3))
+    length: float = 0.0
+    axis: Array = field(default_factory=lambda: rot.IDENTITY)
+    channels: list[str] = field(default_factory=list)  # "TX", "RX", ..., in the order of the AMC
+
+
+@dataclass
+class Acclaim:
+    """What an ASF file says."""
+
+    path: FilePath
+    bones: dict[str, Bone]  # the root first, parents before their children
+    parents: dict[str, str]
+    position: Array
+    scale: float  # metres in one unit
+    degrees: bool
+
+    def skeleton(self) -> Skeleton:
+        """The bones as joints: each stands where its bone starts, which is where its parent's ends; metres."""
+        index = {name: joint for joint, name in enumerate(self.bones)}
+        parents = [index[self.parents[name]] if name in self.parents else -1 for name in self.bones]
+        ends = np.array([bone.length * bone.direction for bone in self.bones.values()]) * self.scale
+        offsets = np.array([ends[parent] if parent >= 0 else np.zeros(3) for parent in parents])
+        leaf = [joint not in parents for joint in range(len(parents))]
+        return Skeleton(
+            Path(self.path).stem, tuple(self.bones), tuple(parents), offsets, ends * np.array(leaf)[:, None]
+        )
+
+
+def fixed_axes(order: str, angles: Array) -> Array:
+    """Rotation [..., 4] of turns by `angles` [..., len(order)] radians about fixed axes, the first letter's first."""
+    # Turns about fixed axes are turns about moving ones in reverse.
+    return rot.from_euler(order[::-1], angles[..., ::-1])
+
+
+def _words(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """The words of each line that has any; commas and parentheses are blanks, # begins a comment."""
+    for number, line in enumerate(lines, start=1):
+        words = re.sub(r"[(),]", " ", line.split("#")[0]).split()
+        if words:
+            yield number, words
+
+
+def read_asf(path: FilePath) -> Acclaim:
+    """All that an ASF file says of its skeleton; FormatError names file and line of what it does not."""
+    lines = read_lines(path)
+    sections: dict[str, list[tuple[int, list[str]]]] = {}
+    section: list[tuple[int, list[str]]] = []
+    for number, words in _words(lines):
+        if words[0].startswith(":"):
+            name = words[0].lower()
+            section = sections.setdefault(name, [])
+        else:
+            section.append((number, words))
+    for wanted in (":root", ":bonedata", ":hierarchy"):
+        if wanted not in sections:
+            raise FormatError(f"no whole ASF file: there is no section {wanted}", path=path, line=len(lines))
+    units = {words[0].lower(): (number, words) for number, words in sections.get(":units", [])}
+    degrees = units.get("angle", (0, ["", "deg"]))[1][-1].lower() != "rad"
+    number, words = units.get("length", (0, ["", "1"]))
+    length = to_number(words[-1], path, number)
+    if not length > 1e-6:
+        raise FormatError(f"the unit of length is {words[-1]}; it must be more than 0", path=path, line=number)
+    root, position = _read_root(sections[":root"], degrees, path)
+    bones = {bone.name: bone for bone in _read_bones(sections[":bonedata"], degrees, path)}
+    bones["root"] = root
+    order, parents = _read_hierarchy(sections[":hierarchy"], bones, path)
+    return Acclaim(path, {name: bones[name] for name in order}, parents, position, _INCH / length, degrees)
+
+
+def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> tuple[Bone, Array]:
+    """The root, and the place that is added to its movement."""
+    root = Bone("root", section[0][0] if section else 1)
+    position, orientation, order = np.zeros(3), np.zeros(3), "XYZ"
+    for number, (keyword, *words) in section:
+        if keyword.lower() == "order":
+            root.channels = _channels(words, path, number)
+        elif keyword.lower() == "axis":
+            order = _rotation_order(words, path, number)
+        elif keyword.lower() == "position":
+            position = _vector(words, path, number)
+        elif keyword.lower() == "orientation":
+            orientation = _vector(words, path, number)
+    if not root.channels:
+        raise FormatError("the root has no order (TX TY TZ RX RY RZ)", path=path, line=root.line)
+    root.axis = fixed_axes(order, np.radians(orientation) if degrees else orientation)
+    return root, position
+
+
+def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> Iterator[Bone]:
+    bone: Bone | None = None
+    names = {"root"}
+    for number, (keyword, *words) in section:
+        match keyword.lower():
+            case "begin":
+                bone = Bone("", number)
+            case "end":
+                if bone is None or not bone.name or bone.name in names:
+                    fault = "a bone without a name" if bone is None or not bone.name else f"a second bone {bone.name!r}"
+                    raise FormatError(fault, path=path, line=number if bone is None else bone.line)
+                names.add(bone.name)
+                if len(names) > MOST_JOINTS:
+                    raise FormatError(f"more than {MOST_JOINTS} bones are no body", path=path, line=number)
+                yield bone
+                bone = None
+            case _ if bone is not None:
+                _read_bone_line(bone, keyword.lower(), words, degrees=degrees, path=path, line=number)
+    if bone is not None:
+        raise FormatError(f"bone {shown(bone.name)} has no end", path=path, line=bone.line)
+
+
+def _read_bone_line(bone: Bone, keyword: str, words: list[str], *, degrees: bool, path: FilePath, line: int) -> None:
+    """One line between begin and end; limits, masses and what else is there does not matter here."""
+    if keyword == "name":
+        bone.name = " ".join(words)
+    elif keyword == "direction":
+        direction = _vector(words, path, line)
+        size = float(np.linalg.norm(direction))
+        bone.direction = direction / size if size > 1e-9 else np.zeros(3)
+    elif keyword == "length":
+        bone.length = to_number(" ".join(words), path, line)
+    elif keyword == "axis":
+        order = _rotation_order(words[3:], path, line)
+        angles = _vector(words[:3], path, line)
+        bone.axis = fixed_axes(order, np.radians(angles) if degrees else angles)
+    elif keyword == "dof":
+        bone.channels = _channels(words, path, line)
+
+
+def _channels(words: list[str], path: FilePath, line: int) -> list[str]:
+    channels = [word.upper() for word in words]
+    for channel in channels:
+        if not _CHANNEL.fullmatch(channel):
+            raise FormatError(f"{shown(channel)} is no channel; they are tx ty tz rx ry rz l", path=path, line=line)
+        if channels.count(channel) > 1:
+            raise FormatError(f"the channel {channel} twice", path=path, line=line)
+    return channels
+
+
+def _rotation_order(words: list[str], path: FilePath, line: int) -> str:
+    order = "".join(words).upper() or "XYZ"
+    if sorted(order) != ["X", "Y", "Z"]:
+        raise FormatError(f"{shown(order)} where an order of axes such as XYZ was expected", path=path, line=line)
+    return order
+
+
+def _vector(words: list[str], path: FilePath, line: int) -> Array:
+    if len(words) != 3:
+        raise FormatError(f"{len(words)} numbers where three were expected", path=path, line=line)
+    return np.array(to_numbers(words, path, line))
+
+
+def _read_hierarchy(
+    section: list[tuple[int, list[str]]], bones: dict[str, Bone], path: FilePath
+) -> tuple[list[str], dict[str, str]]:
+    """Names of the bones, parents before their children, and each bone's parent."""
+    parents: dict[str, str] = {}
+    children: dict[str, list[str]] = {name: [] for name in bones}
+    for number, words in section:
+        if words[0].lower() in ("begin", "end") and len(words) == 1:
+            continue
+        unknown = next((word for word in words if word not in bones), None)
+        if unknown is not None:
+            raise FormatError(f"there is no bone {shown(unknown)}{meant(unknown, bones)}", path=path, line=number)
+        for child in words[1:]:
+            if child in parents or child == "root":
+                raise FormatError(f"bone {shown(child)} hangs from two others", path=path, line=number)
+            parents[child] = words[0]
+            children[words[0]].append(child)
+    order: list[str] = []
+    waiting = ["root"]
+    while waiting:
+        order.append(waiting.pop())
+        waiting += reversed(children[order[-1]])
+    loose = [name for name in bones if name not in order]
+    if loose:
+        raise FormatError(f"{listed(loose)} hang from nothing", path=path, line=bones[loose[0]].line)
+    return order, parents

@@ -1,0 +1,179 @@
+"""Where the joints of a BVH file stand: from places that change with time to a skeleton whose offsets do not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.formats.text import listed
+from motionmind.formats.units import bone_span
+from motionmind.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+# As shares of the body's span: what counts as standing still (exporters print 6 digits), and what is more than the
+# give of a joint or the stretch of a rig.
+_STILL = 1e-4
+_TRAVEL = 1e-2
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A tree of joints that may each move against its parent, as BVH allows.
+
+    Attributes:
+        skeleton: the file's tree, with its OFFSETs, in its unit of length.
+        rotations: local quaternions [T, J, 4].
+        places: for each joint that has position channels, its place in its parent's frame [T, 3].
+    """
+
+    skeleton: Skeleton
+    rotations: Array
+    places: dict[int, Array]
+
+    def stray(self, joint: int) -> float:
+        """How far the joint moves against its parent, along the axis on which that is most."""
+        return float(np.max(np.ptp(self.places[joint], axis=0))) if joint in self.places else 0.0
+
+    def turn(self, joint: int) -> float:
+        """The largest angle in radians between the joint's first rotation and any other."""
+        return float(np.max(rot.angle(self.rotations[:1, joint], self.rotations[:, joint])))
+
+    def place(self, joint: int) -> Array:
+        """Places [T, 3] of any joint in its parent's frame."""
+        still = np.broadcast_to(self.skeleton.offsets[joint], (len(self.rotations), 3))
+        return self.places.get(joint, still)
+
+    def mean_offsets(self) -> Array:
+        """Mean place of each joint [J, 3]; 0 for the root."""
+        offsets = np.array(self.skeleton.offsets)
+        for joint, place in self.places.items():
+            offsets[joint] = place.mean(axis=0)
+        offsets[0] = 0.0
+        return offsets
+
+
+@dataclass(frozen=True)
+class Body:
+    """A BVH file's movement on a skeleton of constant offsets, in the file's unit, and what was mended to have it so.
+
+    Attributes:
+        skeleton: offsets and tips in the file's unit.
+        rotations: local quaternions [T, J, 4].
+        root: places of the root [T, 3] in the file's unit.
+        notes: what was mended, in words.
+        strays: joints whose place was not constant, and by how much at most, in the file's unit.
+    """
+
+    skeleton: Skeleton
+    rotations: Array
+    root: Array
+    notes: list[str]
+    strays: list[tuple[str, float]]
+
+    def mended(self, scale: float) -> Iterator[str]:
+        """What was mended, in words, lengths in millimetres if one unit is `scale` metres."""
+        yield from self.notes
+        if self.strays:
+            far = [f"{name} (by up to {1000.0 * scale * stray:.1f} mm)" for name, stray in self.strays]
+            yield f"joints that move against their parents are kept at their mean place: {listed(far)}"
+
+
+def settle(body: Placed) -> Body:
+    """The movement with constant offsets that is nearest to `body`."""
+    notes: list[str] = []
+    if _are_added(body):
+        offsets = body.skeleton.offsets
+        body = replace(body, places={j: place + offsets[j] * (j > 0) for j, place in body.places.items()})
+        notes.append("its position channels stand near 0 and its OFFSETs do not: read as added to them")
+    span = bone_span(np.array(body.skeleton.parents), body.mean_offsets(), body.skeleton.tips)
+    if top := _new_root(body, span):
+        body = _fold(body, top, span, notes)
+    offsets = body.mean_offsets()
+    strays = [
+        (body.skeleton.names[joint], float(np.max(np.linalg.norm(place - offsets[joint], axis=-1))))
+        for joint, place in body.places.items()
+        if joint > 0 and body.stray(joint) > _STILL * span
+    ]
+    return Body(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
+
+
+def _are_added(body: Placed) -> bool:
+    """Whether most of the joints that stand still say: channels near 0, at an OFFSET that is not."""
+    added = replaced = 0
+    for joint, place in body.places.items():
+        offset = body.skeleton.offsets[joint]
+        near = 0.01 * float(np.linalg.norm(offset))
+        if joint > 0 and near > 0.0 and body.stray(joint) <= near:
+            added += bool(np.linalg.norm(place[0]) < near)
+            replaced += bool(np.linalg.norm(place[0] - offset) < near)
+    return added > replaced
+
+
+def _new_root(body: Placed, span: float) -> int:
+    """The joint that should be the root in place of the file's; 0, the file's own, where none should.
+
+    It moves against its parent by more than a rig's stretch, and all of the body that moves hangs from it. What
+    else there is must be joints on the way to it, or less than half of the body and still.
+    """
+    skeleton = body.skeleton
+    far = [joint for joint in body.places if joint > 0 and body.stray(joint) > _TRAVEL * span]
+    if not far:
+        return 0
+    top = max(far, key=lambda joint: (len(_descendants(skeleton, joint)), -joint))
+    carried, above = _descendants(skeleton, top), _ancestors(skeleton, top)
+    aside = [joint for joint in range(len(skeleton)) if joint not in carried and joint not in above]
+    if not aside:
+        return top
+    still = all(body.stray(joint) <= _STILL * span and body.turn(joint) < _STILL for joint in above + aside)
+    return top if still and 2 * len(carried) > len(skeleton) else 0
+
+
+def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """From the root down to the joint's parent."""
+    chain: list[int] = []
+    while (joint := skeleton.parents[joint]) >= 0:
+        chain.append(joint)
+    return chain[::-1]
+
+
+def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint itself and all that hang from it, in order."""
+    found = {joint}
+    for child in range(joint + 1, len(skeleton)):
+        if skeleton.parents[child] in found:
+            found.add(child)
+    return sorted(found)
+
+
+def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
+    """The part of the body below `top`, with `top` as root: all above it is in its rotation and place."""
+    old = body.skeleton
+    above, kept = _ancestors(old, top), _descendants(old, top)
+    turned: Array = np.broadcast_to(rot.IDENTITY, (len(body.rotations), 4))
+    root: Array = np.zeros((len(body.rotations), 3))
+    for joint in [*above, top]:
+        root = root + rot.mul_vec(turned, body.place(joint))
+        turned = rot.mul(turned, body.rotations[:, joint])
+    rotations = body.rotations[:, kept]
+    rotations[:, 0] = turned
+    new = {joint: index for index, joint in enumerate(kept)}
+    skeleton = Skeleton(
+        old.name,
+        tuple(old.names[joint] for joint in kept),
+        (-1, *(new[old.parents[joint]] for joint in kept[1:])),
+        old.offsets[kept],
+        old.tips[kept],
+    )
+    name = old.names[top]
+    aside = [old.names[joint] for joint in range(len(old)) if joint not in new and joint not in above]
+    if aside:
+        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {listed(aside)}")
+    walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL * span]
+    if walking:
+        notes.append(f"{name} is taken as the root, at its own place; the path of {listed(walking)} itself is lost")
+    return Placed(skeleton, rotations, {**{new[j]: p for j, p in body.places.items() if j in new}, 0: root})

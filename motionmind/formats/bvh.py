@@ -1,0 +1,291 @@
+"""BVH (Biovision hierarchy) files: movement of any tree of joints, in and out.
+
+The format has no standard of its own. What is read here is what its writers write, after the description of M. Meredith
+and S. Maddock, "Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels
+turn in the order in which they stand, each about the axes that the ones before have turned; position channels move
+the joint in its parent's frame, wherever they stand among the channels, and take the place of its OFFSET.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
+from motionmind.formats._bvh_hierarchy import Joint, is_comment, read_hierarchy
+from motionmind.formats._bvh_places import Body, Placed, settle
+from motionmind.formats.files import FilePath, write_atomically
+from motionmind.formats.text import LARGEST, read_lines, shown, to_number, to_numbers
+from motionmind.formats.units import guess_unit, metres_per_unit
+from motionmind.motion import Motion
+from motionmind.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+_FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
+_FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
+
+_log = logging.getLogger(__name__)
+
+
+def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
+    """Movement from a BVH file, on the file's own tree of joints, in metres.
+
+    Each joint has its own channels, in any order. Lines of the motion that are blank or begin with # or // are
+    passed over. Where the header's count of frames is wrong, the frames that are there count; a warning says so.
+
+    Position channels of a joint other than the root take the place of its OFFSET where they are constant. If they
+    vary, and the joint carries most of the body, it becomes the root, with all above it folded in (Bandai-Namco's
+    `joint_Root` stands at the origin while `Hips` moves); if it does not, its mean place is kept and a warning says
+    by how much it strayed. A file whose position channels stand near 0 while its offsets do not adds the two, as
+    old exporters of Blender wrote it; a warning says that it was read so.
+
+    Args:
+        path: the file; its stem becomes the name of the skeleton and of the motion.
+        unit: a name in `UNITS`, or metres in one unit of the file; None takes the one that `guess_unit` tells from
+            the skeleton, and logs it (logger "motionmind.formats.bvh", level INFO).
+
+    Raises:
+        FormatError: the file is not there, or is no whole BVH; the message names file and line.
+
+    Warns:
+        MotionMindWarning: something was mended, as said above.
+    """
+    body, times = _read_body(path)
+    if unit is None:
+        name, scale = guess_unit(body.skeleton)
+        _log.info("%s: one unit taken as %.5g m (%s)", path, scale, name)
+    else:
+        scale = metres_per_unit(unit)
+    for message in body.mended(scale):
+        warnings.warn(f"{path}: {message}", MotionMindWarning, stacklevel=2)
+    raw = body.skeleton
+    return Motion(
+        Skeleton(raw.name, raw.names, raw.parents, raw.offsets * scale, raw.tips * scale),
+        body.rotations,
+        body.root * scale,
+        times,
+        name=raw.name,
+    )
+
+
+def bvh_unit(path: FilePath) -> tuple[str, float]:
+    """The unit that `read_bvh` takes for a file when none is given: its name, and its metres."""
+    return guess_unit(_read_body(path)[0].skeleton)
+
+
+def _read_body(path: FilePath) -> tuple[Body, Array]:
+    """The whole file, in its own unit, and the frames' times [T] in seconds."""
+    lines = read_lines(path)
+    start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
+    joints = read_hierarchy(lines[:start], path)
+    if start is None:
+        raise FormatError("no line MOTION: the file ends before its frames", path=path, line=len(lines))
+    channels = sum(len(joint.channels) for joint in joints)
+    if channels == 0:
+        raise FormatError("no joint has CHANNELS: nothing could move", path=path, line=start + 1)
+    declared, frame_time, first = _read_motion_header(lines, start + 1, path)
+    values = _read_frames(lines, first, channels, declared, path)
+    body = settle(_assemble(joints, values, Path(path).stem))
+    if declared != len(values):
+        body.notes.append(
+            f"the header says {declared} frames, the file holds {len(values)}; all {len(values)} are read"
+        )
+    return body, np.arange(len(values), dtype=np.float64) * frame_time
+
+
+# --- the frames ----------------------------------------------------------------------------------------------------
+
+
+def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[int, float, int]:
+    """The count of frames that the header claims, seconds a frame, and the index of the line that follows."""
+    declared: int | None = None
+    frame_time: float | None = None
+    for index in range(start, len(lines)):
+        line = lines[index]
+        if not line.strip() or is_comment(line):
+            continue
+        if match := _FRAME_TIME.fullmatch(line):
+            frame_time = to_number(match[1], path, index + 1)
+            if frame_time < 1e-9:
+                raise FormatError(
+                    f"Frame Time is {match[1]}; it must be the seconds from frame to frame, more than 0",
+                    path=path,
+                    line=index + 1,
+                )
+        elif match := _FRAMES.fullmatch(line):
+            if not re.fullmatch(r"[0-9]{1,18}", match[1]):
+                raise FormatError(
+                    f"{shown(match[1])} where the number of frames was expected", path=path, line=index + 1
+                )
+            declared = int(match[1])
+        else:
+            break
+        if declared is not None and frame_time is not None:
+            return declared, frame_time, index + 1
+    missing = "Frame Time" if declared is not None else "Frames"
+    raise FormatError(f"no line '{missing}: ...' between MOTION and the frames", path=path, line=start)
+
+
+def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Array:
+    """Channel values [T, C], one line a frame; frames wrapped over several lines where their sum is right."""
+    rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
+    if not rows:
+        raise FormatError("no frames after the header", path=path, line=len(lines))
+    try:
+        frames = np.loadtxt([line for _, line in rows], dtype=np.float64, comments=None, ndmin=2)
+    except ValueError:  # a word that is no number, or lines of different lengths
+        return _read_odd_frames(rows, channels, declared, path)
+    if frames.shape[1] != channels or not np.all(np.abs(frames) <= LARGEST):  # false for NaN too
+        return _read_odd_frames(rows, channels, declared, path)
+    return frames
+
+
+def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Array:
+    """Frames read word by word: to name the first fault, or to find that line ends mean nothing in this file."""
+    values = [to_numbers(line.split(), path, number) for number, line in rows]
+    flat = [value for row in values for value in row]
+    if len(flat) == declared * channels:
+        return np.array(flat).reshape(declared, channels)
+    number, row = next((n, row) for (n, _), row in zip(rows, values, strict=True) if len(row) != channels)
+    raise FormatError(f"the line holds {len(row)} numbers, a frame of this file has {channels}", path=path, line=number)
+
+
+def _assemble(joints: list[Joint], values: Array, name: str) -> Placed:
+    """Rotations and places of the joints from the channels' values [T, C]."""
+    frames = len(values)
+    rotations = np.tile(rot.IDENTITY, (frames, len(joints), 1))
+    places: dict[int, Array] = {}
+    groups: dict[str, list[tuple[int, list[int]]]] = {}  # joints that turn in the same order, all at once
+    column = 0
+    for index, joint in enumerate(joints):
+        columns = range(column, column + len(joint.channels))
+        column += len(joint.channels)
+        turns = [(name[0], at) for name, at in zip(joint.channels, columns, strict=True) if name[1:] == "ROTATION"]
+        moves = [
+            ("XYZ".index(name[0]), at)
+            for name, at in zip(joint.channels, columns, strict=True)
+            if name[1:] == "POSITION"
+        ]
+        if turns:
+            order = "".join(letter for letter, _ in turns)
+            groups.setdefault(order, []).append((index, [at for _, at in turns]))
+        if moves:
+            place = np.tile(np.array(joint.offset, dtype=np.float64), (frames, 1))
+            for axis, at in moves:
+                place[:, axis] = values[:, at]
+            places[index] = place
+    for order, members in groups.items():
+        angles = np.radians(values[:, [columns for _, columns in members]])
+        rotations[:, [index for index, _ in members]] = rot.from_euler(order, angles)
+    skeleton = Skeleton(
+        name,
+        tuple(joint.name for joint in joints),
+        tuple(joint.parent for joint in joints),
+        np.array([joint.offset for joint in joints], dtype=np.float64),
+        np.array([joint.tip or [0.0, 0.0, 0.0] for joint in joints], dtype=np.float64),
+    )
+    return Placed(skeleton, rotations, places)
+
+
+# --- out -----------------------------------------------------------------------------------------------------------
+
+
+# The order in which most files turn (MotionBuilder's, Bandai-Namco's), so that most readers have met it. Its middle
+# turn is about x, where 90 degrees are rarer than about y or z in arms that hang from a T-pose.
+_ORDER = "ZXY"
+
+
+def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
+    """Write `motion` as BVH: root with positions, all joints with Zrotation Xrotation Yrotation.
+
+    Read back with the same unit, rotations agree to 1e-6 rad and positions to 1e-6 m. Joints come in the depth-first
+    order that the format dictates. Each leaf has an End Site at its tip (0 0 0 where it has none). The first time
+    becomes 0. Angles are unwrapped, so that a reader who blends neighbouring frames sees no jump of 360 degrees.
+
+    Raises:
+        MotionMindError: the times are not even (`motion.resample` makes them so), a joint's name cannot stand in a
+            BVH file, or the file cannot be written.
+    """
+    scale = 1.0 / metres_per_unit(unit)
+    skeleton = motion.skeleton
+    _check_names(skeleton)
+    step = _even_step(motion)
+    order = _depth_first(skeleton)
+    # Lengths to 1e-8 m: rounding errors add up along a chain of bones.
+    digits = max(0, int(np.ceil(8.0 - np.log10(scale))))
+    lines = ["HIERARCHY", *_hierarchy_lines(skeleton, order, scale, digits), "MOTION"]
+    lines += [f"Frames: {len(motion)}", f"Frame Time: {step:.12g}"]
+    degrees = np.degrees(np.unwrap(rot.to_euler(_ORDER, motion.rotations[:, order]), axis=0))
+    # Adding 0 makes 0 of -0, which would be printed with its sign.
+    root = np.round(motion.root * scale, digits) + 0.0
+    values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
+    row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
+    lines += [row % tuple(frame) for frame in values.tolist()]
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
+
+
+def _even_step(motion: Motion) -> float:
+    """Seconds from frame to frame; a thirtieth where there is only one."""
+    if len(motion) == 1:
+        return 1.0 / 30.0
+    step = float(motion.times[-1] - motion.times[0]) / (len(motion) - 1)
+    late = np.abs(motion.times - motion.times[0] - step * np.arange(len(motion)))
+    if np.max(late) > 1e-3 * step:
+        frame = int(np.argmax(late))
+        raise MotionMindError(
+            f"{motion.name or 'motion'}: BVH needs frames that are even in time; frame {frame} is "
+            f"{late[frame]:.3g} s off a step of {step:.6g} s (resample the motion first)"
+        )
+    return step
+
+
+def _check_names(skeleton: Skeleton) -> None:
+    for name in skeleton.names:
+        if name != " ".join(name.split()) or not name or set("{}") & set(name) or is_comment(name):
+            raise MotionMindError(f"{skeleton.name}: {shown(name)} is no joint name that BVH can hold")
+
+
+def _depth_first(skeleton: Skeleton) -> list[int]:
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+        children[parent].append(joint)
+    order: list[int] = []
+    waiting = [0]
+    while waiting:
+        order.append(waiting.pop())
+        waiting += reversed(children[order[-1]])
+    return order
+
+
+def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float, digits: int) -> Iterator[str]:
+    def offset(vector: Array) -> str:
+        return "OFFSET " + " ".join(f"{value:.{digits}f}" for value in np.round(vector * scale, digits) + 0.0)
+
+    leaves = set(order) - set(skeleton.parents)
+    turns = "Zrotation Xrotation Yrotation"
+    open_blocks: list[int] = []
+    for joint in order:
+        while open_blocks and open_blocks[-1] != skeleton.parents[joint]:
+            yield "\t" * (len(open_blocks) - 1) + "}"
+            open_blocks.pop()
+        tab = "\t" * len(open_blocks)
+        yield f"{tab}{'JOINT' if joint else 'ROOT'} {skeleton.names[joint]}"
+        yield f"{tab}{{"
+        yield f"{tab}\t{offset(skeleton.offsets[joint] if joint else np.zeros(3))}"
+        yield f"{tab}\tCHANNELS " + (f"3 {turns}" if joint else f"6 Xposition Yposition Zposition {turns}")
+        if joint in leaves:
+            yield f"{tab}\tEnd Site"
+            yield f"{tab}\t{{"
+            yield f"{tab}\t\t{offset(skeleton.tips[joint])}"
+            yield f"{tab}\t}}"
+        open_blocks.append(joint)
+    for depth in range(len(open_blocks) - 1, -1, -1):
+        yield "\t" * depth + "}"

@@ -1,0 +1,67 @@
+"""Whole files in and out: one clear error line when a file cannot be read, and never a half-written one."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import stat
+from contextlib import suppress
+from pathlib import Path
+
+from motionmind.errors import FormatError, MotionMindError
+
+FilePath = str | os.PathLike[str]
+
+
+def read_bytes(path: FilePath) -> bytes:
+    """All bytes of the file at `path`; FormatError where there is none, or it may not be read."""
+    try:
+        return Path(path).read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise FormatError(f"cannot be read: {_reason(error)}", path=path) from error
+
+
+def write_atomically(path: FilePath, data: bytes) -> None:
+    """Put `data` at `path` so that whoever reads it finds the old file or the new one, whole.
+
+    The bytes go to a temporary name in the same folder, are flushed to the disk, and are moved into place. A link
+    is followed; the permissions of a file that is replaced are kept. What is no ordinary file (a pipe,
+    `/dev/stdout`) is written to as it is. MotionMindError where writing fails; the temporary file is gone then.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        mode = target.stat().st_mode if target.exists() else None
+        if mode is not None and not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            target.write_bytes(data)
+            return
+        if mode is not None and stat.S_ISDIR(mode):
+            raise IsADirectoryError(0, "it is a folder")
+        _write_beside_and_move(target, data, mode)
+    except (OSError, ValueError) as error:
+        raise MotionMindError(f"{os.fspath(path)}: cannot be written: {_reason(error)}") from error
+
+
+def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
+    temporary = target.with_name(f".motionmind-{secrets.token_hex(8)}.tmp")
+    try:
+        # Opened here, not by tempfile, whose files are private to their owner whatever the umask says.
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        if mode is not None:
+            temporary.chmod(stat.S_IMODE(mode))
+        temporary.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+
+
+def _reason(error: OSError | ValueError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file or folder"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror[0].lower() + error.strerror[1:]
+    return str(error)

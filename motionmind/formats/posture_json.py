@@ -1,0 +1,83 @@
+"""One posture as JSON that a person can read and edit.
+
+    {
+      "format": "motionmind-posture",
+      "version": 1,
+      "skeleton": "human23",
+      "root": [0.0, 0.97, 0.0],
+      "rotations": {
+        "pelvis": [0.0, 0.0, 0.0, 1.0],
+        "left_hip": [0.38268, 0.0, 0.0, 0.92388],
+        ...
+      }
+    }
+
+`root` is the place of the root in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
+`skeleton` is "human23", or a description:
+`{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`, metres,
+parents before their children; `tip` may be left out.
+"""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from motionmind.errors import FormatError
+from motionmind.formats import _json
+from motionmind.formats.files import FilePath, read_bytes, write_atomically
+from motionmind.motion import Posture
+
+
+class PostureSchema(msgspec.Struct, forbid_unknown_fields=True):
+    """The file, version 1."""
+
+    format: str
+    version: int
+    skeleton: str | _json.SkeletonSchema
+    root: _json.Vector
+    rotations: dict[str, _json.Quaternion]
+
+
+def read_posture_json(path: FilePath) -> Posture:
+    """The posture in a JSON file.
+
+    Raises:
+        FormatError: the file is not there or holds no posture of version 1; or a joint is missing, unknown, or has
+            a zero quaternion. The message names file and joint.
+
+    Warns:
+        MotionMindWarning: a quaternion's length was off by more than 1e-6 and has been made 1.
+    """
+    return posture_from_json(read_bytes(path), path)
+
+
+def posture_from_json(data: bytes, path: FilePath) -> Posture:
+    """The posture in `data`, the content of the file at `path`; see `read_posture_json`."""
+    kind = _json.kind_of(data, path)
+    if kind != _json.POSTURE:
+        raise FormatError(f"this holds a motion, where a posture ({_json.POSTURE!r}) was expected", path=path)
+    schema = _json.decode(data, PostureSchema, path)
+    skeleton = _json.to_skeleton(schema.skeleton, path)
+    _json.check_joints(list(schema.rotations), skeleton, path)
+    rotations = np.array([schema.rotations[name] for name in skeleton.names], dtype=np.float64)
+    root = np.array(schema.root, dtype=np.float64)
+    _json.check_lengths(root, "root", path)
+    return Posture(skeleton, _json.unit_rotations(rotations, skeleton.names, path), root)
+
+
+def write_posture_json(path: FilePath, posture: Posture) -> None:
+    """Write `posture` as JSON; read back, no number is off by more than 1e-9. MotionMindError if it cannot be."""
+    skeleton = posture.skeleton
+    rows = [
+        f"    {_json.text(name)}: {rotation}"
+        for name, rotation in zip(skeleton.names, _json.rounded(posture.rotations).tolist(), strict=True)
+    ]
+    fields = [
+        f'  "format": "{_json.POSTURE}"',
+        f'  "version": {_json.VERSION}',
+        f'  "skeleton": {_json.skeleton_text(skeleton, "  ")}',
+        f'  "root": {_json.rounded(posture.root).tolist()}',
+        '  "rotations": {\n' + ",\n".join(rows) + "\n  }",
+    ]
+    write_atomically(path, ("{\n" + ",\n".join(fields) + "\n}\n").encode())

@@ -1,0 +1,84 @@
+"""The problem of a fixed number of moves in toulbar2's cfn format, so that anyone can check an optimum.
+
+The format: "cost function network", JSON with `problem`, `variables` and `functions`
+(toulbar2's documentation, "User guide: file formats, cfn format"). A cost at or above `mustbe` forbids.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from motionmind.search.problem import Ints, Model, build_grid, costs_to_go, with_waits
+from motionmind.search.solve import Rules
+
+DECIMALS = 6
+
+
+def cfn(model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, lanes: Sequence[str]) -> str:
+    """The problem of exactly `moves` moves from states `start` [L] to `goal` [L], with the costs that are searched.
+
+    Variables are named lane_t and their values after the lane's states, such as "s12"; the optimum is the cost that a
+    certificate states, the price of the moves themselves included.
+    """
+    held = with_waits(model, goal, rules.wait)
+    grid = build_grid(held, start, moves, costs_to_go(held, goal, moves), np.inf)
+    names = [f"{lanes[i % grid.lanes]}_{i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
+    domains = [slice(grid.dom_ptr[i], grid.dom_ptr[i + 1]) for i in range(len(names))]
+
+    def functions() -> Iterator[tuple[str, list[str], dict[str, object]]]:
+        yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
+        for i, name in enumerate(names):
+            lane = i % grid.lanes
+            yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
+            if i + grid.lanes < len(names):
+                after = i + grid.lanes
+                rows = range(domains[i].start, domains[i].stop)
+                edges = [(p, e) for p in rows for e in range(grid.row_ptr[p], grid.row_ptr[p + 1])]
+                listed = [
+                    (p - domains[i].start, grid.row_to[e] - domains[after].start, grid.row_cost[e]) for p, e in edges
+                ]
+                yield f"move_{name}", [name, names[after]], {"defaultcost": None, "costs": _flat(listed)}
+            if grid.up_ptr[i + 1] > grid.up_ptr[i]:
+                above = i - lane + grid.parents[lane]
+                couplings = range(grid.up_ptr[i], grid.up_ptr[i + 1])
+                pairs = [(u, q) for u in couplings for q in range(grid.col_ptr[u], grid.col_ptr[u + 1])]
+                listed = [(u - couplings.start, grid.col_to[q] - domains[i].start, grid.col_cost[q]) for u, q in pairs]
+                yield f"coordinate_{name}", [names[above], name], {"defaultcost": 0.0, "costs": _flat(listed)}
+
+    parts = list(functions())
+    # Above what any path can cost: the sum of the dearest entries of all functions.
+    forbidden = 1.0 + sum(max(map(abs, _costs(scope, body)), default=0.0) for _, scope, body in parts)
+    lines = []
+    for name, scope, body in parts:
+        default = {"defaultcost": forbidden} if body.get("defaultcost", 0.0) is None else {}
+        lines.append(f"{json.dumps(name)}: {json.dumps({'scope': scope, **body, **default})}")
+    variables = [
+        f"{json.dumps(name)}: {json.dumps([f's{s}' for s in grid.dom[where]])}"
+        for name, where in zip(names, domains, strict=True)
+    ]
+    problem = {"name": f"tween_{moves}_moves", "mustbe": f"<{forbidden:.{DECIMALS}f}"}
+    return (
+        f'{{"problem": {json.dumps(problem)},\n"variables": {{\n'
+        + ",\n".join(variables)
+        + '\n},\n"functions": {\n'
+        + ",\n".join(lines)
+        + "\n}}\n"
+    )
+
+
+def _flat(listed: list[tuple[int, int, float]]) -> list[float]:
+    """Pairs with their cost, one after another, as the format wants them."""
+    return [number for a, b, cost in listed for number in (int(a), int(b), _round(cost))]
+
+
+def _costs(scope: list[str], body: dict[str, object]) -> list[float]:
+    costs = body["costs"]
+    assert isinstance(costs, list)
+    return costs[2::3] if len(scope) == 2 else costs
+
+
+def _round(cost: float) -> float:
+    return round(float(cost), DECIMALS)

@@ -1,0 +1,197 @@
+"""The answer: a motion, what it is made of, and how good it provably is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.corpus.corpus import Corpus
+from motionmind.grammar.grammar import Grammar
+from motionmind.motion import Motion
+from motionmind.search.cfn import cfn
+from motionmind.search.problem import Ints, Model
+from motionmind.search.solve import Certificate, Rules
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """A move of a joint that the corpus does not attest: `move` counts from 0, `price` is in nats."""
+
+    joint: str
+    move: int
+    degrees: float
+    price: float
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A move that a joint spends waiting at its goal for the others, at `price` nats."""
+
+    joint: str
+    move: int
+    price: float
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a move of a joint was seen: a clip, and the number of the posture there from which it was made."""
+
+    clip: str
+    posture: int
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """The problem as the search was given it: the costs, start and goal states [L], and the rules."""
+
+    model: Model
+    start: Ints
+    goal: Ints
+    rules: Rules
+
+
+@dataclass(frozen=True, eq=False)
+class Tween:
+    """A tween from posture A to posture B, with its certificate and provenance.
+
+    Attributes:
+        motion: the movement; its first and last frames are A and B, its `moves` the times of the path's postures.
+        joints: the lanes [L]: the skeleton's joints, then "facing" where that is a lane of its own.
+        path: states of the lanes [moves + 1, L].
+        status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded".
+        cost: of the path, nats.
+        lower_bound: no path within the rules that were asked for costs less, nats.
+        attested: share of the joints' moves that the corpus attests.
+        bridges: the moves that it does not, but for waits.
+        waits: moves spent waiting at the goal.
+        snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
+        sources: for each move and lane one place in the corpus that attests it, None where none does.
+        expansions: of A*.
+        peak_nodes: the greatest number of nodes that A* held.
+        node_budget: the number that it might hold.
+        seconds: spent on "load", "problem", "bound", "search" and "realise"; measured, so it differs from run to run.
+    """
+
+    motion: Motion
+    joints: tuple[str, ...]
+    path: NDArray[np.int32]
+    status: Literal["optimal", "bounded"]
+    cost: float
+    lower_bound: float
+    attested: float
+    bridges: tuple[Bridge, ...]
+    waits: tuple[Wait, ...]
+    snap_degrees: Floats
+    sources: tuple[tuple[Source | None, ...], ...]
+    expansions: int
+    peak_nodes: int
+    node_budget: int
+    seconds: dict[str, float]
+    posed: Posed
+
+    @property
+    def moves(self) -> int:
+        """Number of moves T; the path has T + 1 postures."""
+        return len(self.path) - 1
+
+    @property
+    def gap(self) -> float:
+        """(cost - lower bound) / cost: 0 is proven optimal."""
+        return 0.0 if self.cost <= self.lower_bound else (self.cost - self.lower_bound) / abs(self.cost)
+
+    def report(self) -> dict[str, Any]:
+        """All but the movement itself, as plain values for JSON."""
+        return {
+            "status": self.status,
+            "cost": self.cost,
+            "lower_bound": self.lower_bound,
+            "gap": self.gap,
+            "moves": self.moves,
+            "expansions": self.expansions,
+            "peak_nodes": self.peak_nodes,
+            "node_budget": self.node_budget,
+            "seconds": self.seconds,
+            "joints": list(self.joints),
+            "path": self.path.tolist(),
+            "attested": self.attested,
+            "bridges": [
+                {"joint": b.joint, "move": b.move, "degrees": b.degrees, "price": b.price} for b in self.bridges
+            ],
+            "waits": [{"joint": w.joint, "move": w.move, "price": w.price} for w in self.waits],
+            "snap_degrees": {
+                end: dict(zip(self.joints, map(float, row), strict=True))
+                for end, row in zip("AB", self.snap_degrees, strict=True)
+            },
+            "sources": [
+                [None if s is None else {"clip": s.clip, "posture": s.posture} for s in row] for row in self.sources
+            ],
+        }
+
+    def problem(self) -> str:
+        """The problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`."""
+        posed = self.posed
+        return cfn(posed.model, posed.start, posed.goal, posed.rules, self.moves, self.joints)
+
+
+def explain(
+    certificate: Certificate, grammar: Grammar, corpus: Corpus, weights: Floats, wait: float, bridge_price: float
+) -> tuple[float, tuple[Bridge, ...], tuple[Wait, ...], tuple[tuple[Source | None, ...], ...]]:
+    """What a path is made of: the share attested, bridges, waits, and sources, as in Tween.
+
+    `weights` [E] are those of the grammar's transitions in the scheme that was searched.
+    """
+    graph, path = grammar.transitions, certificate.path
+    bridges, waits, sources = [], [], []
+    for move, (before, after) in enumerate(pairwise(path)):
+        row: list[Source | None] = []
+        for lane, joint in enumerate(grammar.lanes):
+            edge = graph.edge(lane, before[lane], after[lane])
+            row.append(Source(*corpus.where(int(graph.attests[edge]))) if edge >= 0 else None)
+            holds_goal = before[lane] == after[lane] == path[-1, lane]
+            if holds_goal and (edge < 0 or wait < weights[edge]):
+                waits.append(Wait(joint, move, wait))
+            elif edge < 0:
+                degrees = grammar.bridges.span(graph.starts[lane] + before[lane], after[lane])
+                bridges.append(Bridge(joint, move, degrees, bridge_price * degrees))
+        sources.append(tuple(row))
+    attested = [source is not None for row in sources for source in row]
+    return float(np.mean(attested)) if attested else 1.0, tuple(bridges), tuple(waits), tuple(sources)
+
+
+def diagnose(model: Model, grammar: Grammar, start: Ints, goal: Ints, rules: Rules, strict: bool) -> str:
+    """Why there is no path: for each lane at fault from where to where, and what comes nearest."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import breadth_first_order, shortest_path
+
+    lines = []
+    for lane, joint in enumerate(grammar.lanes):
+        first, last = model.starts[lane], model.starts[lane + 1]
+        rows = slice(model.indptr[first], model.indptr[last])
+        graph = csr_array(
+            (np.ones(rows.stop - rows.start), model.targets[rows], model.indptr[first : last + 1] - rows.start),
+            shape=(last - first, last - first),
+        )
+        a, b = int(start[lane]), int(goal[lane])
+        hops = shortest_path(graph, unweighted=True, indices=[a])[0, b]
+        if np.isfinite(hops):
+            if hops > rules.longest:
+                lines.append(f"{joint} needs {hops:.0f} moves from state {a} to state {b}")
+            continue
+        ahead = breadth_first_order(graph, a, return_predecessors=False)
+        back = breadth_first_order(graph.T.tocsr(), b, return_predecessors=False)
+        angle = np.abs(grammar.centres[first + ahead] @ grammar.centres[first + back].T)
+        i, k = np.unravel_index(int(angle.argmax()), angle.shape)
+        degrees = float(np.degrees(2.0 * np.arccos(min(1.0, angle[i, k]))))
+        lines.append(
+            f"{joint}: of the {len(ahead)} states that state {a} leads to and the {len(back)} that lead to state {b} "
+            f"none are the same; nearest are {ahead[i]} and {back[k]}, {degrees:.1f} degrees apart"
+        )
+    helps = "without strict, bridges may join them; so may a coarser tolerance" if strict else "allow more moves"
+    within = f"at most {rules.longest} move{'s' * (rules.longest != 1)}"
+    return "\n  ".join([f"no path from A to B in {within} ({helps}):", *lines])

@@ -1,0 +1,168 @@
+"""Toy bodies: problems written as dense tables, and their optima by brute force over all joint states.
+
+What is here knows `Model` only as a form to translate into; the optima come from the dense tables and the sum of
+products that the model's definition prints, not from the search's grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.search.problem import Model
+from motionmind.search.solve import Rules
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Toy:
+    """A body of a few lanes, dense.
+
+    Attributes:
+        parents: parent lane [L], or -1.
+        edges: cost of a move of each lane, infinity where there is none, L arrays of [S, S].
+        children, above: the parts of a coupling that separate, of the lane's state and of its parent's.
+        discounts: what is taken off for pairs, 0 or below, L arrays of [states of the parent, S].
+        start, goal: states [L].
+        wait, per_move: beta and tau.
+    """
+
+    parents: tuple[int, ...]
+    edges: tuple[Floats, ...]
+    children: tuple[Floats, ...]
+    above: tuple[Floats, ...]
+    discounts: tuple[Floats, ...]
+    start: tuple[int, ...]
+    goal: tuple[int, ...]
+    wait: float
+    per_move: float
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return tuple(len(table) for table in self.edges)
+
+    def coupling(self, lane: int) -> Floats:
+        """Cost of standing together [states of the parent, states of the lane]."""
+        return self.above[lane][:, None] + self.children[lane][None, :] + self.discounts[lane]
+
+    def moves(self, lane: int) -> Floats:
+        """Cost of a lane's moves, waiting at the goal among them [S, S]."""
+        costs, goal = self.edges[lane].copy(), self.goal[lane]
+        costs[goal, goal] = min(costs[goal, goal], self.wait)
+        return costs
+
+    def model(self) -> Model:
+        """The same as the search reads it."""
+        lanes, starts = len(self.sizes), np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64)
+        rows = [np.flatnonzero(np.isfinite(row)) for table in self.edges for row in table]
+        costs = [row[np.isfinite(row)] for table in self.edges for row in table]
+        unary, alone = np.zeros(starts[-1]), np.zeros(starts[-1])
+        pair_starts, pairs, discounts = [0], [], []
+        for lane, parent in enumerate(self.parents):
+            mine = slice(starts[lane], starts[lane + 1])
+            if parent >= 0:
+                unary[mine] += self.children[lane]
+                unary[starts[parent] : starts[parent + 1]] += self.above[lane]
+                alone[mine] = self.coupling(lane).min(axis=0)
+                pairs += [np.flatnonzero(row) for row in self.discounts[lane]]
+                discounts += [row[row != 0.0] for row in self.discounts[lane]]
+            pair_starts.append(len(pairs))
+        return Model(
+            starts,
+            np.array(self.parents, dtype=np.int64),
+            _pointer(rows),
+            np.concatenate([*rows, []]).astype(np.int32),
+            np.concatenate([*costs, []]).astype(np.float64),
+            unary,
+            alone,
+            np.array(pair_starts, dtype=np.int64),
+            _pointer(pairs),
+            np.concatenate([*pairs, []]).astype(np.int32),
+            np.concatenate([*discounts, []]).astype(np.float64),
+        )
+
+    def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.array(self.start, dtype=np.int64), np.array(self.goal, dtype=np.int64)
+
+    def rules(self, shortest: int, longest: int, node_budget: int = 100_000, sweeps: int = 60) -> Rules:
+        return Rules(self.wait, self.per_move, shortest, longest, node_budget, sweeps)
+
+    def cost(self, path: NDArray[np.int32]) -> float:
+        """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule."""
+        if tuple(path[0]) != self.start or tuple(path[-1]) != self.goal:
+            return np.inf
+        total = self.per_move * (len(path) - 1)
+        for before, after in pairwise(path):
+            for lane, parent in enumerate(self.parents):
+                total += self.moves(lane)[before[lane], after[lane]]
+                if parent >= 0:
+                    total += self.coupling(lane)[after[parent], after[lane]]
+        return float(total)
+
+    def optima(self, longest: int) -> Floats:
+        """Least cost of exactly T moves, for T = 0 .. longest, over all joint states [longest + 1]."""
+        joint = np.array(list(product(*map(range, self.sizes))))
+        stand = np.zeros(len(joint))
+        move = np.zeros((len(joint), len(joint)))
+        for lane, parent in enumerate(self.parents):
+            move += self.moves(lane)[joint[:, lane][:, None], joint[:, lane][None, :]]
+            if parent >= 0:
+                stand += self.coupling(lane)[joint[:, parent], joint[:, lane]]
+        at_goal = np.flatnonzero((joint == self.goal).all(axis=1))[0]
+        value = np.where((joint == self.start).all(axis=1), 0.0, np.inf)
+        optima = [value[at_goal]]
+        for _ in range(longest):
+            value = (value[:, None] + move).min(axis=0) + stand
+            optima.append(value[at_goal])
+        return np.array(optima) + self.per_move * np.arange(longest + 1)
+
+
+def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False) -> Toy:
+    """A random body of 1 to `most` lanes: any forest, sparse moves with dead ends, couplings with discounts.
+
+    Args:
+        seed: what it is drawn from.
+        most: lanes at most; at most 256 joint states come of it.
+        states: states a lane at most.
+        frustrated: couplings far stronger than moves, which leaves a gap between bound and optimum.
+        even: all costs multiples of a tenth, so that many paths cost the same but for rounding.
+    """
+    rng = np.random.default_rng(seed)
+    lanes = int(rng.integers(1, most + 1))
+    sizes = [int(rng.integers(1, states + 1)) for _ in range(lanes)]
+    while np.prod(sizes) > 256:
+        sizes[int(np.argmax(sizes))] -= 1
+    parents = tuple(int(rng.integers(-1, lane)) if lane else -1 for lane in range(lanes))
+
+    def draw(high: float, shape: tuple[int, ...] | int) -> Floats:
+        return rng.integers(0, 6, shape) * (high / 5.0) if even else rng.uniform(0.0, high, shape)
+
+    edges, children, above, discounts = [], [], [], []
+    for size, parent in zip(sizes, parents, strict=True):
+        table = draw(2.0, (size, size))
+        table[rng.random((size, size)) > (0.85 if frustrated else rng.uniform(0.4, 0.9))] = np.inf
+        edges.append(table)
+        size_above = sizes[parent] if parent >= 0 else 0
+        strength = 6.0 if frustrated else 2.0
+        children.append(draw(1.0, size))
+        above.append(draw(1.0, size_above))
+        discounts.append(-draw(strength, (size_above, size)) * (rng.random((size_above, size)) < rng.uniform(0.3, 0.7)))
+    return Toy(
+        parents,
+        tuple(edges),
+        tuple(children),
+        tuple(above),
+        tuple(discounts),
+        tuple(int(rng.integers(size)) for size in sizes),
+        tuple(int(rng.integers(size)) for size in sizes),
+        wait=float(draw(1.5, 1)[0]),
+        per_move=float(draw(1.0, 1)[0]),
+    )
+
+
+def _pointer(rows: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
