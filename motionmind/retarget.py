@@ -55,9 +55,10 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     """The movement on human23's joints, with the performer's proportions.
 
     Forward kinematics gives the file's joint positions again, exactly except where several joints of the file became
-    one: there a bent chain has become a straight bone (CMU's dancer: see `tests/test_retarget.py` for how much).
-    Joints that the file lacks (such as toes or fingers) go along with the joint they hang from, at human23's place
-    scaled by the length of the legs. Movement that is on human23 already is returned as it is.
+    one: there a bent chain has become a straight bone. (CMU, where three joints of the spine become two: neck and
+    arms are 21 mm off on average in 20 clips of a dancer, 65 mm at most; 8 mm and 32 mm in 9 clips of karate; the
+    legs are exact.) Joints that the file lacks, such as toes or fingers, go along with the joint they hang from, at
+    human23's place scaled by the length of the legs. Movement that is on human23 already is returned as it is.
 
     Args:
         movement: on the file's own skeleton.

@@ -178,8 +178,8 @@ _BANDAI = {"hips": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sid
 # Bandai's zero pose is no body that stands: in each joint's frame the bone lies along +x (right limbs: -x) and the
 # hinge of knee and elbow is y. Where human23's +x (to the left) and +y (up) lie follows from that for limbs, for the
 # trunk from where hips and shoulders are attached. The sense of the hinges is the movement's: knees turn about +y,
-# elbows about -y. With the soles flat on the floor (1,900 frames of stance in six clips, to 0.5 degrees) the bone
-# from ankle to toes points 39.6 degrees down, the toes' own x axis 23.0 degrees.
+# elbows about -y. With the soles flat on the floor (where the feet of walk, kick and slash rest most of the time) the
+# bone from ankle to toes points 39.6 degrees down, the toes' own x axis 23.0 degrees.
 _TRUNK, _LEG = _axes("+z", "+x"), {"left": ("+y", "-x"), "right": ("+y", "+x")}
 _ARM = {"left": _axes("+x", "+y"), "right": _axes("+x", "-y")}
 _BANDAI_FRAMES = (

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import random
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -24,3 +26,36 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"recorded movement is not here: no folder {SHARED_DATA}")
     return SHARED_DATA
+
+
+_BAD = ["nan", "1e999", "1e300", "-", "{", "}", "[", "9" * 30, "End", "\0", "é", ":", ";", ",", "#", '"', "_", "0"]
+_BAD += ["null", "\x85", "\x1c", "\u0661", "1\u20282"]
+
+
+def _mutate(text: str, rng: random.Random) -> bytes:
+    """`text` with some words or bytes deleted, doubled, swapped, replaced, or cut off."""
+    words = text.replace("\n", " \n ").split(" ")
+    for _ in range(rng.randint(1, 3)):
+        at, other = rng.randrange(len(words)), rng.randrange(len(words))
+        match rng.randrange(5):
+            case 0:
+                del words[at]
+            case 1:
+                words.insert(at, words[other])
+            case 2:
+                words[at], words[other] = words[other], words[at]
+            case 3:
+                words[at] = rng.choice(_BAD)
+            case 4:
+                words = words[: max(2, at)]
+    data = bytearray(" ".join(words).encode())
+    for _ in range(rng.randint(0, 2)):
+        at = rng.randrange(len(data) + 1)
+        data[at : at + rng.randint(0, 3)] = rng.randbytes(rng.randint(0, 2))
+    return bytes(data)
+
+
+@pytest.fixture(scope="session")
+def mutate() -> Callable[[str, random.Random], bytes]:
+    """A function that damages a text, a little, at random."""
+    return _mutate

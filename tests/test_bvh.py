@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import random
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +21,8 @@ from motionmind.formats.bvh import bvh_unit, read_bvh, write_bvh
 from motionmind.formats.units import UNITS, guess_unit
 from motionmind.motion import Motion
 from motionmind.skeleton import Skeleton, human23
+
+Mutate = Callable[[str, random.Random], bytes]
 
 SMALL = """HIERARCHY
 ROOT Hips
@@ -251,6 +254,7 @@ def test_a_small_file(tmp_path: Path) -> None:
         lambda text: "\n\n# made by hand\n" + text + "\n\n\n",
         lambda text: text.replace("30 1", "30\n1").replace("31 2", "31\n2").replace("32 3", "32\n3"),  # wrapped
         lambda text: text.rstrip("\n"),
+        lambda text: text.replace("1 91", "\x85\u0661 91"),  # what Python takes for a blank and for a digit
     ],
 )
 def test_the_same_movement_in_other_dress(tmp_path: Path, change) -> None:  # type: ignore[no-untyped-def]
@@ -540,6 +544,7 @@ def motions(draw: st.DrawFn) -> Motion:
     )
 
 
+@settings(max_examples=50)
 @given(motions())
 def test_any_motion_reads_back(tmp_path_factory: pytest.TempPathFactory, motion: Motion) -> None:
     path = tmp_path_factory.getbasetemp() / "property.bvh"
@@ -547,33 +552,9 @@ def test_any_motion_reads_back(tmp_path_factory: pytest.TempPathFactory, motion:
     assert_same(motion, read_bvh(path, unit="m"))
 
 
-def mutate(text: str, rng: random.Random) -> bytes:
-    """`text` with some words or bytes deleted, doubled, swapped, replaced, or cut off."""
-    words = text.replace("\n", " \n ").split(" ")
-    for _ in range(rng.randint(1, 3)):
-        at, other = rng.randrange(len(words)), rng.randrange(len(words))
-        match rng.randrange(5):
-            case 0:
-                del words[at]
-            case 1:
-                words.insert(at, words[other])
-            case 2:
-                words[at], words[other] = words[other], words[at]
-            case 3:
-                words[at] = rng.choice(
-                    ["nan", "1e999", "-", "{", "}", "9" * 30, "End", "\0", "é", ":", "#", "[", '"', "_", "0"]
-                )
-            case 4:
-                words = words[: max(2, at)]
-    data = bytearray(" ".join(words).encode())
-    for _ in range(rng.randint(0, 2)):
-        at = rng.randrange(len(data))
-        data[at : at + rng.randint(0, 3)] = rng.randbytes(rng.randint(0, 2))
-    return bytes(data)
-
-
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
-def test_only_our_errors_escape(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+def test_only_our_errors_escape(tmp_path_factory: pytest.TempPathFactory, mutate: Mutate, seed: int) -> None:
     path = tmp_path_factory.getbasetemp() / "mutated.bvh"
     rng = random.Random(seed)
     for _ in range(4):

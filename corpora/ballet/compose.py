@@ -100,7 +100,7 @@ def hip_height() -> float:
 
 
 def lift(
-    towards: float, height: float, knee: float = 0.0, out: float = TURNOUT, foot: float = 62.0, toes: float = 15.0
+    towards: float, height: float, knee: float = 0.0, out: float = TURNOUT, foot: float = 58.0, toes: float = 15.0
 ) -> Leg:
     """A leg in the air: the thigh `height` degrees from hanging, `towards` 0 front, 90 side, 180 back."""
     hip = rot.mul(turns("yxy", towards, -height, -towards), turns("y", out))
@@ -151,7 +151,7 @@ def rest(towards: float, foot: float, toes: float) -> Leg:
 
 def draw_up(across: float, up: float, ahead: float, towards: float) -> Leg:
     """A bent leg whose pointed foot is drawn up along the standing one: its tip, seen from the hip, in metres."""
-    foot, toes = turns("x", 62.0), turns("x", 12.0)
+    foot, toes = turns("x", 58.0), turns("x", 15.0)
     tip = rot.mul_vec(toes, BODY.tips[BODY.index("left_toes")])
     end = segment("ankle") + rot.mul_vec(foot, segment("toes") + tip)
     return Leg(*reach(np.array([across, up, ahead]), towards, end), foot, toes)
@@ -178,13 +178,15 @@ def head(turn: float, left: float = 0.0, up: float = 0.0) -> dict[str, Array]:
 PLACES = {
     "first": ((0.073, 0.035), (0.073, -0.010)),
     "second": ((0.270, 0.035), (0.270, -0.010)),
-    "fourth front": ((0.043, 0.225), (0.043, 0.179)),
-    "fourth back": ((0.043, -0.095), (0.043, -0.141)),
+    "fourth front": ((0.043, 0.225), (0.043, 0.192)),
+    "fourth back": ((0.043, -0.095), (0.043, -0.128)),
     "fifth front": ((0.013, 0.125), (0.013, 0.069)),
     "fifth back": ((0.013, 0.005), (0.013, -0.031)),
-    "on": ((-0.030, 0.040), (-0.075, -0.015)),
-    "on back": ((-0.030, 0.040), (-0.075, -0.015)),
-    "on side": ((-0.030, 0.040), (-0.075, -0.015)),
+    "bow": ((0.073, 0.215), (0.073, 0.170)),
+    "arched": ((0.073, -0.055), (0.073, -0.100)),
+    "on": ((-0.040, 0.040), (-0.115, -0.005)),
+    "on back": ((-0.040, 0.040), (-0.115, -0.005)),
+    "on side": ((-0.060, 0.040), (-0.115, -0.005)),
 }
 # How a standing leg stands: degrees of the knee, and of the lifted heel.
 LEVELS = {
@@ -198,7 +200,7 @@ LEVELS = {
     "releve": (0.0, 48.0),
 }
 STANDING = {
-    f"{place} {level}".strip(): stand(*np.array(flat) + (np.array(high) - flat) * min(heel / 48.0, 1.0), bend, heel)
+    f"{place} {level}".strip(): stand(*np.array(flat) + (np.array(high) - flat) * min(heel / 24.0, 1.0), bend, heel)
     for place, (flat, high) in PLACES.items()
     for level, (bend, heel) in LEVELS.items()
 }
@@ -206,9 +208,9 @@ LEGS = STANDING | {
     "slide front": rest(-8, 28, -20),
     "slide side": rest(82, 28, -20),
     "slide back": rest(188, 28, -20),
-    "tendu front": rest(-8, 62, 15),
-    "tendu side": rest(82, 62, 15),
-    "tendu back": rest(188, 62, 15),
+    "tendu front": rest(-8, 58, 15),
+    "tendu side": rest(82, 58, 15),
+    "tendu back": rest(188, 58, 15),
     "degage front": lift(-8, 46),
     "degage side": lift(82, 46),
     "degage back": lift(180, 34),
@@ -218,6 +220,9 @@ LEGS = STANDING | {
     "high side": lift(80, 90, out=74),
     "arabesque": lift(160, 44),
     "peel": peel(0.02, 0.11, 42),
+    "brush side": lift(82, 38, foot=20, toes=0),
+    "cou-de-pied front": draw_up(0.02, -0.83, 0.10, 62),
+    "cou-de-pied back": draw_up(0.02, -0.83, -0.10, 70),
     "coupe front": draw_up(0.02, -0.70, 0.10, 62),
     "coupe back": draw_up(0.02, -0.70, -0.10, 70),
     "passe": draw_up(-0.05, -0.455, 0.04, 70),
@@ -226,6 +231,7 @@ LEGS = STANDING | {
     "attitude back": lift(140, 42, knee=80),
     "unfold front": lift(4, 86, knee=40),
     "unfold side": lift(76, 90, knee=40, out=68),
+    "enveloppe side": lift(75, 66, knee=50),
     "unfold back": lift(152, 44, knee=38),
     "air first": lift(90, 2),
     "air second": lift(86, 27),
@@ -252,7 +258,7 @@ ARMS = {
 TORSOS = {
     "upright": torso((0, 0, 0), (0, 0, 0), (0, 0, 0)),
     "turned left": torso((0, 0, 0), (0, 0, 8), (0, 0, 16)),
-    "inclined left": torso((0, 0, 0), (0, 11, 0), (4, 17, 0)),
+    "inclined left": torso((0, 0, 0), (0, 9, 0), (3, 14, 0)),
     "forward half": torso((22, 0, 0), (12, 0, 0), (8, 0, 0)),
     "forward": torso((54, 0, 0), (24, 0, 0), (16, 0, 0)),
     "forward low": torso((86, 0, 0), (36, 0, 0), (24, 0, 0)),
@@ -353,6 +359,11 @@ def back(rows: list[Row]) -> list[Row]:
     return [rows[-1], *(replace(row, seconds=after.seconds) for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True))]
 
 
+def out_and_back(rows: list[Row]) -> list[Row]:
+    """The rows, and the way back."""
+    return join(rows, back(rows))
+
+
 def over(legs: list[Row], above: list[Row]) -> list[Row]:
     """The legs and times of one phrase under the arms, torso and head of another; a shorter one holds its end."""
     upper = [above[min(i, len(above) - 1)] for i in range(len(legs))]
@@ -362,10 +373,12 @@ def over(legs: list[Row], above: list[Row]) -> list[Row]:
 
 
 def join(*phrases: list[Row]) -> list[Row]:
-    """One phrase after the other; where one begins as the last one ended, without standing still."""
-    rows: list[Row] = []
+    """One phrase after the other, each beginning with the posture that the last one ended with."""
+    rows = phrases[0][:1]
     for part in phrases:
-        rows += part[1:] if rows and rows[-1].body == part[0].body else part
+        if part[0].body != rows[-1].body:
+            raise ValueError(f"a phrase begins with {part[0].body}, but the last one ended with {rows[-1].body}")
+        rows = rows + part[1:]
     return rows
 
 
@@ -507,6 +520,14 @@ def plies(place: str) -> list[Row]:
     return join(at(place, DEMI), at(place, GRAND), releve, back(releve))
 
 
+PREPARATION = phrase("""
+    0   | fifth right | bas    | upright | right
+    .4  |             | low    |         | incline left
+    .4  |             | first  |         | front
+    .4  |             | wide
+    .4  |             | second |         | left
+""")
+
 # Tendus, degages, battements: from fifth to the front, to the side closing behind, to the back.
 TENDU_FRONT = phrase("""
     0   | fifth right      | second        | upright | left
@@ -525,39 +546,27 @@ TENDU_BACK = phrase("""
     .3  | on / slide back  | wide / second |         | front
     .3  | on / tendu back  | reaching / side |       | left
 """)
-DEGAGE_FRONT = phrase("""
-    0    | fifth right       | second | upright | left
+KICK_FRONT = phrase("""
+    0    | fifth right          | second | upright | left
     .15  | on / slide front
     .15  | on / tendu front
-    .15  | on / degage front
-""")
-DEGAGE_SIDE = phrase("""
-    0    | fifth right       | second | upright | left
-    .15  | on / slide side
-    .15  | on / tendu side
-    .15  | on / degage side
-""")
-DEGAGE_BACK = phrase("""
-    0    | fifth left        | second | upright | left
-    .15  | on / slide back
-    .15  | on / tendu back
-    .15  | on / degage back  |        | derriere right
-""")
-KICK_FRONT = phrase("""
-    0    | on / tendu front     | second | upright | left
     .15  | on / degage front
     .15  | on / half front      | upper / second
     .15  | on / high front      | crown / second | devant
 """)
 KICK_SIDE = phrase("""
-    0    | on / tendu side      | second | upright | left
+    0    | fifth right          | second | upright | left
+    .15  | on / slide side
+    .15  | on / tendu side
     .15  | on / degage side     |        |         | front
     .15  | on side / half side  |        | listed right
     .15  | on side / high side  | upper
 """)
 KICK_BACK = phrase("""
-    0    | on / tendu back      | second | upright | left
-    .15  | on back / degage back | wide / second | derriere right | front
+    0    | fifth left           | second | upright | right
+    .15  | on / slide back
+    .15  | on / tendu back      |        |         | front
+    .15  | on back / degage back | wide / second | derriere right
     .20  | on back / arabesque  | reaching / second | arabesque right
 """)
 FIFTH_EN_HAUT = phrase("""
@@ -605,30 +614,36 @@ ONE_BY_ONE = phrase("""
     .5  |             | ajar
     .5  |             | bas
 """)
-BOW = phrase("""
-    0   | fifth right | fifth  | upright      | front
-    .6  |             | crown  | forward half
-    .6  |             |        | forward      | down
-    .6  |             | high   | forward low
-    .6  |             | first  | forward low  | front
-    .6  |             | low    | forward
-    .6  |             | first  | forward half | incline left
-    .6  |             | high   | upright
-    .6  |             | fifth  | lifted       | up
-    .6  |             | upper  | back
-    .6  |             | second | lifted       | lifted left
-    .6  |             |        | upright      | left
-    .6  |             | upper  | inclined left | front
-    .6  |             | upper / demi-second | inclined left | incline left
-    .6  |             | second / ajar | upright | front
-    .6  |             | demi-second / bas
-    .6  |             | ajar / bas
-    .6  |             | bas    |              | right
+TO_FIRST = phrase("""
+    0   | fifth right     | bas    | upright      | right
+    .4  | on / slide side | low    |              | front
+    .4  | on / tendu side | first
+    .4  | on / slide side | high   |              | up
+    .4  | first           | crown
+    .4  |                 | fifth  |              | front
 """)
-RISE = phrase("""
-    0   | fifth right | fifth / bas | upright | front
-    .3  | fifth right rise | | | up
-    .3  | fifth right releve
+BOW = phrase("""
+    0   | first  | fifth  | upright      | front
+    .6  | bow    | crown  | forward half
+    .6  |        | fifth  | forward
+    .6  |        |        | forward low  | down
+    .6  |        | crown  |              | front
+    .6  |        | high   | forward
+    .6  |        | first  | forward half | incline left
+    .6  | first  | high   | upright
+    .6  |        | crown  |              | front
+    .6  | arched | fifth  | lifted       | up
+    .6  |        | crown  | back
+    .6  |        | upper  |              | lifted left
+    .6  |        | second | lifted
+    .6  | first  |        | upright      | left
+    .6  |        | upper / demi-second | inclined right | front
+    .6  |        | crown / ajar |        | incline right
+    .6  |        | upper / bas  | upright | front
+    .6  |        | second / bas
+    .6  |        | demi-second / bas
+    .6  |        | ajar / bas
+    .6  |        | bas
 """)
 
 # Adagio: developpes and poses on one leg, the right one working.
@@ -680,41 +695,67 @@ ARABESQUE = phrase("""
     .4  |                     | bas
 """)
 
+OPEN_UP = phrase("""
+     |  | second |  | right
+     |  | wide   |  | front
+     |  | first
+""")
+
 # Balances in passe, from a plie.
 SPRING = phrase("""
     0   | fifth right         | bas   | upright | right
     .3  | fifth right half    | ajar
     .3  | fifth right plie    | demi-second |   | front
-    .2  | fifth right half    | wide / demi-second
-    .15 | on rise / peel      | first / wide
+    .2  | fifth right push    | wide / demi-second
+    .15 | on rise / cou-de-pied front | first / wide
     .15 | on releve / coupe front | first
     .3  | on releve / passe   | high
     .3  |                     | crown |         | up
     .6  |                     | fifth
 """)
+DOWN_BEHIND = phrase("""
+    0   | on releve / passe   | fifth | upright | up
+    .2  | on releve / coupe back | crown |      | front
+    .2  | on rise / cou-de-pied back | crown / upper
+    .2  | fifth left push     | upper / second
+    .2  | fifth left plie     | second / demi-second | | left
+    .3  | fifth left half     | demi-second / ajar
+    .3  | fifth left          | ajar / bas
+    .3  |                     | bas
+""")
 
 # Allegro.
-HOP = """
-    0          | PLACE        | bas         | upright | front
-    .2         | PLACE half   | ajar
-    .2         | PLACE plie   | demi-second
-    .15        | PLACE push   | ajar
-    .15 up .18 | air PLACE    | demi-second
-    .15        | PLACE push   | ajar
-    .15        | PLACE plie
-    .2         | PLACE half   | low
-    .2         | PLACE        | bas
-"""
-ECHAPPE = phrase("""
-    0          | fifth right      | bas         | upright | front
-    .2         | fifth right plie | low
-    .15        | fifth right push | first       |         | left
-    .15 up .15 | air second       | wide
+SINK = phrase("""
+    0          | fifth right      | bas         | upright | right
+    .2         | fifth right half
+    .2         | fifth right plie
+""")
+SAUTE = phrase("""
+    0          | first            | bas         | upright | front
+    .2         | first half       | ajar
+    .2         | first plie       | demi-second
+    .15        | first push       | ajar
+    .15 up .18 | air first        | demi-second
+    .15        | first push       | ajar
+    .15        | first plie       |             |         | left
+    .15        | first push       | low
+    .15 up .20 | air second       | wide        |         | front
     .15        | second push      | second
-    .15        | second plie
+    .15        | second plie      |             |         | right
     .15        | second push      | wide
-    .15 up .15 | air second       | demi-second |         | front
-    .15        | fifth left push  | ajar
+    .15 up .20 | air second       | demi-second |         | front
+    .15        | fifth right push | ajar
+    .15        | fifth right plie | bas         |         | right
+""")
+ECHAPPE = phrase("""
+    0          | fifth right plie | bas         | upright | right
+    .15        | fifth right push | low         |         | front
+    .15 up .15 | air second       | first
+    .15        | second push      | wide
+    .15        | second plie      | second      |         | left
+    .15        | second push      | demi-second
+    .15 up .15 | air first        | ajar        |         | front
+    .15        | fifth left push
     .15        | fifth left plie  | bas         |         | left
 """)
 CHANGEMENT = phrase("""
@@ -727,51 +768,60 @@ CHANGEMENT = phrase("""
     .15 up .16 face 0  | air first        | first |        | front
     .15                | fifth left push  | low
     .15                | fifth left plie  | bas  |         | left
+    .15                | fifth left push  | ajar |         | front
+    .15 up .16         | air fifth left   | low
+    .15                | fifth right push | ajar
+    .15                | fifth right plie | bas  |         | right
 """)
 GLISSADE = phrase("""
-    0                  | fifth left plie  | bas  | upright | left
-    .2                 | on plie / degage side | ajar |    | front
-    .15 up .05 left -.35 | air second     | demi-second
-    .15 left -.25      | degage side / on plie | | inclined right | right
-    .2                 | fifth left plie  | ajar | upright | front
-    .2                 | fifth left half  | bas  |         | left
-    .2                 | fifth left
+    0                   | fifth left plie  | bas  | upright | left
+    .15                 | on plie / brush side | ajar |     | front
+    .15                 | on plie / degage side | demi-second
+    .12                 | on push / degage side
+    .12 up .05 left -.3 | air second       |      | turned left | right
+    .12 left -.25       | degage side / on push
+    .15                 | brush side / on plie | ajar | upright | front
+    .2                  | fifth left plie  | bas  |         | left
 """)
 ASSEMBLE = phrase("""
-    0                  | fifth left       | bas  | upright | left
-    .2                 | fifth left plie  | low  |         | front
-    .15                | on plie / degage side | first / wide
-    .15                | on push / degage side | high / second | turned left | right
-    .15 up .20 left -.10 | air first / air second | fifth / second
-    .15                | fifth right push | crown / demi-second | upright | front
-    .15                | fifth right plie | upper / ajar |  | right
-    .2                 | fifth right half | second / ajar
-    .2                 | fifth right      | demi-second / bas
-    .3                 |                  | ajar / bas
-    .3                 |                  | bas
+    0                   | fifth left plie  | bas  | upright | left
+    .15                 | on plie / brush side | low / ajar | | front
+    .15                 | on plie / degage side | first / demi-second
+    .12                 | on push / degage side | high / second | turned left | right
+    .15 up .20 left -.1 | air first / air second
+    .12 up .10          | air fifth right  | crown / second | | front
+    .15                 | fifth right push | upper / demi-second | upright
+    .15                 | fifth right plie | second / ajar | | right
+    .2                  | fifth right half | demi-second / ajar
+    .2                  | fifth right      | ajar / bas
+    .3                  |                  | bas
 """)
 JETE = phrase("""
-    0                  | fifth left plie  | bas  | upright | left
-    .15                | on plie / degage side | ajar | | right
-    .15                | on push / degage side | low / demi-second
-    .12 up .12 left -.20 | air first / air second | first / second | turned right | front
-    .15                | coupe back / on push | | | right
-    .15                | coupe back / on plie
-    .15                | coupe back / on push | first / wide | upright | front
-    .12 up .10         | coupe back / air first | low / wide
-    .15                | coupe back / on push | low / ajar
-    .2                 | coupe back / on plie | bas / ajar | | left
-    .2                 | degage side / on plie | ajar | | right
-    .2                 | fifth left plie  | bas  |         | left
+    0                   | fifth left plie  | bas  | upright | left
+    .15                 | on plie / brush side | ajar |     | right
+    .12                 | on push / degage side | low / demi-second
+    .12 up .12 left -.2 | cou-de-pied back / air second | first / wide | turned right | front
+    .12                 | coupe back / on push | first / second |  | right
+    .15                 | coupe back / on plie
+    .15                 | coupe back / on push | first / wide | upright | front
+    .12 up .10          | coupe back / air first | low / wide
+    .15                 | coupe back / on push | low / demi-second
+    .15                 | coupe back / on plie | low / ajar | | left
+    .15                 | enveloppe side / on plie | ajar | | right
+    .15                 | brush side / on plie
+    .2                  | fifth left plie  | bas  |         | left
 """)
 PAS_DE_BOURREE = phrase("""
     0    | fifth right plie      | bas         | upright | right
-    .2   | on plie / degage side | demi-second |         | front
-    .2   | fifth left push       | ajar
-    .15  | fifth left releve     | low         |         | left
+    .15  | on plie / brush side  | ajar        |         | front
+    .15  | on plie / degage side | demi-second
+    .15  | on push / brush side
+    .15  | fifth left releve     | ajar        |         | left
+    .15  | brush side / on releve | low
     .15  | second releve         | ajar
-    .15  | fifth right push      | low
-    .2   | fifth right plie      | bas         |         | right
+    .15  | on releve / brush side | low        |         | right
+    .15  | fifth right push
+    .2   | fifth right plie      | bas
     .2   | fifth right half
     .2   | fifth right
 """)
@@ -782,7 +832,8 @@ STEP = phrase("""
     .4   | on / slide front       | low            |         | front
     .4   | on / tendu front       | first
     .4   | fourth right           | reaching       |         | up
-    .4   | tendu back / on        | wide / front   |         | front
+    .4   | slide back / on        | wide / front   |         | front
+    .4   | tendu back / on
     .4   | degage back / on back  | side / front   | derriere left
     .5   | arabesque / on back    |                | arabesque left
     1    |
@@ -793,21 +844,19 @@ STEP = phrase("""
     .4   |                        | ajar           |         | right
     .4   |                        | bas
 """)
-TURN = phrase("""
-    0            | fifth right        | bas   | upright | right
-    .3           | fifth right plie   | demi-second |   | front
-    .2           | fifth right push   | low
-    .2  face -45 | fifth right releve | first |         | left
-    .3           |                    | high
-    .3           |                    | first |         | front
-    .3           | fifth right rise   | low
-    .3           | fifth right        | bas   |         | right
-""")
-
-CROSS = join(TENDU_FRONT, back(TENDU_FRONT), TENDU_SIDE, TENDU_BACK, back(TENDU_BACK))
-QUICK_CROSS = [
-    *(DEGAGE_FRONT, back(DEGAGE_FRONT), DEGAGE_SIDE, back(DEGAGE_SIDE), TENDU_SIDE, DEGAGE_BACK, back(DEGAGE_BACK))
-]
+CHANGE_OVER = over(TENDU_SIDE, phrase("""
+    | | bas   | | right
+    | | low   | | front
+    | | first
+    | | low   | | incline right
+    | | bas   | | left
+"""))
+TENDUS = join(TENDU_FRONT, back(TENDU_FRONT), TENDU_SIDE, TENDU_BACK, back(TENDU_BACK))
+DEGAGES = join(*(out_and_back(kick[:4]) for kick in (KICK_FRONT, KICK_SIDE)), TENDU_SIDE, out_and_back(KICK_BACK[:4]))
+KICKS = join(out_and_back(KICK_FRONT), out_and_back(KICK_SIDE), TENDU_SIDE, out_and_back(KICK_BACK))
+ADAGIO = join(UP, DEVANT, over(UP, OPEN_UP), A_LA_SECONDE, ARABESQUE)
+BALANCES = join(SPRING, back(SPRING), SPRING, DOWN_BEHIND)
+ALLEGRO = join(other_side(SINK), GLISSADE, JETE, GLISSADE, ASSEMBLE, SINK, PAS_DE_BOURREE)
 
 CLIPS = {
     "jump": ("The jump in seven positions: fifth, plie, push, air, landing, plie, fifth", JUMP),
@@ -815,18 +864,13 @@ CLIPS = {
         "Demi-plies, grand plies and releves in first, second, fourth and fifth",
         join(OPENING, plies("first"), TO_SECOND, TO_FOURTH, plies("fourth right"), TO_FIFTH, plies("fifth right"), CLOSING),
     ),
-    "tendus": ("Tendus to the front, the side and the back, both sides", join(CROSS, other_side(CROSS))),
-    "port-de-bras": (
-        "Arms together and one by one, a bow forward and a bend back",
-        join(CIRCLE, ONE_BY_ONE, CIRCLE[:6], BOW),
-    ),
-    "adagio": (
-        "Developpes to the front and the side, arabesque and attitude",
-        join(UP, DEVANT, UP, A_LA_SECONDE, ARABESQUE),
-    ),
-    "arabesques": ("Steps into the first arabesque, one on each side", join(STEP, other_side(STEP))),
-    "balances": ("Passe on demi-pointe", join(SPRING)),
-    "sautes": ("Sautes, echappes, changements", join(at("first", HOP))),
-    "glissades": ("Glissade, assemble", join(GLISSADE, ASSEMBLE, PAS_DE_BOURREE)),
-    "jetes": ("", JETE),
+    "tendus": ("Tendus to the front, the side and the back, one side and the other", join(PREPARATION, TENDUS, other_side(TENDUS), CLOSING)),
+    "degages": ("Degages, quick and low", join(PREPARATION, DEGAGES, other_side(DEGAGES), FIFTH_EN_HAUT)),
+    "battements": ("Grand battements to the front, the side and the back", join(PREPARATION, KICKS, other_side(KICKS), CLOSING)),
+    "port-de-bras": ("Arms together and one by one, a bow forward and a bend back", join(CIRCLE, ONE_BY_ONE, TO_FIRST, BOW)),
+    "adagio": ("Developpes to the front and the side, arabesque and attitude", join(ADAGIO, other_side(ADAGIO))),
+    "arabesques": ("Steps into the first arabesque, one on each side", join(STEP, CHANGE_OVER, other_side(STEP))),
+    "balances": ("Passe on demi-pointe, from a plie", join(BALANCES, other_side(BALANCES))),
+    "sautes": ("Sautes in first and second, echappes, changements", join(SAUTE, ECHAPPE, CHANGEMENT, other_side(CHANGEMENT), other_side(back(SINK)))),
+    "glissades": ("Glissade, assemble, jete, pas de bourree", join(ALLEGRO, other_side(ALLEGRO))),
 }

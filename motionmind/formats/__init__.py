@@ -70,12 +70,23 @@ def read_motion(
     return motion_from_json(data, path)
 
 
-def read_posture(path: FilePath, *, frame: int | None = None, unit: str | float | None = None) -> Posture:
-    """One posture from a file of any format that is known.
+def read_posture(
+    path: FilePath,
+    *,
+    frame: int | None = None,
+    unit: str | float | None = None,
+    asf: FilePath | None = None,
+    skeleton: Skeleton | None = None,
+) -> Posture:
+    """One posture from a file of any format that is known; arguments as for `read_motion`.
 
-    A file with several frames needs `frame`, from 0, or from the end if negative; FormatError says so.
+    A file with several frames needs `frame`, counted from 0, or from the end if negative.
+
+    Raises:
+        FormatError: as `read_motion`; or there are several frames and none is chosen.
+        MotionMindError: there is no such frame.
     """
-    motion = read_motion(path, unit=unit)
+    motion = read_motion(path, unit=unit, asf=asf, skeleton=skeleton)
     if frame is None and len(motion) > 1:
         raise FormatError(f"{len(motion)} frames, where one posture was expected; say which frame", path=path)
     return motion.posture(frame or 0)

@@ -122,8 +122,10 @@ def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FileP
     names = {"root"}
     for number, (keyword, *words) in section:
         match keyword.lower():
-            case "begin":
+            case "begin" if bone is None:
                 bone = Bone("", number)
+            case "begin":
+                break
             case "end":
                 if bone is None or not bone.name or bone.name in names:
                     fault = "a bone without a name" if bone is None or not bone.name else f"a second bone {bone.name!r}"
@@ -204,5 +206,5 @@ def _read_hierarchy(
         waiting += reversed(children[order[-1]])
     loose = [name for name in bones if name not in order]
     if loose:
-        raise FormatError(f"{listed(loose)} hang from nothing", path=path, line=bones[loose[0]].line)
+        raise FormatError(f"the hierarchy does not reach {listed(loose)}", path=path, line=bones[loose[0]].line)
     return order, parents

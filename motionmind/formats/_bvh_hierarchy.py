@@ -119,6 +119,11 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[Joint]:
     if open_blocks or not joints:
         missing = f"{len(open_blocks)} '}}' missing" if open_blocks else "no ROOT"
         raise FormatError(f"the hierarchy is not whole: {missing}", path=path, line=len(lines))
+    names: set[str] = set()
+    for joint in joints:
+        if joint.name in names:
+            raise FormatError(f"a second joint named {shown(joint.name)}", path=path, line=joint.line)
+        names.add(joint.name)
     return joints
 
 
@@ -131,9 +136,8 @@ def _open_joint(kind: str, words: _Words, joints: list[Joint], open_blocks: list
         raise words.error(f"a {kind} may not stand here")
     line = words.line
     name = words.take_name(kind)
-    if not name or any(joint.name == name for joint in joints):
-        fault = f"a second joint named {shown(name)}" if name else f"a {kind} without a name"
-        raise FormatError(fault, path=words.path, line=line)
+    if not name:
+        raise FormatError(f"a {kind} without a name", path=words.path, line=line)
     joints.append(Joint(name, parent, line))
     if len(joints) > MOST_JOINTS:
         raise words.error(f"more than {MOST_JOINTS} joints are no body")

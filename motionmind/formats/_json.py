@@ -86,10 +86,12 @@ def decode(data: bytes, schema: type[T], path: FilePath) -> T:
 
 def _malformed(message: str, data: bytes, path: FilePath) -> FormatError:
     """What is wrong with text that is no JSON, with its line."""
-    if "truncated" in message:
-        line = data.rstrip().count(b"\n") + 1
-        return FormatError("the JSON is cut short: the file ends before it does", path=path, line=line)
     found = re.search(r"\(byte (\d+)\)", message)
+    end = len(data.rstrip())
+    # A number that is cut is not "truncated" to msgspec, but wrong at its last byte.
+    if "truncated" in message or (found and int(found[1]) >= end):
+        line = data.count(b"\n", 0, end) + 1
+        return FormatError("the JSON is cut short: the file ends before it does", path=path, line=line)
     if found is None:
         return FormatError(f"this is no JSON: {message}", path=path)
     at = int(found[1])

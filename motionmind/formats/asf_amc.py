@@ -122,9 +122,9 @@ def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Ar
             values.append([0.0] * column)
             missing = set(places)
         else:
-            place = _place_of(words, places, missing, acclaim=acclaim, path=path, line=number)
             if not numbers:
                 raise FormatError("values before the number of their frame", path=path, line=number)
+            place = _place_of(words, places, missing, acclaim=acclaim, path=path, line=number)
             values[-1][place] = to_numbers(words[1:], path, number)
             missing.remove(words[0])
     if not numbers:

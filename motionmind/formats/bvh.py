@@ -151,11 +151,12 @@ def _read_frames(lines: list[str], first: int, channels: int, declared: int, pat
 def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Array:
     """Frames read word by word: to name the first fault, or to find that line ends mean nothing in this file."""
     values = [to_numbers(line.split(), path, number) for number, line in rows]
-    flat = [value for row in values for value in row]
-    if len(flat) == declared * channels:
-        return np.array(flat).reshape(declared, channels)
-    number, row = next((n, row) for (n, _), row in zip(rows, values, strict=True) if len(row) != channels)
-    raise FormatError(f"the line holds {len(row)} numbers, a frame of this file has {channels}", path=path, line=number)
+    flat = np.array([value for row in values for value in row])
+    odd = next((i for i, row in enumerate(values) if len(row) != channels), None)
+    if odd is None or len(flat) == declared * channels:
+        return flat.reshape(-1, channels)
+    fault = f"the line holds {len(values[odd])} numbers, a frame of this file has {channels}"
+    raise FormatError(fault, path=path, line=rows[odd][0])
 
 
 def _assemble(joints: list[Joint], values: Array, name: str) -> Placed:
@@ -166,14 +167,10 @@ def _assemble(joints: list[Joint], values: Array, name: str) -> Placed:
     groups: dict[str, list[tuple[int, list[int]]]] = {}  # joints that turn in the same order, all at once
     column = 0
     for index, joint in enumerate(joints):
-        columns = range(column, column + len(joint.channels))
+        columns = list(enumerate(joint.channels, start=column))
         column += len(joint.channels)
-        turns = [(name[0], at) for name, at in zip(joint.channels, columns, strict=True) if name[1:] == "ROTATION"]
-        moves = [
-            ("XYZ".index(name[0]), at)
-            for name, at in zip(joint.channels, columns, strict=True)
-            if name[1:] == "POSITION"
-        ]
+        turns = [(channel[0], at) for at, channel in columns if channel.endswith("ROTATION")]
+        moves = [("XYZ".index(channel[0]), at) for at, channel in columns if channel.endswith("POSITION")]
         if turns:
             order = "".join(letter for letter, _ in turns)
             groups.setdefault(order, []).append((index, [at for _, at in turns]))
@@ -198,8 +195,8 @@ def _assemble(joints: list[Joint], values: Array, name: str) -> Placed:
 # --- out -----------------------------------------------------------------------------------------------------------
 
 
-# The order in which most files turn (MotionBuilder's, Bandai-Namco's), so that most readers have met it. Its middle
-# turn is about x, where 90 degrees are rarer than about y or z in arms that hang from a T-pose.
+# The order in which most files turn (MotionBuilder's, Bandai-Namco's), so that most readers have met it. Euler angles
+# lock where the middle turn is 90 degrees: about x, that is rarer in arms that a T-pose stretches along x.
 _ORDER = "ZXY"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from contextlib import suppress
 from pathlib import Path
@@ -42,7 +41,7 @@ def write_atomically(path: FilePath, data: bytes) -> None:
 
 
 def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
-    temporary = target.with_name(f".motionmind-{secrets.token_hex(8)}.tmp")
+    temporary = target.with_name(f".motionmind-{os.urandom(8).hex()}.tmp")
     try:
         # Opened here, not by tempfile, whose files are private to their owner whatever the umask says.
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)

@@ -42,6 +42,7 @@ _NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)
 
 # Numbers printed with five digits, as the papers do, are off unit length by about 1e-5; only more is worth a word.
 _PRINTED = 1e-3
+_WRITTEN = 1e-9
 
 # One joint as it stands in the file: its name, the four words that should be numbers, and their line.
 _Entry = tuple[str, list[str], int]
@@ -220,4 +221,5 @@ def _unit(rotations: Array, lines: NDArray[np.intp], skeleton: Skeleton, path: F
         where = f"{path}:{lines[frame, joint]}: the rotation of {skeleton.names[joint]}"
         message = f"{where} has length {length[frame, joint]:.6g}, not 1{more}; made 1"
         warnings.warn(message, MotionMindWarning, stacklevel=4)
-    return np.asarray(rotations / length[..., None], dtype=np.float64)
+    # What this module wrote stays as it is.
+    return np.where(np.abs(length - 1.0)[..., None] > _WRITTEN, rotations / length[..., None], rotations)

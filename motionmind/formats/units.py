@@ -25,9 +25,9 @@ UNITS: dict[str, float] = {
 
 PERSON_HEIGHT = 1.70
 
-# Height of a standing body as a share of its longest way from one end to another along the bones, fingertip to
-# toe: 1.70 m to 2.49 m in human23. Between 0.62 and 0.78 in bodies with more or fewer bones in hands and feet,
-# nearer to each other than any two units are.
+# Height of a body as a share of its longest way from one end to another along the bones, most often fingertip to
+# toe: 1.70 m to 2.49 m in human23; 0.62 to 0.71 in recordings whose rest pose stands. That is nearer to each other
+# than any two units are.
 HEIGHT_PER_SPAN = 0.68
 
 

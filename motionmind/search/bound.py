@@ -18,6 +18,14 @@ gamma_b * theta_b - M(a -> b) + theta_ab, one for each of its n <= 1 / gamma_b e
 gamma_b * theta_b over them is at most theta_b, which is b's own cost plus the messages into b (those from before
 cancel with the M(a -> b) that are taken off) less b's constant. So they add up to at most b's own cost, its edges in,
 the messages that came back to b, less its constants; and so on to the last. Whatever the forward messages were.
+
+In other words the energy is shared out among chains that run along the order, whose least costs add up to the bound;
+theta is the sum, over the chains through a variable, of what each costs more than its least with a given value there.
+So when the backward sweep comes to a variable, theta plus the bound as it then stands bounds all paths *through* each
+position. (It then stands at: the constants of the forward sweep before the variable; the minima of theta from it on; the
+constants of the messages sent back so far, but for those to variables before it, which the forward sweep's hold the
+place of.) Where that is no less than the cost of a path already known, the position can be taken out of its domain,
+which makes the next bounds tighter: reduced-cost fixing, as in linear programming.
 """
 
 from __future__ import annotations
@@ -25,9 +33,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionmind.search.jit import jit
-from motionmind.search.problem import Floats, Grid, Ints
+from motionmind.search.problem import Floats, Grid, Indices, Ints
 
 
 class Messages(NamedTuple):
@@ -38,9 +47,11 @@ class Messages(NamedTuple):
         up_row: to each position from its lane's variable one move after [P].
         down_col: to each position from its parent variable [P].
         up_col: to each position of its parent variable from a variable, by coupling row [U].
-        constants: taken out at each variable [n].
+        constants: taken out at each variable by the backward sweep [n].
+        before: taken out at each variable by the forward sweep [n].
         ahead: a position's own cost plus all messages to it from later variables, less its variable's constant [P]:
             what assigning it adds to f, but for its edges in and what they had promised.
+        through: a lower bound on the cost of every path through a position [P].
     """
 
     down_row: Floats
@@ -48,7 +59,9 @@ class Messages(NamedTuple):
     down_col: Floats
     up_col: Floats
     constants: Floats
+    before: Floats
     ahead: Floats
+    through: Floats
 
 
 @jit
@@ -61,6 +74,8 @@ def no_messages(grid: Grid) -> Messages:
         np.zeros(count),
         np.zeros(grid.up_ptr[-1]),
         np.zeros(len(grid.dom_ptr) - 1),
+        np.zeros(len(grid.dom_ptr) - 1),
+        np.zeros(count),
         np.zeros(count),
     )
 
@@ -82,8 +97,7 @@ def _ahead(grid: Grid, m: Messages, i: int) -> None:
 
 @jit
 def _theta(grid: Grid, m: Messages, i: int) -> Floats:
-    """gamma times the variable's own cost plus all messages to it, their minimum (its constant) taken out."""
-    lanes, lane = grid.lanes, i % grid.lanes
+    """The variable's own cost plus all messages to it, their minimum (its constant) taken out."""
     first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
     _ahead(grid, m, i)
     theta = np.empty(last - first)
@@ -91,16 +105,20 @@ def _theta(grid: Grid, m: Messages, i: int) -> Floats:
         theta[p - first] = m.ahead[p] + m.down_row[p] + m.down_col[p]
     least = np.min(theta)
     m.constants[i] = least
+    return np.asarray(theta - least)
+
+
+@jit
+def _gamma(grid: Grid, i: int) -> float:
+    """1 / max(edges in, edges out) of a variable."""
+    lanes, lane = grid.lanes, i % grid.lanes
     edges_in = 0 if i < lanes else 1 if grid.parents[lane] < 0 else 2
     edges_out = 1 if i < lanes * grid.moves else 0
     if i >= lanes:
         for child in range(lane + 1, lanes):
             if grid.parents[child] == lane:
                 edges_out += 1
-    gamma = 1.0 / max(edges_in, edges_out, 1)
-    for k in range(last - first):
-        theta[k] = gamma * (theta[k] - least)
-    return theta
+    return 1.0 / max(edges_in, edges_out, 1)
 
 
 @jit
@@ -110,7 +128,8 @@ def forward(grid: Grid, m: Messages) -> None:
     for i in range(len(grid.dom_ptr) - 1):
         lane = i % lanes
         first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
-        theta = _theta(grid, m, i)
+        theta = _gamma(grid, i) * _theta(grid, m, i)
+        m.before[i] = m.constants[i]
         if i < lanes * grid.moves:
             begin, end = grid.dom_ptr[i + lanes], grid.dom_ptr[i + lanes + 1]
             for x in range(begin, end):
@@ -120,7 +139,7 @@ def forward(grid: Grid, m: Messages) -> None:
                 for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
                     x = grid.row_to[e]
                     m.down_row[x] = min(m.down_row[x], value + grid.row_cost[e])
-            _settle(m.down_row, begin, end)
+            m.before[i] += _settle(m.down_row, begin, end)
         if i >= lanes:
             for child in range(lane + 1, lanes):
                 if grid.parents[child] == lane:
@@ -136,18 +155,24 @@ def forward(grid: Grid, m: Messages) -> None:
                         for q in range(grid.col_ptr[base + k], grid.col_ptr[base + k + 1]):
                             x = grid.col_to[q]
                             m.down_col[x] = min(m.down_col[x], value + grid.col_cost[q])
-                    _settle(m.down_col, begin, end)
+                    m.before[i] += _settle(m.down_col, begin, end)
 
 
 @jit
 def backward(grid: Grid, m: Messages) -> float:
     """One sweep from the last variable to the first; the lower bound that it proves."""
     lanes = grid.lanes
-    bound = 0.0
+    bound, earlier, later = 0.0, np.sum(m.before), 0.0
+    sent = np.zeros(len(grid.dom_ptr) - 1)  # constants of the messages that have been sent to each variable
     for i in range(len(grid.dom_ptr) - 2, -1, -1):
         lane = i % lanes
         first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
         theta = _theta(grid, m, i)
+        earlier -= m.before[i]
+        later += m.constants[i] + sent[i]
+        for p in range(first, last):
+            m.through[p] = earlier + theta[p - first] + later
+        theta *= _gamma(grid, i)
         if i >= lanes:
             before = i - lanes
             for p in range(grid.dom_ptr[before], grid.dom_ptr[before + 1]):
@@ -156,7 +181,9 @@ def backward(grid: Grid, m: Messages) -> float:
                     x = grid.row_to[e]
                     least = min(least, grid.row_cost[e] + theta[x - first] - m.down_row[x])
                 m.up_row[p] = least
-            m.constants[i] += _settle(m.up_row, grid.dom_ptr[before], grid.dom_ptr[before + 1])
+            settled = _settle(m.up_row, grid.dom_ptr[before], grid.dom_ptr[before + 1])
+            m.constants[i] += settled
+            sent[before] += settled
             if grid.parents[lane] >= 0:
                 least = np.inf
                 for x in range(first, last):
@@ -167,7 +194,9 @@ def backward(grid: Grid, m: Messages) -> float:
                         x = grid.col_to[q]
                         value = min(value, grid.col_cost[q] + theta[x - first] - m.down_col[x])
                     m.up_col[u] = value
-                m.constants[i] += _settle(m.up_col, grid.up_ptr[i], grid.up_ptr[i + 1])
+                settled = _settle(m.up_col, grid.up_ptr[i], grid.up_ptr[i + 1])
+                m.constants[i] += settled
+                sent[i - lane + grid.parents[lane]] += settled
         for p in range(first, last):
             m.ahead[p] -= m.constants[i]
         bound += m.constants[i]
@@ -238,15 +267,14 @@ def descend(grid: Grid, m: Messages, path: Ints, start: int) -> float:
 def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> tuple[float, float]:
     """Run up to `sweeps` pairs of sweeps; the bound, and the cost of the best path met on the way.
 
-    The path is written to `path` [n] (positions). Stops when the bound reaches that cost or `enough`, or when eight
-    pairs have raised it by less than a thousandth of what separates it from the lower of the two.
+    The path is written to `path` [n] (positions). Stops when the bound reaches that cost or `enough`.
     """
     lanes = grid.lanes
     trial = np.zeros(len(path), np.int64)
     for lane in range(lanes):
         path[lane] = trial[lane] = grid.dom_ptr[lane]
-    bound, cost, earlier = -np.inf, np.inf, -np.inf
-    for sweep in range(sweeps):
+    bound, cost = -np.inf, np.inf
+    for _ in range(sweeps):
         forward(grid, m)
         bound = backward(grid, m)
         found = bound + descend(grid, m, trial, lanes)
@@ -255,8 +283,68 @@ def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> 
             path[:] = trial
         if bound >= min(cost, enough) - 1e-9:
             break
-        if sweep % 8 == 7:
-            if bound - earlier < 1e-3 * (min(cost, enough) - bound):
-                break
-            earlier = bound
     return bound, cost
+
+
+@jit
+def narrow(grid: Grid, m: Messages, below: float) -> tuple[Grid, Messages]:
+    """The grid without the positions that no path cheaper than `below` goes through, and the messages of the rest.
+
+    A domain is left empty where there is no such path at all.
+    """
+    lanes, variables = grid.lanes, len(grid.dom_ptr) - 1
+    kept = m.through < below
+    for i in range(variables - lanes - 1, -1, -1):  # what leads nowhere
+        for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
+            leads = False
+            for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
+                leads = leads or kept[grid.row_to[e]]
+            kept[p] = kept[p] and leads
+    led_to = np.zeros(len(kept), np.bool_)
+    led_to[: grid.dom_ptr[lanes]] = True
+    for p in range(len(kept)):  # what nothing leads to
+        kept[p] = kept[p] and led_to[p]
+        if kept[p]:
+            led_to[grid.row_to[grid.row_ptr[p] : grid.row_ptr[p + 1]]] = True
+
+    number = np.cumsum(kept).astype(np.int32) - 1  # of each kept position among them
+    held = np.flatnonzero(kept)
+    dom_ptr = np.zeros(variables + 1, np.int64)
+    up_ptr = np.zeros(variables + 1, np.int64)
+    coupled = np.zeros(grid.up_ptr[-1], np.bool_)
+    for i in range(variables):
+        dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[grid.dom_ptr[i] : grid.dom_ptr[i + 1]])
+        up_ptr[i + 1] = up_ptr[i]
+        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
+            above = i - i % lanes + grid.parents[i % lanes]
+            coupled[grid.up_ptr[i] : grid.up_ptr[i + 1]] = kept[grid.dom_ptr[above] : grid.dom_ptr[above + 1]]
+            up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
+    rows = np.flatnonzero(coupled)
+    row_ptr, row_to, row_cost = _subset(held, grid.row_ptr, grid.row_to, grid.row_cost, kept, number)
+    col_ptr, col_to, col_cost = _subset(rows, grid.col_ptr, grid.col_to, grid.col_cost, kept, number)
+    smaller = Grid(
+        lanes, grid.moves, grid.parents, dom_ptr, grid.dom[held], grid.unary[held],
+        row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,
+    )  # fmt: skip
+    return smaller, Messages(
+        m.down_row[held], m.up_row[held], m.down_col[held], m.up_col[rows],
+        m.constants, m.before, m.ahead[held], m.through[held],
+    )  # fmt: skip
+
+
+@jit
+def _subset(
+    rows: Ints, ptr: Ints, to: Indices, cost: Floats, kept: NDArray[np.bool_], number: Indices
+) -> tuple[Ints, Indices, Floats]:
+    """The listed entries of some rows whose ends are kept, renumbered."""
+    out_ptr = np.zeros(len(rows) + 1, np.int64)
+    for k in range(len(rows)):
+        out_ptr[k + 1] = out_ptr[k] + np.sum(kept[to[ptr[rows[k]] : ptr[rows[k] + 1]]])
+    out_to, out_cost = np.empty(out_ptr[-1], np.int32), np.empty(out_ptr[-1])
+    count = 0
+    for row in rows:
+        for e in range(ptr[row], ptr[row + 1]):
+            if kept[to[e]]:
+                out_to[count], out_cost[count] = number[to[e]], cost[e]
+                count += 1
+    return out_ptr, out_to, out_cost

@@ -1,31 +1,42 @@
-"""One door to numba: functions compiled once and kept in a cache beside the code, or where one can be written."""
+"""One door to numba: functions are compiled once and kept on disk, for the very sources they were compiled from."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar, cast
 
+import numba
 import platformdirs
 
 _F = TypeVar("_F", bound=Callable[..., object])
 
 
-def _cache_somewhere() -> None:
-    """Point numba at a folder that can be written, where neither the code's own nor the user's cache can be."""
-    beside, own = Path(__file__).parent, Path(platformdirs.user_cache_dir("numba"))
+def _cache_folder() -> str:
+    """A folder named after the state of all sources beside this one.
+
+    numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
+    go on using the old code after that file changed. In the user's cache directory, or where that cannot be written
+    in the system's for temporary files.
+    """
+    sources = [(path.name, path.stat().st_mtime_ns) for path in sorted(Path(__file__).parent.glob("*.py"))]
+    state = hashlib.sha256(repr(sources).encode()).hexdigest()[:16]
+    own = Path(platformdirs.user_cache_dir("motionmind", appauthor=False))
     nearest = next(folder for folder in (own, *own.parents) if folder.exists())
-    if "NUMBA_CACHE_DIR" not in os.environ and not (os.access(beside, os.W_OK) or os.access(nearest, os.W_OK)):
-        os.environ["NUMBA_CACHE_DIR"] = str(Path(tempfile.gettempdir()) / f"motionmind-numba-{os.getuid()}")
+    base = own if os.access(nearest, os.W_OK) else Path(tempfile.gettempdir()) / f"motionmind-{os.getpid()}"
+    return str(base / "compiled" / state)
 
 
-_cache_somewhere()
-
-import numba  # noqa: E402  (it reads the variable set above when it is imported)
+_FOLDER = _cache_folder()
 
 
 def jit(function: _F) -> _F:
     """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time."""
-    return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
+    theirs, numba.config.CACHE_DIR = numba.config.CACHE_DIR, os.environ.get("NUMBA_CACHE_DIR", _FOLDER)
+    try:
+        return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = theirs

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.search import astar, bound
+from motionmind.search.polish import polish
 from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
+SWEEPS_AT_ONCE = 8
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 
@@ -56,7 +58,7 @@ class Rules:
     shortest: int
     longest: int
     node_budget: int
-    sweeps: int = 60
+    sweeps: int = 160
 
 
 def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
@@ -79,27 +81,53 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
         toll = rules.per_move * int(moves)
         grid = build_grid(held, start, int(moves), to_go, best - toll)
         clock.lap("problem")
-        messages = bound.no_messages(grid)
-        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        proven, cost = bound.tighten(grid, messages, chosen, rules.sweeps, best - toll)
+        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best - toll)
+        if found < best - toll:
+            best, path = found + toll, states
         clock.lap("bound")
-        cost = min(cost, best - toll)
-        improved = cost < best - toll
-        if proven < cost - PROVEN and expansions < rules.node_budget:
+        if proven < best - toll - PROVEN and expansions < rules.node_budget:
+            chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
             found, proven, expanded, held_nodes = astar.search(
-                grid, messages, proven, cost, chosen, rules.node_budget, rules.node_budget - expansions
+                grid, messages, proven, best - toll, chosen, rules.node_budget, rules.node_budget - expansions
             )
+            if found < best - toll:
+                best, path = found + toll, _states(grid, chosen)
             expansions, peak = expansions + expanded, max(peak, held_nodes)
-            improved, cost = improved or found < cost, found
             clock.lap("search")
-        if improved:
-            best, path = cost + toll, _states(grid, chosen)
         lower[moves] = max(lower[moves], proven + toll)
     if not np.isfinite(best):
         return None
     least = min(float(lower.min()), best)
     proven_best = best - least <= PROVEN
     return Certificate(path, best, least, "optimal" if proven_best else "bounded", expansions, peak, clock.seconds)
+
+
+def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
+    """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
+
+    Every few sweeps the path is polished, and positions that no better path goes through are taken out of the grid;
+    until both meet, or what separates them no longer shrinks.
+    """
+    messages = bound.no_messages(grid)
+    proven, cost, states = -np.inf, np.inf, np.zeros((0, grid.lanes), dtype=np.int32)
+    for done in range(0, sweeps, SWEEPS_AT_ONCE):
+        gap, size = min(cost, below) - proven, len(grid.dom)
+        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
+        latest, _ = bound.tighten(grid, messages, chosen, SWEEPS_AT_ONCE, min(cost, below))
+        proven = max(proven, latest)
+        found = polish(grid, chosen)
+        if found < cost:
+            cost, states = found, _states(grid, chosen)
+        known = min(cost, below)
+        if proven >= known - PROVEN:
+            break
+        grid, messages = bound.narrow(grid, messages, known - astar.SAME)
+        if np.any(np.diff(grid.dom_ptr) == 0):
+            proven = known
+            break
+        if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
+            break
+    return min(proven, cost, below), cost, states, grid, messages
 
 
 def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
