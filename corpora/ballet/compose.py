@@ -182,10 +182,9 @@ PLACES = {
     "fourth back": ((0.043, -0.095), (0.043, -0.128)),
     "fifth front": ((0.013, 0.125), (0.013, 0.069)),
     "fifth back": ((0.013, 0.005), (0.013, -0.031)),
-    "bow": ((0.073, 0.215), (0.073, 0.170)),
+    "bow": ((0.073, 0.235), (0.073, 0.190)),
     "arched": ((0.073, -0.055), (0.073, -0.100)),
     "on": ((-0.040, 0.040), (-0.115, -0.005)),
-    "on back": ((-0.040, 0.040), (-0.115, -0.005)),
     "on side": ((-0.060, 0.040), (-0.115, -0.005)),
 }
 # How a standing leg stands: degrees of the knee, and of the lifted heel.
@@ -566,8 +565,8 @@ KICK_BACK = phrase("""
     0    | fifth left           | second | upright | right
     .15  | on / slide back
     .15  | on / tendu back      |        |         | front
-    .15  | on back / degage back | wide / second | derriere right
-    .20  | on back / arabesque  | reaching / second | arabesque right
+    .15  | on / degage back | wide / second | derriere right
+    .20  | on / arabesque  | reaching / second | arabesque right
 """)
 FIFTH_EN_HAUT = phrase("""
     0    | fifth right | second               | upright | left
@@ -627,10 +626,10 @@ BOW = phrase("""
     .6  | bow    | crown  | forward half
     .6  |        | fifth  | forward
     .6  |        |        | forward low  | down
-    .6  |        | crown  |              | front
-    .6  |        | high   | forward
-    .6  |        | first  | forward half | incline left
-    .6  | first  | high   | upright
+    .6  |        |        |              | front
+    .6  |        | crown  | forward
+    .6  |        | high   | forward half | incline left
+    .6  | first  |        | upright
     .6  |        | crown  |              | front
     .6  | arched | fifth  | lifted       | up
     .6  |        | crown  | back
@@ -681,11 +680,11 @@ ARABESQUE = phrase("""
     0   | fifth left          | bas   | upright | left
     .4  | on / slide back     | low   |         | front
     .4  | on / tendu back     | first |
-    .4  | on back / degage back | reaching / wide | derriere right
-    .5  | on back / arabesque | front / second | arabesque right
+    .4  | on / degage back | reaching / wide | derriere right
+    .5  | on / arabesque | front / second | arabesque right
     .8  |                     | front / side
-    .5  | on back / unfold back | reaching / second | attitude right | lifted left
-    .5  | on back / attitude back | high / second
+    .5  | on / unfold back | reaching / second | attitude right | lifted left
+    .5  | on / attitude back | high / second
     .8  |                     | fifth / second
     .5  | on / coupe back     | crown / demi-second | upright | front
     .4  | on / peel           | upper / ajar
@@ -834,10 +833,10 @@ STEP = phrase("""
     .4   | fourth right           | reaching       |         | up
     .4   | slide back / on        | wide / front   |         | front
     .4   | tendu back / on
-    .4   | degage back / on back  | side / front   | derriere left
-    .5   | arabesque / on back    |                | arabesque left
+    .4   | degage back / on  | side / front   | derriere left
+    .5   | arabesque / on    |                | arabesque left
     1    |
-    .5   | degage back / on back  | side / reaching | derriere left
+    .5   | degage back / on  | side / reaching | derriere left
     .4   | tendu back / on        | second / wide  | upright | left
     .4   | slide back / on        | second         |         | front
     .4   | fifth right            | demi-second    |         | left

@@ -141,8 +141,9 @@ def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
 
 @jit
 def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
-    """Write the positions that a node and its ancestors chose."""
-    while node >= 0:
+    """Write the positions that a node and its ancestors chose, the start that the root stands for among them."""
+    path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
+    while node > 0:
         i = nodes.var[node]
         path[i] = grid.dom_ptr[i] + nodes.frontier[node, i % grid.lanes]
         node = nodes.parent[node]

@@ -7,12 +7,13 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
 
 _F = TypeVar("_F", bound=Callable[..., object])
+config: Any = numba.config
 
 
 def _cache_folder() -> str:
@@ -35,8 +36,9 @@ _FOLDER = _cache_folder()
 
 def jit(function: _F) -> _F:
     """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time."""
-    theirs, numba.config.CACHE_DIR = numba.config.CACHE_DIR, os.environ.get("NUMBA_CACHE_DIR", _FOLDER)
+    theirs = config.CACHE_DIR  # read when a function is decorated; nobody else's functions are to move
+    config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", _FOLDER)
     try:
         return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = theirs
+        config.CACHE_DIR = theirs
