@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.formats import write_motion, write_posture
-from motionmind.motion import Motion, Posture
+from motionmind.formats import write_atomically, write_motion, write_posture
+from motionmind.motion import Motion
 from motionmind.skeleton import human23
 
 Array = NDArray[np.float64]
 
-HERE = Path(__file__).parent
 BODY = human23()
 TURNOUT = 60.0
 
@@ -39,7 +38,7 @@ def turns(order: str, *degrees: float) -> Array:
 
 def segment(joint: str) -> Array:
     """Where the left side's `joint` lies in its parent's frame."""
-    return BODY.offsets[BODY.index(f"left_{joint}")]
+    return np.array(BODY.offsets[BODY.index(f"left_{joint}")])
 
 
 class Leg(NamedTuple):
@@ -198,10 +197,18 @@ LEVELS = {
     "rise": (0.0, 24.0),
     "releve": (0.0, 48.0),
 }
+
+
+def weight(place: str, bend: float, heel: float) -> Leg:
+    """A standing leg with the weight as far over the ball of the foot as the heel is lifted."""
+    flat, high = PLACES[place]
+    share = min(heel / 24.0, 1.0)
+    across, ahead = (a + (b - a) * share for a, b in zip(flat, high, strict=True))
+    return stand(across, ahead, bend, heel)
+
+
 STANDING = {
-    f"{place} {level}".strip(): stand(*np.array(flat) + (np.array(high) - flat) * min(heel / 24.0, 1.0), bend, heel)
-    for place, (flat, high) in PLACES.items()
-    for level, (bend, heel) in LEVELS.items()
+    f"{place} {level}".strip(): weight(place, bend, heel) for place in PLACES for level, (bend, heel) in LEVELS.items()
 }
 LEGS = STANDING | {
     "slide front": rest(-8, 28, -20),
@@ -214,9 +221,9 @@ LEGS = STANDING | {
     "degage side": lift(82, 46),
     "degage back": lift(180, 34),
     "half front": lift(-6, 68),
-    "half side": lift(82, 68, out=68),
+    "half side": lift(82, 68, out=64),
     "high front": lift(-4, 90),
-    "high side": lift(80, 90, out=74),
+    "high side": lift(80, 90, out=68),
     "arabesque": lift(160, 44),
     "peel": peel(0.02, 0.11, 42),
     "brush side": lift(82, 38, foot=20, toes=0),
@@ -229,7 +236,7 @@ LEGS = STANDING | {
     "attitude side": lift(66, 86, knee=85),
     "attitude back": lift(140, 42, knee=80),
     "unfold front": lift(4, 86, knee=40),
-    "unfold side": lift(76, 90, knee=40, out=68),
+    "unfold side": lift(76, 90, knee=40, out=64),
     "enveloppe side": lift(75, 66, knee=50),
     "unfold back": lift(152, 44, knee=38),
     "air first": lift(90, 2),
@@ -252,7 +259,6 @@ ARMS = {
     "reaching": arm(74, 86, -2, 32, 28, (8, 0), (6, 6), 9),
     "front": arm(90, 102, 0, 6, 0, (0, 0), (8, 6), 4),
     "side": arm(2, 90, 0, 5, 0, (0, 0), (4, 0), 4),
-    "behind": arm(-25, 55, 0, 5, 0, (-10, 0), (2, -4), 4),
 }
 TORSOS = {
     "upright": torso((0, 0, 0), (0, 0, 0), (0, 0, 0)),
@@ -279,7 +285,6 @@ HEADS = {
 }
 
 # --------------------------------------------------------------------------------------- phrases: posture by posture
-
 
 SIDE = re.compile(r"\b(left|right)\b")
 
@@ -355,7 +360,10 @@ def opposite(name: str) -> str:
 
 def back(rows: list[Row]) -> list[Row]:
     """The way back through the same postures."""
-    return [rows[-1], *(replace(row, seconds=after.seconds) for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True))]
+    return [
+        rows[-1],
+        *(replace(row, seconds=after.seconds) for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True)),
+    ]
 
 
 def out_and_back(rows: list[Row]) -> list[Row]:
@@ -447,7 +455,7 @@ JUMP = phrase("""
     .30        | fifth right      | ajar          |              | right
 """)
 
-# Plies and releves. In each position one goes down and comes back by the same way.
+# Plies and releves, in each position of the feet.
 OPENING = phrase("""
     0   | first | bas
     .5  |       | low           |         | incline left
@@ -825,7 +833,7 @@ PAS_DE_BOURREE = phrase("""
     .2   | fifth right
 """)
 
-# Steps into the first arabesque, and on from there.
+# Steps into the first arabesque.
 STEP = phrase("""
     0    | fifth right            | bas            | upright | right
     .4   | on / slide front       | low            |         | front
@@ -843,13 +851,16 @@ STEP = phrase("""
     .4   |                        | ajar           |         | right
     .4   |                        | bas
 """)
-CHANGE_OVER = over(TENDU_SIDE, phrase("""
+CHANGE_OVER = over(
+    TENDU_SIDE,
+    phrase("""
     | | bas   | | right
     | | low   | | front
     | | first
     | | low   | | incline right
     | | bas   | | left
-"""))
+"""),
+)
 TENDUS = join(TENDU_FRONT, back(TENDU_FRONT), TENDU_SIDE, TENDU_BACK, back(TENDU_BACK))
 DEGAGES = join(*(out_and_back(kick[:4]) for kick in (KICK_FRONT, KICK_SIDE)), TENDU_SIDE, out_and_back(KICK_BACK[:4]))
 KICKS = join(out_and_back(KICK_FRONT), out_and_back(KICK_SIDE), TENDU_SIDE, out_and_back(KICK_BACK))
@@ -861,15 +872,87 @@ CLIPS = {
     "jump": ("The jump in seven positions: fifth, plie, push, air, landing, plie, fifth", JUMP),
     "plies": (
         "Demi-plies, grand plies and releves in first, second, fourth and fifth",
-        join(OPENING, plies("first"), TO_SECOND, TO_FOURTH, plies("fourth right"), TO_FIFTH, plies("fifth right"), CLOSING),
+        join(
+            OPENING,
+            plies("first"),
+            TO_SECOND,
+            TO_FOURTH,
+            plies("fourth right"),
+            TO_FIFTH,
+            plies("fifth right"),
+            CLOSING,
+        ),
     ),
-    "tendus": ("Tendus to the front, the side and the back, one side and the other", join(PREPARATION, TENDUS, other_side(TENDUS), CLOSING)),
+    "tendus": (
+        "Tendus to the front, the side and the back, one side and the other",
+        join(PREPARATION, TENDUS, other_side(TENDUS), CLOSING),
+    ),
     "degages": ("Degages, quick and low", join(PREPARATION, DEGAGES, other_side(DEGAGES), FIFTH_EN_HAUT)),
-    "battements": ("Grand battements to the front, the side and the back", join(PREPARATION, KICKS, other_side(KICKS), CLOSING)),
-    "port-de-bras": ("Arms together and one by one, a bow forward and a bend back", join(CIRCLE, ONE_BY_ONE, TO_FIRST, BOW)),
+    "battements": (
+        "Grand battements to the front, the side and the back",
+        join(PREPARATION, KICKS, other_side(KICKS), CLOSING),
+    ),
+    "port-de-bras": (
+        "Arms together and one by one, a bow forward and a bend back",
+        join(CIRCLE, ONE_BY_ONE, TO_FIRST, BOW),
+    ),
     "adagio": ("Developpes to the front and the side, arabesque and attitude", join(ADAGIO, other_side(ADAGIO))),
     "arabesques": ("Steps into the first arabesque, one on each side", join(STEP, CHANGE_OVER, other_side(STEP))),
     "balances": ("Passe on demi-pointe, from a plie", join(BALANCES, other_side(BALANCES))),
-    "sautes": ("Sautes in first and second, echappes, changements", join(SAUTE, ECHAPPE, CHANGEMENT, other_side(CHANGEMENT), other_side(back(SINK)))),
+    "sautes": (
+        "Sautes in first and second, echappes, changements",
+        join(SAUTE, ECHAPPE, CHANGEMENT, other_side(CHANGEMENT), other_side(back(SINK))),
+    ),
     "glissades": ("Glissade, assemble, jete, pas de bourree", join(ALLEGRO, other_side(ALLEGRO))),
 }
+
+POSTURES = {
+    "first": "first | bas | upright | front",
+    "second": "second | second | upright | left",
+    "fourth": "fourth right | second | upright | left",
+    "fifth": "fifth right | bas | upright | right",
+    "plie": "first plie | demi-second | upright | incline right",
+    "grand-plie": "fifth right grand | bas | upright | down",
+    "releve": "fifth right releve | fifth | upright | front",
+    "tendu": "on / tendu side | second | upright | right",
+    "coupe": "on / coupe front | low | upright | front",
+    "passe": "on releve / passe | fifth | upright | front",
+    "devant": "on / high front | fifth / second | devant | lifted left",
+    "a-la-seconde": "on side / high side | second | listed right | right",
+    "attitude": "on / attitude back | fifth / second | attitude right | lifted left",
+    "arabesque": "on / arabesque | front / side | arabesque right | front",
+    "arms-fifth": "first | fifth | upright | front",
+    "bow": "bow | fifth | forward low | down",
+}
+
+
+def compose(folder: Path) -> None:
+    """Write clips, postures and manifest into `folder`."""
+    for name, (_, rows) in CLIPS.items():
+        write_motion(made(folder / "clips") / f"{name}.json", motion(name, rows))
+    for name, text in POSTURES.items():
+        write_posture(made(folder / "postures") / f"{name}.json", motion(name, phrase("0 |" + text)).posture(0))
+    clips = [{"name": name, "file": f"clips/{name}.json", "about": about} for name, (about, _) in CLIPS.items()]
+    manifest = {
+        "format": "motionmind-corpus",
+        "version": 1,
+        "name": "ballet",
+        "title": "Ballet exercises: barre, port de bras, adagio, allegro",
+        "author": "The MotionMind authors",
+        "licence": "CC0-1.0",
+        "source": "Composed by hand for MotionMind: compose.py, beside this file, holds every position and phrase",
+        "facing": "stage",
+        "rate": None,
+        "tolerance": 6.0,
+        "clips": clips,
+    }
+    write_atomically(folder / "manifest.json", (json.dumps(manifest, indent=2) + "\n").encode())
+
+
+def made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+if __name__ == "__main__":
+    compose(Path(__file__).parent)

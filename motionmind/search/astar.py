@@ -98,7 +98,8 @@ def _expand(grid: Grid, m: Messages, nodes: _Nodes, node: int, cost: float, path
             continue
         twin = _find(nodes, node, i, choice, lane)
         if twin >= 0:
-            if nodes.f[twin] <= f:
+            # Not by the last bit: of two prefixes that cost the same each could come to stand in for the other's child.
+            if nodes.f[twin] <= f + SAME:
                 continue
             if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
                 other = nodes.parent[twin]

@@ -22,10 +22,10 @@ the messages that came back to b, less its constants; and so on to the last. Wha
 In other words the energy is shared out among chains that run along the order, whose least costs add up to the bound;
 theta is the sum, over the chains through a variable, of what each costs more than its least with a given value there.
 So when the backward sweep comes to a variable, theta plus the bound as it then stands bounds all paths *through* each
-position. (It then stands at: the constants of the forward sweep before the variable; the minima of theta from it on; the
-constants of the messages sent back so far, but for those to variables before it, which the forward sweep's hold the
-place of.) Where that is no less than the cost of a path already known, the position can be taken out of its domain,
-which makes the next bounds tighter: reduced-cost fixing, as in linear programming.
+position. (It then stands at: the constants of the forward sweep before the variable, the minima of theta from it on,
+and the constants of the messages sent back so far, but for those to variables before it, where the forward sweep's
+stand.) Where that is no less than the cost of a path already known, the position can be taken out of its domain, which
+makes the next bounds tighter: reduced-cost fixing, as in linear programming.
 """
 
 from __future__ import annotations

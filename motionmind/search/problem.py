@@ -193,8 +193,9 @@ def _domains(
     for i in range((moves + 1) * lanes):
         t, lane = i // lanes, i % lanes
         first, least = model.starts[lane], to_go[moves, model.starts[lane] + start[lane]]
-        # Of what the kept states before lead to. The margin grows with t so that rounding cannot keep a state and
-        # drop all that follow it.
+        # Of what the kept states before lead to. The margin grows with t, by more than the sums can be off, so that
+        # rounding cannot keep a state and drop all that follow it.
+        margin = (t + 1) * (1e-9 + 1e-14 * (abs(least) + abs(spare)))
         led_to = np.zeros(model.starts[lane + 1] - first, np.bool_)
         if t == 0:
             led_to[start[lane]] = True
@@ -205,7 +206,7 @@ def _domains(
         for state in range(len(led_to)):
             if led_to[state]:
                 through = so_far[t, first + state] + to_go[moves - t, first + state]
-                if through < np.inf and through - least <= spare + 1e-9 * (t + 1):
+                if through < np.inf and through - least <= spare + margin:
                     place[t, first + state] = count
                     count += 1
         dom_ptr[i + 1] = count

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from motionmind.search import astar, bound
 from motionmind.search.polish import polish
+from motionmind.search.probe import probe
 from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
 SWEEPS_AT_ONCE = 8
+CASES = 1000  # that the bound is split into at most, for each number of moves
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 
@@ -127,6 +129,10 @@ def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray
             break
         if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
             break
+    if proven < min(cost, below) - PROVEN:
+        flat = states.ravel().copy()
+        proven, cost, grid, messages = probe(grid, messages, proven, cost, below, flat, CASES)
+        states = flat.reshape(-1, grid.lanes)
     return min(proven, cost, below), cost, states, grid, messages
 
 
