@@ -24,7 +24,8 @@ CLIPS = {entry["name"]: entry for entry in json.loads((FOLDER / "manifest.json")
 # and the other two as a rotation vector. After American Academy of Orthopaedic Surgeons, "Joint Motion" (1965), with
 # the hips and ankles of dancers: turnout and plantar flexion go further than most people's.
 LIMITS = {
-    "hip": ("y", (-125, 45), (-30, 75), (-20, 90)),  # flexion is -x, turnout y, abduction z
+    # Flexion is -x, turnout y, abduction z; a bent hip turns out further than a straight one, as in passe.
+    "hip": ("y", (-125, 45), (-30, 78), (-20, 90)),
     "knee": ("x", (-1, 145), (-1, 1), (-1, 1)),
     "ankle": ("x", (-45, 80), (-30, 30), (-25, 25)),  # dorsiflexion under weight, in the deepest plie
     "toes": ("x", (-80, 40), (-1, 1), (-1, 1)),

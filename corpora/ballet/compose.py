@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 BODY = human23()
 TURNOUT = 60.0
+TOLERANCE = 6.0  # degrees within which orientations count as the same state
 
 # ---------------------------------------------------------------------------------------------- geometry of the body
 
@@ -179,8 +180,8 @@ PLACES = {
     "second": ((0.270, 0.035), (0.270, -0.010)),
     "fourth front": ((0.043, 0.225), (0.043, 0.192)),
     "fourth back": ((0.043, -0.095), (0.043, -0.128)),
-    "fifth front": ((0.013, 0.125), (0.013, 0.069)),
-    "fifth back": ((0.013, 0.005), (0.013, -0.031)),
+    "fifth front": ((0.013, 0.125), (0.013, 0.081)),
+    "fifth back": ((0.013, 0.005), (0.013, -0.039)),
     "bow": ((0.073, 0.235), (0.073, 0.190)),
     "arched": ((0.073, -0.055), (0.073, -0.100)),
     "on": ((-0.040, 0.040), (-0.115, -0.005)),
@@ -231,7 +232,7 @@ LEGS = STANDING | {
     "cou-de-pied back": draw_up(0.02, -0.83, -0.10, 70),
     "coupe front": draw_up(0.02, -0.70, 0.10, 62),
     "coupe back": draw_up(0.02, -0.70, -0.10, 70),
-    "passe": draw_up(-0.05, -0.455, 0.04, 70),
+    "passe": draw_up(-0.05, -0.455, 0.04, 64),
     "attitude front": lift(20, 78, knee=85),
     "attitude side": lift(66, 86, knee=85),
     "attitude back": lift(140, 42, knee=80),
@@ -841,10 +842,10 @@ STEP = phrase("""
     .4   | fourth right           | reaching       |         | up
     .4   | slide back / on        | wide / front   |         | front
     .4   | tendu back / on
-    .4   | degage back / on  | side / front   | derriere left
-    .5   | arabesque / on    |                | arabesque left
+    .4   | degage back / on       | side / front   | derriere left
+    .5   | arabesque / on         |                | arabesque left
     1    |
-    .5   | degage back / on  | side / reaching | derriere left
+    .5   | degage back / on       | side / reaching | derriere left
     .4   | tendu back / on        | second / wide  | upright | left
     .4   | slide back / on        | second         |         | front
     .4   | fifth right            | demi-second    |         | left
@@ -943,7 +944,8 @@ def compose(folder: Path) -> None:
         "source": "Composed by hand for MotionMind: compose.py, beside this file, holds every position and phrase",
         "facing": "stage",
         "rate": None,
-        "tolerance": 6.0,
+        "tolerance": TOLERANCE,
+        "discretization": {"kind": "codebook", "tolerance": TOLERANCE},
         "clips": clips,
     }
     write_atomically(folder / "manifest.json", (json.dumps(manifest, indent=2) + "\n").encode())

@@ -328,7 +328,7 @@ def narrow(grid: Grid, m: Messages, below: float) -> tuple[Grid, Messages]:
     )  # fmt: skip
     return smaller, Messages(
         m.down_row[held], m.up_row[held], m.down_col[held], m.up_col[rows],
-        m.constants, m.before, m.ahead[held], m.through[held],
+        m.constants.copy(), m.before.copy(), m.ahead[held], m.through[held],
     )  # fmt: skip
 
 

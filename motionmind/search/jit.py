@@ -42,3 +42,8 @@ def jit(function: _F) -> _F:
         return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
     finally:
         config.CACHE_DIR = theirs
+
+
+def is_compiled() -> bool:
+    """Whether compiled code is on disk already; where not, the first search takes half a minute longer."""
+    return next(Path(os.environ.get("NUMBA_CACHE_DIR", _FOLDER)).glob("**/*.nbi"), None) is not None

@@ -50,6 +50,9 @@ def probe(
             break
         if struck:
             grid, m = narrow(grid, m, known - _SAME)
+            if np.any(np.diff(grid.dom_ptr) == 0):
+                proven = max(proven, known)
+                break
             trial = np.zeros(len(grid.dom_ptr) - 1, np.int64)
             bound, _ = tighten(grid, m, trial, 1, known)
             proven = max(proven, bound)

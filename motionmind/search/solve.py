@@ -84,15 +84,19 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
         grid = build_grid(held, start, int(moves), to_go, best - toll)
         clock.lap("problem")
         proven, found, states, grid, messages = _bound(grid, rules.sweeps, best - toll)
+        known = min(found, best - toll)
         if found < best - toll:
             best, path = found + toll, states
         clock.lap("bound")
-        if proven < best - toll - PROVEN and expansions < rules.node_budget:
+        if proven < known - PROVEN and expansions < rules.node_budget:
             chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-            found, proven, expanded, held_nodes = astar.search(
-                grid, messages, proven, best - toll, chosen, rules.node_budget, rules.node_budget - expansions
-            )
-            if found < best - toll:
+            # f grows from what the messages prove by themselves; cases may have proven more.
+            found, searched, expanded, held_nodes = astar.search(
+                grid, messages, float(messages.constants.sum()), known, chosen, rules.node_budget,
+                rules.node_budget - expansions,
+            )  # fmt: skip
+            proven = max(proven, searched)
+            if found < known:
                 best, path = found + toll, _states(grid, chosen)
             expansions, peak = expansions + expanded, max(peak, held_nodes)
             clock.lap("search")

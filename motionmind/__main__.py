@@ -1,0 +1,5 @@
+"""`python -m motionmind`: the command line."""
+
+from motionmind.cli import main
+
+main()
