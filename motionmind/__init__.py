@@ -1,1 +1,84 @@
-"""MotionMind: movement between two postures in the style of a corpus, with a proof of how good it is."""
+"""MotionMind: movement between two postures in the style of a corpus, with a proof of how good it is.
+
+    from motionmind import Engine, own_skeleton, read_motion
+
+    engine = Engine.fit([own_skeleton(read_motion("clip.bvh"))], rate=5)
+    tween = engine.tween(a, b)
+
+What is listed here is the public interface. It is imported when it is first used, so that `import motionmind` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from motionmind.discretize import make as make_discretization
+    from motionmind.engine import Engine, own_skeleton
+    from motionmind.errors import (
+        CorpusError,
+        FormatError,
+        MotionMindError,
+        MotionMindWarning,
+        NoPathError,
+        SkeletonError,
+    )
+    from motionmind.formats import read_motion, read_posture, write_motion, write_posture
+    from motionmind.motion import Motion, Posture
+    from motionmind.retarget import to_human23
+    from motionmind.skeleton import Skeleton, human23
+    from motionmind.tween import Bridge, Source, Tween, Wait
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Bridge",
+    "CorpusError",
+    "Engine",
+    "FormatError",
+    "Motion",
+    "MotionMindError",
+    "MotionMindWarning",
+    "NoPathError",
+    "Posture",
+    "Skeleton",
+    "SkeletonError",
+    "Source",
+    "Tween",
+    "Wait",
+    "human23",
+    "make_discretization",
+    "own_skeleton",
+    "read_motion",
+    "read_posture",
+    "to_human23",
+    "write_motion",
+    "write_posture",
+]
+
+_HOMES = {
+    "discretize": ("make_discretization",),
+    "engine": ("Engine", "own_skeleton"),
+    "errors": (
+        "CorpusError",
+        "FormatError",
+        "MotionMindError",
+        "MotionMindWarning",
+        "NoPathError",
+        "SkeletonError",
+    ),
+    "formats": ("read_motion", "read_posture", "write_motion", "write_posture"),
+    "motion": ("Motion", "Posture"),
+    "retarget": ("to_human23",),
+    "skeleton": ("Skeleton", "human23"),
+    "tween": ("Bridge", "Source", "Tween", "Wait"),
+}
+_RENAMED = {"make_discretization": "make"}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"motionmind.{module}"), _RENAMED.get(name, name))
+    raise AttributeError(f"module 'motionmind' has no attribute {name!r}")

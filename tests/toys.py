@@ -6,13 +6,14 @@ products that the model's definition prints, not from the search's grid.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.search.problem import Model
+from motionmind.search.bound import Messages, no_messages
+from motionmind.search.problem import Grid, Model, build_grid, costs_to_go, with_waits
 from motionmind.search.solve import Rules
 
 Floats = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Toy:
 
     def model(self) -> Model:
         """The same as the search reads it."""
-        lanes, starts = len(self.sizes), np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64)
+        starts = np.concatenate([[0], np.cumsum(self.sizes)]).astype(np.int64)
         rows = [np.flatnonzero(np.isfinite(row)) for table in self.edges for row in table]
         costs = [row[np.isfinite(row)] for table in self.edges for row in table]
         unary, alone = np.zeros(starts[-1]), np.zeros(starts[-1])
@@ -103,22 +104,57 @@ class Toy:
                     total += self.coupling(lane)[after[parent], after[lane]]
         return float(total)
 
-    def optima(self, longest: int) -> Floats:
-        """Least cost of exactly T moves, for T = 0 .. longest, over all joint states [longest + 1]."""
-        joint = np.array(list(product(*map(range, self.sizes))))
+    def joint_states(self) -> NDArray[np.int64]:
+        """All states of the whole body [product of sizes, L]."""
+        return np.array(list(product(*map(range, self.sizes))))
+
+    def _tables(self) -> tuple[Floats, Floats]:
+        """What the body as a whole pays for a move [N, N] and for standing somewhere [N]."""
+        joint = self.joint_states()
         stand = np.zeros(len(joint))
         move = np.zeros((len(joint), len(joint)))
         for lane, parent in enumerate(self.parents):
             move += self.moves(lane)[joint[:, lane][:, None], joint[:, lane][None, :]]
             if parent >= 0:
                 stand += self.coupling(lane)[joint[:, parent], joint[:, lane]]
-        at_goal = np.flatnonzero((joint == self.goal).all(axis=1))[0]
-        value = np.where((joint == self.start).all(axis=1), 0.0, np.inf)
-        optima = [value[at_goal]]
+        return move, stand
+
+    def so_far(self, longest: int) -> Floats:
+        """Least cost from the start to each joint state in exactly t moves, without tau [longest + 1, N]."""
+        move, stand = self._tables()
+        value = [np.where((self.joint_states() == self.start).all(axis=1), 0.0, np.inf)]
         for _ in range(longest):
-            value = (value[:, None] + move).min(axis=0) + stand
-            optima.append(value[at_goal])
-        return np.array(optima) + self.per_move * np.arange(longest + 1)
+            value.append((value[-1][:, None] + move).min(axis=0) + stand)
+        return np.array(value)
+
+    def to_go(self, longest: int) -> Floats:
+        """Least cost from each joint state to the goal in exactly t moves, without tau [longest + 1, N]."""
+        move, stand = self._tables()
+        value = [np.where((self.joint_states() == self.goal).all(axis=1), 0.0, np.inf)]
+        for _ in range(longest):
+            value.append((move + stand + value[-1]).min(axis=1))
+        return np.array(value)
+
+    def optima(self, longest: int) -> Floats:
+        """Least cost of exactly T moves, for T = 0 .. longest, over all joint states [longest + 1]."""
+        at_goal = (self.joint_states() == self.goal).all(axis=1)
+        return self.so_far(longest)[:, at_goal][:, 0] + self.per_move * np.arange(longest + 1)
+
+    def scaled(self, factor: float) -> Toy:
+        """The same body with all costs multiplied."""
+
+        def times(tables: tuple[Floats, ...]) -> tuple[Floats, ...]:
+            return tuple(table * factor for table in tables)
+
+        return replace(
+            self,
+            edges=times(self.edges),
+            children=times(self.children),
+            above=times(self.above),
+            discounts=times(self.discounts),
+            wait=self.wait * factor,
+            per_move=self.per_move * factor,
+        )
 
 
 def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False) -> Toy:
@@ -162,6 +198,26 @@ def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = 
         wait=float(draw(1.5, 1)[0]),
         per_move=float(draw(1.0, 1)[0]),
     )
+
+
+def noisy_messages(grid: Grid, seed: int, noise: float) -> Messages:
+    """Forward messages at random: with what is then sent back they bound, but poorly, and leave A* much to do."""
+    rng = np.random.default_rng(seed)
+    messages = no_messages(grid)
+    messages.down_row[:] = rng.uniform(0.0, noise, len(grid.dom))
+    messages.down_row[: grid.dom_ptr[grid.lanes]] = 0.0
+    for i in range(len(grid.dom_ptr) - 1):
+        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
+            here = slice(grid.dom_ptr[i], grid.dom_ptr[i + 1])
+            messages.down_col[here] = rng.uniform(0.0, noise, here.stop - here.start)
+    return messages
+
+
+def grid_of(toy: Toy, moves: int, below: float = np.inf) -> Grid:
+    """The grid of exactly `moves` moves."""
+    start, goal = toy.ends()
+    held = with_waits(toy.model(), goal, toy.wait)
+    return build_grid(held, start, moves, costs_to_go(held, goal, moves), below)
 
 
 def _pointer(rows: list[NDArray[np.int64]]) -> NDArray[np.int64]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import motionmind
 from motionmind.errors import CorpusError
 
 FOLDERS = ("corpora", "discretization")
@@ -18,7 +17,7 @@ def bundled(folder: str) -> Path:
     """
     if folder not in FOLDERS:
         raise CorpusError(f"no bundled folder {folder!r}; there are {' and '.join(FOLDERS)}")
-    package = Path(motionmind.__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     places = (package / "_bundled" / folder, package.parent / folder)
     for place in places:
         if place.is_dir():

@@ -4,8 +4,8 @@ A node fixes the variables up to one; its *frontier* is the last position chosen
 rest depends on, so nodes with the same variable and frontier are the same node. f grows by `bound.step`.
 
 When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
-backed up into it; it is opened again with that f, so nothing is lost from the proof. Leaves are forgotten by halves,
-not one by one, which keeps the cost of forgetting constant per node.
+backed up into it; it is opened again with that f, so nothing is lost from the proof. Leaves are forgotten by halves
+or so, not one by one, which keeps the cost of forgetting constant per node.
 
 Sources: Standley, "Finding optimal solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition);
 Russell, "Efficient memory-bounded search methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified
@@ -152,7 +152,7 @@ def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
 
 @jit
 def _forget(nodes: _Nodes, current: int) -> bool:
-    """Forget the worse half of the leaves, backing their keys up into their parents; whether any could be forgotten."""
+    """Forget the leaves that are worse than the mean (of equals half), their keys backed up; whether there were any."""
     leaves = np.empty(nodes.tally[_HEAPED], np.int32)
     count = 0
     for k in range(nodes.tally[_HEAPED]):
@@ -160,9 +160,12 @@ def _forget(nodes: _Nodes, current: int) -> bool:
         if nodes.children[node] == 0 and nodes.parent[node] >= 0 and node != current:
             leaves[count] = node
             count += 1
-    order = np.argsort(-nodes.key[leaves[:count]], kind="mergesort")
-    for k in order[: (count + 1) // 2]:
+    middle = np.mean(nodes.key[leaves[:count]])
+    alike = np.all(nodes.key[leaves[:count]] <= middle)
+    for k in range(count):
         node = leaves[k]
+        if nodes.key[node] <= middle and not (alike and k >= count // 2):
+            continue
         parent = nodes.parent[node]
         closed = nodes.slot[parent] < 0
         nodes.key[parent] = nodes.key[node] if closed else min(nodes.key[parent], nodes.key[node])

@@ -64,7 +64,6 @@ class Messages(NamedTuple):
     through: Floats
 
 
-@jit
 def no_messages(grid: Grid) -> Messages:
     """Messages of zero: the bound they give is the sum of each variable's minimum."""
     count = len(grid.dom)

@@ -12,7 +12,7 @@ import numpy as np
 from motionmind.search.bound import Messages, narrow, tighten
 from motionmind.search.jit import jit
 from motionmind.search.polish import polish
-from motionmind.search.problem import Floats, Grid, Indices
+from motionmind.search.problem import Floats, Grid, Indices, Ints
 
 _SWEEPS = 3  # pairs of sweeps that bound a case
 _NEAR = 0.02  # a case's path is polished if it costs no more than this share above the best
@@ -21,16 +21,16 @@ _SAME = 1e-9
 
 @jit
 def probe(
-    grid: Grid, m: Messages, proven: float, cost: float, below: float, states: Indices, cases: int
+    grid: Grid, m: Messages, order: Ints, proven: float, cost: float, below: float, states: Indices, cases: int
 ) -> tuple[float, float, Grid, Messages]:
-    """Go through the variables, those with the fewest values first, and bound up to `cases` cases.
+    """Go through the variables in the given order and bound up to `cases` cases.
 
     Stops when the bound meets the cost of the best path. Better paths found in a case are written to `states` [n].
     Returns the bound (on paths cheaper than `below`), the cost of the best path, and the grid without what was struck
     off, with its messages.
     """
     done = 0
-    for i in np.argsort(np.diff(grid.dom_ptr), kind="mergesort"):
+    for i in order:
         least, struck = np.inf, False
         known = min(cost, below)
         if grid.dom_ptr[i + 1] - grid.dom_ptr[i] < 2:

@@ -16,6 +16,7 @@ from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go
 
 SWEEPS_AT_ONCE = 8
 CASES = 1000  # that the bound is split into at most, for each number of moves
+MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 
@@ -52,7 +53,7 @@ class Rules:
         shortest: least number of moves.
         longest: greatest number of moves.
         node_budget: nodes that A* may hold at once; it stops after as many expansions.
-        sweeps: pairs of sweeps of the bound at most, for each number of moves.
+        sweeps: pairs of sweeps of the bound at most, for each number of moves; at least 1.
     """
 
     wait: float
@@ -69,6 +70,8 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
     Numbers of moves are looked at in the order of what the lanes cost on their own. Each is bounded, then searched, and
     only as long as its bound is below the best path found; so the least bound of all proves the answer.
     """
+    if np.diff(model.starts).max() > MOST_STATES:
+        raise ValueError(f"a lane has {np.diff(model.starts).max()} states; the search takes up to {MOST_STATES}")
     clock = _Clock()
     held = with_waits(model, goal, rules.wait)
     to_go = costs_to_go(held, goal, rules.longest)
@@ -119,7 +122,7 @@ def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray
     for done in range(0, sweeps, SWEEPS_AT_ONCE):
         gap, size = min(cost, below) - proven, len(grid.dom)
         chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        latest, _ = bound.tighten(grid, messages, chosen, SWEEPS_AT_ONCE, min(cost, below))
+        latest, _ = bound.tighten(grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), min(cost, below))
         proven = max(proven, latest)
         found = polish(grid, chosen)
         if found < cost:
@@ -135,7 +138,8 @@ def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray
             break
     if proven < min(cost, below) - PROVEN:
         flat = states.ravel().copy()
-        proven, cost, grid, messages = probe(grid, messages, proven, cost, below, flat, CASES)
+        fewest_first = np.argsort(np.diff(grid.dom_ptr), kind="stable")
+        proven, cost, grid, messages = probe(grid, messages, fewest_first, proven, cost, below, flat, CASES)
         states = flat.reshape(-1, grid.lanes)
     return min(proven, cost, below), cost, states, grid, messages
 
