@@ -42,7 +42,8 @@ def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Brid
     indptr, targets, degrees = [np.zeros(1, np.int64)], [], []
     for lane, size in enumerate(transitions.sizes()):
         first = transitions.starts[lane]
-        angles = np.degrees(_angles(centres[first : first + size]))
+        # Rounded, so that which of equally near states comes first does not hang on the last bit.
+        angles = np.round(np.degrees(_angles(centres[first : first + size])), 9)
         near = _nearest(angles) | _spanning_tree(angles)
         rows = transitions.indptr[first : first + size + 1]
         attested = transitions.targets[rows[0] : rows[-1]]

@@ -20,15 +20,22 @@ def _cache_folder() -> str:
     """A folder named after the state of all sources beside this one.
 
     numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
-    go on using the old code after that file changed. In the user's cache directory, or where that cannot be written
-    in the system's for temporary files.
+    go on using the old code after that file changed. It is in the user's cache directory, or where that cannot be
+    written in the system's for temporary files, as a folder that nobody else may write to.
     """
     sources = [(path.name, path.stat().st_mtime_ns) for path in sorted(Path(__file__).parent.glob("*.py"))]
     state = hashlib.sha256(repr(sources).encode()).hexdigest()[:16]
     own = Path(platformdirs.user_cache_dir("motionmind", appauthor=False))
     nearest = next(folder for folder in (own, *own.parents) if folder.exists())
-    base = own if os.access(nearest, os.W_OK) else Path(tempfile.gettempdir()) / f"motionmind-{os.getpid()}"
-    return str(base / "compiled" / state)
+    return str((own if os.access(nearest, os.W_OK) else _temporary()) / "compiled" / state)
+
+
+def _temporary() -> Path:
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"motionmind-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    owned = folder.stat().st_uid in (user, 0) and not folder.is_symlink()
+    return folder if owned else Path(tempfile.mkdtemp(prefix="motionmind-"))
 
 
 _FOLDER = _cache_folder()

@@ -1,0 +1,75 @@
+"""Optima against those of toulbar2, an exact solver of another kind, on the problems as they are written out for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toys import random_toy
+
+from motionmind.discretize import Codebook
+from motionmind.engine import Engine, own_skeleton
+from motionmind.formats import read_motion
+from motionmind.search.cfn import cfn
+from motionmind.search.costs import price
+from motionmind.search.solve import Rules, solve
+
+pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
+
+PAIRS = 50
+SECONDS = 4  # that toulbar2 may take for one problem
+SAME = 1e-3  # nats; the written costs are rounded to 1e-6 each
+
+
+@pytest.fixture(scope="session")
+def cmu05(shared_data: Path) -> Engine:
+    """What is learned from twenty clips of one dancer, at 5 Hz and 15 degrees; each begins with an added T-pose."""
+    clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
+    if not clips:
+        pytest.skip(f"no clips in {shared_data / 'cmu-05'}")
+    return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
+
+
+def toulbar2(path: Path, seconds: int) -> tuple[float, float]:
+    """Cost of the best solution that toulbar2 finds within a time, and the bound it proves; equal where it finished."""
+    network = pytoulbar2.CFN(verbose=-1)
+    network.Read(str(path))
+    solution = network.Solve(timeLimit=seconds)
+    return (np.inf if solution is None else solution[1]), network.GetDDualBound()
+
+
+def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
+    model = price(cmu05.grammar, "conditional", 1.0, 1.0)
+    rules = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
+    rng = np.random.default_rng(7)
+    optimal = finished = 0
+    for pair in range(PAIRS):
+        start, goal = cmu05.states[rng.integers(len(cmu05.states), size=2)].astype(np.int64)
+        ours = solve(model, start, goal, rules)
+        assert ours is not None
+        moves = len(ours.path) - 1
+        (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.lanes))
+        theirs, proven = toulbar2(tmp_path / "problem.cfn", SECONDS)
+        optimal += ours.status == "optimal"
+        # Of exactly these moves ours is the best known; the bound on all numbers of moves holds for these as well.
+        assert ours.lower_bound <= theirs + SAME, pair
+        assert proven <= ours.cost + SAME, pair
+        if theirs - proven < SAME:
+            finished += 1
+            assert theirs == pytest.approx(ours.cost, abs=SAME), pair
+    assert optimal >= 0.95 * PAIRS
+    assert finished >= 48
+
+
+def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:
+    for seed in range(25):
+        toy = random_toy(seed, frustrated=seed % 2 == 0)
+        lanes = [f"lane{lane}" for lane in range(len(toy.sizes))]
+        for moves in (1, 3, 5):
+            ours = solve(toy.model(), *toy.ends(), toy.rules(moves, moves))
+            if ours is not None:
+                text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, lanes)
+                (tmp_path / "problem.cfn").write_text(text)
+                theirs, _ = toulbar2(tmp_path / "problem.cfn", SECONDS)
+                assert theirs == pytest.approx(ours.cost, abs=SAME), (seed, moves)
