@@ -3,299 +3,411 @@
 from __future__ import annotations
 
 import json
+import logging
+import math
 import os
 import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from enum import StrEnum
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
-import typer
+import click
 
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 
 if TYPE_CHECKING:
-    from motionmind.engine import Engine
+    from motionmind.corpus.corpus import Facing
+    from motionmind.corpus.gather import Flips
     from motionmind.motion import Motion
     from motionmind.tween import Tween
 
-app = typer.Typer(
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    help="Movement between two postures in the style of a corpus, with a proof of how close to the best it is.",
-)
-corpora = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Build corpora from movement, and look at them."
-)
-app.add_typer(corpora, name="corpus")
-
-PATH_MISSING = 3  # exit code where nothing joins A and B
 BAD_INPUT = 2  # exit code for everything that the user can put right
+NO_PATH = 3  # where nothing joins A and B
+INTERRUPTED = 130  # by Ctrl-C, as shells have it
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
-class Weights(StrEnum):
-    """How transitions are weighed."""
+class InOrder(click.Group):
+    """Commands in the order in which a user comes to need them."""
 
-    conditional = "conditional"
-    printed = "printed"
-
-
-class Facing(StrEnum):
-    """Whether the turn about the vertical belongs to the pelvis' states."""
-
-    free = "free"
-    stage = "stage"
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Their names."""
+        return list(self.commands)
 
 
-class Flips(StrEnum):
-    """What becomes of a clip in which a joint jumps."""
+class Notes(logging.Handler):
+    """Notes on what was taken for granted, such as a file's unit: for the first file of which each is true."""
 
-    split = "split"
-    keep = "keep"
-    drop = "drop"
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.said: set[object] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it, to standard error."""
+        what = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
+        if what not in self.said:
+            self.said.add(what)
+            click.echo(f"note: {record.getMessage()}", err=True)
 
 
-class Body(StrEnum):
-    """Which joints the converted movement is on."""
+class Number(click.FloatRange):
+    """A finite number in a range."""
 
-    own = "own"
-    human23 = "human23"
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number; a usage error where it is none."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
 
 
-Home = Annotated[
-    Path | None, typer.Option(help="Folder of your own corpora [default: $MOTIONMIND_HOME, or the data directory].")
-]
-Joints = Annotated[Path | None, typer.Option(help="TOML or JSON file: your joint = human23's joint.")]
-Unit = Annotated[
-    str | None, typer.Option(help="BVH's unit of length: m, cm, mm, dm, in, ft, cmu [default: by height].")
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+COUNT = click.IntRange(min=1)
+NATS = Number(min=0)
+RATE = Number(min=0, min_open=True, max=1000)  # beyond it lies no camera, only memory
+
+HOME = click.option(
+    "--home",
+    type=FOLDER,
+    envvar="MOTIONMIND_HOME",
+    show_envvar=True,
+    help="Folder of the corpora that you built  [default: the platform's data directory]",
+)
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+
+
+def reading(command: _Command) -> _Command:
+    """Options of the commands that read movement."""
+    for option in (
+        click.option("--asf", type=FILE, help="AMC's skeleton  [default: the one beside it]"),
+        click.option(
+            "--unit",
+            metavar="UNIT",
+            help="BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres in "
+            "one  [default: told from the body's height]",
+        ),
+        click.option("--joints", type=FILE, help="Whose joints they are: a TOML or JSON file, your joint = human23's."),
+    ):
+        command = option(command)
+    return command
+
+
+def example(line: str) -> str:
+    """An epilog that is not wrapped, so that it can be copied."""
+    return f"\b\nExample:\n  {line}"
+
+
+# --- commands -------------------------------------------------------------------------------------------------------
+
+
+@click.group(
+    cls=InOrder,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
+@click.version_option(package_name="motionmind", message="%(prog)s %(version)s")
+@click.pass_context
+def app(context: click.Context) -> None:
+    """Movement between two postures in the style of a corpus, with a proof of how close to the best it is."""
+    _help_alone(context)
 
 
 @app.command(
-    epilog="Example: motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
-    "--corpus ballet -o tween.bvh"
+    epilog=example(
+        "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
+        "--corpus ballet -o tween.bvh"
+    )
 )
+@click.argument("a", type=FILE)
+@click.argument("b", type=FILE)
+@click.option("--corpus", required=True, metavar="NAME", help="Corpus whose style it takes, by name or folder.")
+@click.option("-o", "--output", type=FILE, help="Where the motion goes: .json or .bvh.")
+@click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
+@click.option("--moves", type=COUNT, metavar="N", help="Number of moves  [default: the search finds it]")
+@click.option("--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find.")
+@click.option("--strict", is_flag=True, help="No bridges: every move attested, or exit code 3.")
+@click.option("--node-budget", type=COUNT, metavar="N", default=200_000, help="Nodes that the search may hold at once.")
+@click.option("--problem", type=FILE, help="Where the problem that was solved goes: .cfn, for toulbar2.")
+@click.option(
+    "--weights", type=click.Choice(["conditional", "printed"]), default="conditional", help="How transitions weigh."
+)
+@click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of how joints coordinate.")
+@click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal.")
+@click.option("--tau", type=NATS, default=1.0, help="Nats for each move.")
+@click.option("--bridge-price", type=NATS, default=1.0, help="Nats for each degree of an unattested move.")
+@click.option("--fps", type=RATE, default=30.0, help="Frames a second of the motion.")
+@HOME
 def tween(
-    a: Annotated[Path, typer.Argument(help="Posture to start from, exactly.")],
-    b: Annotated[Path, typer.Argument(help="Posture to end in, exactly.")],
-    corpus: Annotated[str, typer.Option(help="Corpus whose style it takes, by name or folder.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Where the motion goes: .json or .bvh.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Where the report goes, as JSON; - prints it, alone.")] = None,
-    moves: Annotated[int | None, typer.Option(help="Number of moves [default: the search finds it].")] = None,
-    max_moves: Annotated[int, typer.Option(help="Greatest number of moves that it may find.")] = 60,
-    strict: Annotated[bool, typer.Option("--strict", help="No bridges: every move attested, or exit code 3.")] = False,
-    node_budget: Annotated[int, typer.Option(help="Nodes that the search may hold at once.")] = 200_000,
-    problem: Annotated[Path | None, typer.Option(help="Write the problem that was solved, in toulbar2's cfn.")] = None,
-    weights: Annotated[Weights, typer.Option(help="How transitions are weighed.")] = Weights.conditional,
-    lambda_: Annotated[float, typer.Option("--lambda", help="Factor of how joints coordinate.")] = 1.0,
-    beta: Annotated[float, typer.Option(help="Nats for each move that a joint waits at its goal.")] = 1.0,
-    tau: Annotated[float, typer.Option(help="Nats for each move.")] = 1.0,
-    bridge_price: Annotated[float, typer.Option(help="Nats for each degree of an unattested move.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Frames a second of the motion.")] = 30.0,
-    home: Home = None,
+    a: Path,
+    b: Path,
+    corpus: str,
+    output: Path | None,
+    report: Path | None,
+    problem: Path | None,
+    home: Path | None,
+    **options: Any,
 ) -> None:
-    """Find the best movement from posture A to posture B, and prove how good it is."""
+    """Find the best movement from A to B, and prove how good it is.
+
+    Exit code 3 says that nothing joins them under the rules that were asked for.
+    """
     from motionmind.engine import Engine
     from motionmind.formats import read_posture, write_atomically, write_motion
+    from motionmind.search.jit import is_compiled
 
-    alone = report is not None and str(report) == "-"
-    files = {
-        path: suffixes for path, suffixes in ((output, (".json", ".bvh")), (report, ()), (problem, (".cfn",))) if path
-    }
-    for path, suffixes in files.items():
-        _check_output(path, suffixes)
-    with _busy(_first_time()):
-        engine = Engine.load(corpus, home)
-        result = engine.tween(
-            read_posture(a),
-            read_posture(b),
-            moves=moves,
-            max_moves=max_moves,
-            strict=strict,
-            node_budget=node_budget,
-            weights=weights.value,
-            lambda_=lambda_,
-            beta=beta,
-            tau=tau,
-            bridge_price=bridge_price,
-            fps=fps,
-        )
+    alone = report == Path("-")
+    wanted = ((output, (".json", ".bvh")), (None if alone else report, ()), (problem, (".cfn",)))
+    written = _check_outputs([(path, suffixes) for path, suffixes in wanted if path])
+    engine = Engine.load(corpus, home)
+    ends = read_posture(a), read_posture(b)
+    if not is_compiled():
+        _progress("compiling the search, which takes half a minute, once")
+    result = engine.tween(*ends, **options)
     if output:
         write_motion(output, result.motion)
     if problem:
         write_atomically(problem, result.problem().encode())
+    text = json.dumps(result.report())
+    if alone:
+        click.echo(text)
+        return
     if report:
-        text = json.dumps(result.report()) + "\n"
-        if alone:
-            sys.stdout.write(text)
-        else:
-            write_atomically(report, text.encode())
-    if not alone:
-        _print_tween(result, [path for path in files if str(path) != "-"])
+        write_atomically(report, f"{text}\n".encode())
+    _print_tween(result, written)
 
 
-@app.command(epilog="Example: motionmind posture clip.bvh --frame 240 -o A.json")
-def posture(
-    clip: Annotated[Path, typer.Argument(help="Movement to take it from.")],
-    frame: Annotated[int, typer.Option(help="Number of the frame, from 0; negative from the end.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Where it goes: .json.")],
-    joints: Joints = None,
-    unit: Unit = None,
-) -> None:
-    """Take one posture out of a clip, on human23 where its joints map to it."""
+@app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))
+@click.argument("clip", type=FILE)
+@click.option(
+    "--frame", type=int, metavar="N", required=True, help="Number of the frame, from 0; negative from the end."
+)
+@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .txt.")
+@reading
+def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str | None, asf: Path | None) -> None:
+    """Take one posture out of a clip.
+
+    It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own.
+    """
     from motionmind.engine import own_skeleton
     from motionmind.formats import write_posture
 
-    _check_output(output, (".json",))
-    motion = own_skeleton(_read(clip, unit=unit), _mapping(joints))
+    _check_outputs([(output, (".json", ".bvh", ".txt"))])
+    motion = own_skeleton(_read(clip, unit, asf), _mapping(joints))
     write_posture(output, motion.posture(frame))
-    typer.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
+    click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
 
-@app.command(epilog="Example: motionmind convert 135_06.amc 135_06.bvh --skeleton human23")
+@app.command(epilog=example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
+@click.argument("source", type=FILE, metavar="IN")
+@click.argument("output", type=FILE, metavar="OUT")
+@click.option("--skeleton", type=click.Choice(["own", "human23"]), default="own", help="The file's joints, or human23.")
+@click.option("--fps", type=RATE, help="Frames a second  [default: as they are]")
+@reading
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Movement: .bvh, .amc, .json, .txt.")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="Where it goes: .bvh, .json, .txt.")],
-    skeleton: Annotated[Body, typer.Option(help="The file's own joints, or human23.")] = Body.own,
-    fps: Annotated[float | None, typer.Option(help="Frames a second [default: as they are].")] = None,
-    asf: Annotated[Path | None, typer.Option(help="AMC's skeleton [default: the one beside it].")] = None,
-    joints: Joints = None,
-    unit: Unit = None,
+    source: Path,
+    output: Path,
+    skeleton: str,
+    fps: float | None,
+    joints: Path | None,
+    unit: str | None,
+    asf: Path | None,
 ) -> None:
-    """Convert movement from one format to another."""
+    """Convert movement from one format to another.
+
+    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json or .txt.
+    """
     from motionmind.formats import write_motion
     from motionmind.retarget import to_human23
 
-    _check_output(output, (".bvh", ".json", ".txt"))
-    motion = _read(source, unit=unit, asf=asf)
-    if skeleton is Body.human23 or joints:
+    _check_outputs([(output, (".bvh", ".json", ".txt"))])
+    motion = _read(source, unit, asf)
+    if skeleton == "human23" or joints:
         motion = to_human23(motion, _mapping(joints))
     if fps is not None:
         motion = motion.resample(fps)
     write_motion(output, motion)
-    typer.echo(f"{output}: {len(motion)} frames, {len(motion.skeleton)} joints ({motion.skeleton.name})")
+    click.echo(f"{output}: {_count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 
 
-@corpora.command(epilog="Example: motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1")
+@app.group("corpus", cls=InOrder, invoke_without_command=True)
+@click.pass_context
+def corpora(context: click.Context) -> None:
+    """Build corpora from movement, and look at them."""
+    _help_alone(context)
+
+
+@corpora.command(epilog=example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
+@click.argument("name")
+@click.argument("files", type=FILE, nargs=-1, required=True)
+@click.option("--rate", type=RATE, help="Postures a second  [default: every frame]")
+@click.option(
+    "--tolerance",
+    multiple=True,
+    metavar="DEGREES",
+    default=("15",),
+    help="How far apart orientations of one state may lie; also JOINT=DEGREES, as often as you like.",
+)
+@click.option(
+    "--discretize",
+    metavar="KIND",
+    default="codebook",
+    help="codebook, quaternion, euler, or a library by name or file.",
+)
+@click.option(
+    "--facing",
+    type=click.Choice(["free", "stage"]),
+    default="free",
+    help="Whether postures that differ in where they face are one (free), or two (stage).",
+)
+@click.option(
+    "--skip",
+    type=click.IntRange(min=0),
+    metavar="N",
+    default=0,
+    help="Frames to drop at each clip's start, as a T-pose.",
+)
+@click.option(
+    "--flips",
+    type=click.Choice(["split", "keep", "drop"]),
+    default="split",
+    help="Where a joint jumps: split the clip there, keep it, or drop it.",
+)
+@click.option("--flip-angle", type=Number(0, 180), default=45.0, help="Degrees in one frame that are a jump.")
+@reading
+@click.option("--title", default="", show_default=False, help="A line on what it is.")
+@click.option("--author", default="", show_default=False, help="Who made the movement.")
+@click.option("--source", default="", show_default=False, help="Where it comes from.")
+@click.option("--licence", default="", show_default=False, help="Under which it may be used.")
+@HOME
 def build(
-    name: Annotated[str, typer.Argument(help="What the corpus is to be called.")],
-    files: Annotated[list[Path], typer.Argument(help="Movement, in any mix of formats that can be read.")],
-    rate: Annotated[float | None, typer.Option(help="Postures a second [default: every frame].")] = None,
-    tolerance: Annotated[
-        list[str] | None, typer.Option(help="Degrees within which orientations are one state; or JOINT=DEGREES.")
-    ] = None,
-    discretize: Annotated[
-        str, typer.Option(help="codebook, quaternion, euler, or a library by name or file.")
-    ] = "codebook",
-    facing: Annotated[Facing, typer.Option(help="free: pool over facings; stage: they are states.")] = Facing.free,
-    skip: Annotated[int, typer.Option(help="Frames to drop at each clip's start, such as a T-pose.")] = 0,
-    flips: Annotated[Flips, typer.Option(help="Where a joint jumps: split the clip, keep it, drop it.")] = Flips.split,
-    flip_angle: Annotated[float, typer.Option(help="Degrees in one frame that are a jump.")] = 45.0,
-    joints: Joints = None,
-    unit: Unit = None,
-    title: Annotated[str, typer.Option(help="A line on what it is.")] = "",
-    author: Annotated[str, typer.Option(help="Who made the movement.")] = "",
-    source: Annotated[str, typer.Option(help="Where it comes from.")] = "",
-    licence: Annotated[str, typer.Option(help="Under which it may be used.")] = "",
-    home: Home = None,
+    name: str,
+    files: tuple[Path, ...],
+    rate: float | None,
+    tolerance: tuple[str, ...],
+    discretize: str,
+    facing: Facing,
+    skip: int,
+    flips: Flips,
+    flip_angle: float,
+    joints: Path | None,
+    unit: str | None,
+    asf: Path | None,
+    home: Path | None,
+    **about: str,
 ) -> None:
-    """Learn a corpus from movement files; one of the same name is replaced."""
+    """Learn a corpus from movement files.
+
+    They may be of any mix of formats, all on the same joints. A corpus of yours with the same name is replaced.
+    """
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make
     from motionmind.engine import Engine, own_skeleton
 
     place = place_for(name, home)
-    default, per_joint = _tolerances(tolerance or [])
-    discretization = make(discretize, default, per_joint)
+    discretization = make(discretize, *_tolerances(tolerance))
     mapping = _mapping(joints)
-    with _progress("reading", len(files)) as step:
+    names = _clip_names(files)
 
-        def clips() -> Iterator[Motion]:
-            for file in files:
-                yield own_skeleton(_read(file, unit=unit), mapping)
-                step(f"reading {file.name}")
-            step("learning")
+    def clips() -> Iterator[Motion]:
+        with click.progressbar(files, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+            for file in bar:
+                yield own_skeleton(replace(_read(file, unit, asf), name=names[file]), mapping)
+        _progress("learning")
 
-        engine = Engine.fit(
-            clips(),
-            name=name,
-            rate=rate,
-            skip=skip,
-            facing=facing.value,
-            discretization=discretization,
-            flips=flips.value,
-            flip_degrees=flip_angle,
-            title=title,
-            author=author,
-            source=source,
-            licence=licence,
-        )
-        engine.save(place)
+    engine = Engine.fit(
+        clips(),
+        name=name,
+        rate=rate,
+        skip=skip,
+        facing=facing,
+        discretization=discretization,
+        flips=flips,
+        flip_degrees=flip_angle,
+        **about,
+    )
+    engine.save(place)
     _print_check(engine.check())
-    typer.echo(f"built {place}")
+    click.echo(f"built {place}")
 
 
-@corpora.command("list", epilog="Example: motionmind corpus list")
-def list_corpora(home: Home = None) -> None:
+@corpora.command("list", epilog=example("motionmind corpus list"))
+@JSON
+@HOME
+def list_corpora(as_json: bool, home: Path | None) -> None:
     """List the corpora that there are, bundled and your own."""
     from motionmind.corpus.store import known, read_manifest
 
+    found = []
     for name, folder in known(home).items():
-        typer.echo(f"{name:16} {read_manifest(folder).get('title') or ''}  ({folder})")
-
-
-@corpora.command(epilog="Example: motionmind corpus info ballet --json")
-def info(name: Annotated[str, typer.Argument(help="Corpus.")], as_json: Json = False, home: Home = None) -> None:
-    """Say what a corpus is and how large."""
-    found = _load(name, home).info()
+        try:
+            title = str(read_manifest(folder).get("title") or "")
+        except MotionMindError as error:
+            title = "cannot be read"
+            click.echo(f"note: {error}", err=True)
+        found.append({"name": name, "title": title, "folder": str(folder)})
     if as_json:
-        typer.echo(json.dumps(found))
+        click.echo(json.dumps(found))
+        return
+    width = max((len(entry["name"]) for entry in found), default=0)
+    for entry in found:
+        click.echo(f"{entry['name']:{width}}  {entry['title'] or '-'}  ({entry['folder']})")
+
+
+@corpora.command(epilog=example("motionmind corpus info ballet --json"))
+@click.argument("name")
+@JSON
+@HOME
+def info(name: str, as_json: bool, home: Path | None) -> None:
+    """Say what a corpus is and how large."""
+    from motionmind.engine import Engine
+
+    found = Engine.load(name, home).info()
+    if as_json:
+        click.echo(json.dumps(found))
         return
     for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
-        typer.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
-    typer.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+        click.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
+    click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
     for clip in found["clips"]:
-        typer.echo(f"  {clip['name']:16} {clip['postures']:5}  {clip['about']}")
+        click.echo(f"  {clip['name']:16} {clip['postures']:5}  {clip['about']}".rstrip())
 
 
-@corpora.command(epilog="Example: motionmind corpus check ballet --pairs 500 --seed 1")
-def check(
-    name: Annotated[str, typer.Argument(help="Corpus.")],
-    as_json: Json = False,
-    pairs: Annotated[int, typer.Option(help="Random pairs of postures to try to join.")] = 2000,
-    seed: Annotated[int, typer.Option(help="Of the random pairs.")] = 0,
-    home: Home = None,
-) -> None:
-    """Say how well a corpus hangs together, and what faults its recordings have."""
-    found = _load(name, home).check(pairs, seed)
+@corpora.command(epilog=example("motionmind corpus check ballet --pairs 500 --seed 1"))
+@click.argument("name")
+@JSON
+@click.option("--pairs", type=COUNT, metavar="N", default=2000, help="Random pairs of postures to try to join.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, help="Of the random pairs.")
+@HOME
+def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) -> None:
+    """Say how well a corpus hangs together, and its recordings' faults."""
+    from motionmind.engine import Engine
+
+    found = Engine.load(name, home).check(pairs, seed)
     if as_json:
-        typer.echo(json.dumps(found))
+        click.echo(json.dumps(found))
     else:
         _print_check(found)
 
 
-# --- what the commands share -------------------------------------------------------------------------------------------
+# --- what the commands share ----------------------------------------------------------------------------------------
 
 
-def _load(name: str, home: Path | None) -> Engine:
-    from motionmind.engine import Engine
+def _help_alone(context: click.Context) -> None:
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
-    return Engine.load(name, home)
 
-
-def _read(path: Path, unit: str | None = None, asf: Path | None = None) -> Motion:
+def _read(path: Path, unit: str | None, asf: Path | None) -> Motion:
     from motionmind.formats import read_motion
 
-    try:
-        length: str | float | None = float(unit) if unit else None
-    except ValueError:
-        length = unit
-    return read_motion(path, unit=length, asf=asf)
+    return read_motion(path, unit=unit, asf=asf)
 
 
 def _mapping(path: Path | None) -> dict[str, str] | None:
@@ -304,13 +416,24 @@ def _mapping(path: Path | None) -> dict[str, str] | None:
     return read_joint_mapping(path) if path else None
 
 
-def _tolerances(given: list[str]) -> tuple[float, dict[str, float]]:
+def _clip_names(files: Sequence[Path]) -> dict[Path, str]:
+    """What each file's clip is called: its stem, or as much more of its path as tells it from the others."""
+    if len(set(files)) < len(files):
+        twice = next(file for file, count in Counter(files).items() if count > 1)
+        raise MotionMindError(f"{twice}: given twice")
+    shorter = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
+    taken = [Counter(names.values()) for names in shorter]
+    unique = ([names[f] for names, count in zip(shorter, taken, strict=True) if count[names[f]] == 1] for f in files)
+    return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
+
+
+def _tolerances(given: Sequence[str]) -> tuple[float, dict[str, float]]:
     """The tolerance for all joints, and those of single ones, from words such as "15" and "left_hip=10"."""
     default, per_joint = 15.0, {}
     for word in given:
-        joint, _, degrees = word.rpartition("=")
+        joint, equals, degrees = word.rpartition("=")
         try:
-            value = float(degrees)
+            value = float(degrees if joint or not equals else "")
         except ValueError:
             raise MotionMindError(f"--tolerance {word}: give degrees, or JOINT=DEGREES such as left_hip=10") from None
         if joint:
@@ -320,121 +443,127 @@ def _tolerances(given: list[str]) -> tuple[float, dict[str, float]]:
     return default, per_joint
 
 
-def _check_output(path: Path, suffixes: tuple[str, ...]) -> None:
-    """Refuse, before anything is done, a file that could not be written after it."""
-    if str(path) == "-":
-        return
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise MotionMindError(
-            f"{path}: cannot write {path.suffix or 'no suffix'}; {', '.join(suffixes)} can be written"
-        )
-    folder = path.resolve().parent
-    if not folder.is_dir():
-        raise MotionMindError(f"{path}: cannot be written: there is no folder {folder}")
-    if path.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
-        raise MotionMindError(f"{path}: cannot be written: {'it is a folder' if path.is_dir() else 'not permitted'}")
+def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]]) -> list[Path]:
+    """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
+    paths = [path for path, _ in wanted]
+    for path, suffixes in wanted:
+        folder = path.resolve().parent
+        if suffixes and path.suffix.lower() not in suffixes:
+            fault = f"the name must end in one of {', '.join(suffixes)}"
+        elif paths.count(path) > 1:
+            fault = "it is to be written twice"
+        elif not folder.is_dir():
+            fault = f"there is no folder {folder}"
+        elif not os.access(path if path.exists() else folder, os.W_OK):
+            fault = "not permitted"
+        else:
+            continue
+        raise MotionMindError(f"{path}: cannot be written: {fault}")
+    return paths
 
 
-def _first_time() -> str:
-    from motionmind.search.jit import is_compiled
-
-    return "" if is_compiled() else "compiling the search, once (up to half a minute)"
-
-
-@contextmanager
-def _busy(message: str) -> Iterator[None]:
-    """Show that something takes long, on a terminal's standard error."""
-    if not message:
-        yield
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(message):
-        yield
+def _progress(message: str) -> None:
+    """Say on a terminal what takes long."""
+    if sys.stderr.isatty():
+        click.echo(message, err=True)
 
 
-@contextmanager
-def _progress(what: str, total: int) -> Iterator[Any]:
-    """A progress bar on a terminal's standard error; yields what moves it on by one."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total + 1)
-        yield lambda description: bar.update(task, advance=1, description=description)
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
-def _print_tween(result: Tween, files: list[Path]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    seconds = result.motion.times[-1]
-    table.add_row("moves", f"{result.moves}, in {seconds:.2f} s ({len(result.motion)} frames)")
-    table.add_row("cost", f"{result.cost:.3f} nats")
-    bound = f"no path costs less than {result.lower_bound:.3f}"
-    table.add_row("proven", f"{result.status}: {bound}" + (f", gap {result.gap:.2%}" if result.gap > 1e-9 else ""))
-    table.add_row("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus")
+def _print_tween(result: Tween, files: Sequence[Path]) -> None:
+    seconds = float(result.motion.times[-1])
     bridged = [f"{b.joint} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
-    table.add_row("bridged", ", ".join(bridged) or "none")
-    waited: dict[str, int] = {}
-    for wait in result.waits:
-        waited[wait.joint] = waited.get(wait.joint, 0) + 1
-    table.add_row("waited", ", ".join(f"{joint} {count}" for joint, count in waited.items()) or "none")
+    waited = Counter(wait.joint for wait in result.waits)
+    lines = [
+        ("moves", f"{result.moves}, in {seconds:.2f} s ({_count(len(result.motion), 'frame')})"),
+        ("cost", f"{result.cost:.3f} nats"),
+        ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
+        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus"),
+        ("bridged", ", ".join(bridged) or "none"),
+        ("waited", ", ".join(f"{joint} {_count(count, 'move')}" for joint, count in waited.items()) or "none"),
+    ]
     for end, row in zip("AB", result.snap_degrees, strict=True):
         worst = int(row.argmax())
-        table.add_row(
-            f"{end} is off", f"{row.mean():.1f} degrees a joint, at most {row[worst]:.1f} ({result.joints[worst]})"
-        )
+        mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
+        lines.append((end, f"{mean} off the corpus's states, at most {most}"))
     if files:
-        table.add_row("written", ", ".join(map(str, files)))
-    Console(soft_wrap=True).print(table)
+        lines.append(("written", ", ".join(map(click.format_filename, files))))
+    for name, line in lines:
+        click.echo(f"{name:10}{line}")
 
 
 def _print_check(found: dict[str, Any]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     rate = f"{found['rate']:g} a second" if found["rate"] else "keyframes"
-    typer.echo(
-        f"{found['name']}: {len(found['clips'])} clips, {found['postures']} postures ({rate}), {found['skeleton']}"
+    click.echo(
+        f"{found['name']}: {_count(len(found['clips']), 'clip')}, {found['postures']} postures ({rate}), "
+        f"{found['skeleton']}"
     )
-    table = Table(box=None, pad_edge=False)
-    for column in ("joint", "states", "edges", "out-degree"):
-        table.add_column(column, justify="left" if column == "joint" else "right")
+    width = max(len(joint) for joint in found["states"])
+    click.echo(f"{'joint':{width}}  states  edges  out-degree")
     for joint, states in found["states"].items():
-        table.add_row(joint, str(states), str(found["edges"][joint]), f"{found['out_degree'][joint]:.2f}")
-    Console(soft_wrap=True).print(table)
-    typer.echo(f"{found['joinable']:.1%} of {found['pairs']} random pairs of postures can be joined without a bridge")
-    faults = found["faults"]
+        click.echo(f"{joint:{width}}  {states:6}  {found['edges'][joint]:5}  {found['out_degree'][joint]:10.2f}")
+    click.echo(f"{found['joinable']:.1%} of {found['pairs']} random pairs of postures can be joined without a bridge")
+    faults: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for fault in found["faults"]:
+        faults.setdefault((fault["clip"], fault["joint"]), []).append(fault)
     if faults:
-        typer.echo(f"{len(faults)} faults of the recordings, joints that turn too far in one frame:")
-    for fault in faults[:20]:
-        typer.echo(f"  {fault['clip']}: {fault['joint']} by {fault['degrees']:.0f} degrees at frame {fault['frame']}")
-    if len(faults) > 20:
-        typer.echo(f"  and {len(faults) - 20} more (--json lists all)")
+        total = _count(len(found["faults"]), "fault")
+        click.echo(f"{total} of the recordings, where a joint turns too far in one frame (all with --json):")
+    for (clip, joint), jumps in faults.items():
+        frames = ", ".join(str(jump["frame"]) for jump in jumps[:3])
+        more = f" and {len(jumps) - 3} more" if len(jumps) > 3 else ""
+        most = max(jump["degrees"] for jump in jumps)
+        click.echo(f"  {clip}: {joint} by up to {most:.0f} degrees, at frame {frames}{more}")
 
 
-def _say(message: Warning | str, category: type[Warning], *_: Any) -> None:
+# --- the door -------------------------------------------------------------------------------------------------------
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 2 for bad input, in one line; 3 where there is no path, with the diagnosis."""
+    log, notes = logging.getLogger("motionmind"), Notes(logging.INFO)
+    log.addHandler(notes)
+    log.setLevel(logging.INFO)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", MotionMindWarning)
+            warnings.showwarning = _say
+            sys.exit(_run(arguments))
+    finally:
+        log.removeHandler(notes)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """The exit code of the command line; what was wrong goes to standard error."""
+    code = BAD_INPUT
+    try:
+        return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
+    except click.Abort:  # Ctrl-C
+        return INTERRUPTED
+    except click.UsageError as error:
+        message = error.format_message() + (f" ({error.ctx.command_path} --help shows how)" if error.ctx else "")
+    except NoPathError as error:
+        message, code = str(error), NO_PATH
+    except MotionMindError as error:
+        message = str(error)
+    except OSError as error:  # of standard output: files are written by those who catch theirs
+        message = f"cannot write: {error.strerror or error}"
+    except MemoryError:
+        message = "not enough memory for this"
+    click.echo(f"error: {message}", err=True)
+    return code
+
+
+def _say(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     """Warnings of our own are notes to the user; others are for developers and stay away from the command line."""
     if issubclass(category, MotionMindWarning):
-        typer.echo(f"note: {message}", err=True)
-
-
-def main() -> None:
-    """Run the command line: exit code 2 for bad input, in one line; 3 where there is no path, with the diagnosis."""
-    warnings.showwarning = _say
-    warnings.simplefilter("always", MotionMindWarning)
-    try:
-        app()
-    except NoPathError as error:
-        typer.echo(f"error: {error}", err=True)
-        raise SystemExit(PATH_MISSING) from None
-    except MotionMindError as error:
-        typer.echo(f"error: {error}", err=True)
-        raise SystemExit(BAD_INPUT) from None
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise SystemExit(1) from None
+        click.echo(f"note: {message}", err=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -15,20 +16,22 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind import survey
 from motionmind.corpus import store
-from motionmind.corpus.corpus import FACING, Clip, Corpus, Facing, Fault
+from motionmind.corpus.corpus import FACING, Corpus, Facing
 from motionmind.corpus.gather import FLIP_DEGREES, Flips, gather
+from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Codebook, Discretization, StateSpace, from_spec
-from motionmind.errors import MotionMindError, NoPathError, SkeletonError
+from motionmind.errors import FormatError, MotionMindError, NoPathError, SkeletonError
 from motionmind.formats import read_motion
 from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination, fit_network
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights
-from motionmind.motion import Motion, Posture
+from motionmind.motion import FASTEST, Motion, Posture
 from motionmind.realise.realise import realise
 from motionmind.realise.root import Carriage, learn_carriage
 from motionmind.retarget import joint_mapping, to_human23
 from motionmind.search.costs import price
+from motionmind.search.problem import Model
 from motionmind.search.solve import Certificate, Rules, solve
 from motionmind.skeleton import Skeleton, human23
 from motionmind.tween import Posed, Tween, diagnose, explain
@@ -43,6 +46,9 @@ _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
 
 NODE_BUDGET = 200_000
 MAX_MOVES = 60
+MOST_MOVES = 10_000  # what is asked for beyond these is a slip of the keyboard, and more than memory holds
+MOST_NODES = 1_000_000_000
+SLOWEST = 0.01  # frames a second
 
 
 def own_skeleton(movement: _Movement, joints: Mapping[str, str] | None = None) -> _Movement:
@@ -70,6 +76,7 @@ class Engine:
     grammar: Grammar
     carriage: Carriage
     load_seconds: float = 0.0
+    _priced: dict[tuple[Weights, float, float | None], Model] = field(default_factory=dict, repr=False)
 
     # --- learning ---------------------------------------------------------------------------------------------------
 
@@ -152,9 +159,9 @@ class Engine:
             "states": self.states,
             "centres": space.centres,
         }
-        for name in _PARTS:
-            part = getattr(self, name) if name == "carriage" else getattr(self.grammar, name)
-            arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(part)}
+        for name, kind in _PARTS.items():
+            part = self.carriage if kind is Carriage else getattr(self.grammar, name)
+            arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
         skeleton = corpus.skeleton
         manifest = {
             **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
@@ -173,7 +180,6 @@ class Engine:
                 "tolerances": space.tolerances.tolist(),
                 "labels": space.labels,
             },
-            "arrays": list(arrays),
         }
         store.save(Path(folder), manifest, arrays)
 
@@ -191,43 +197,42 @@ class Engine:
         folder = store.locate(name, home)
         if store.read_manifest(folder)["format"] == store.BUILT:
             return cls._open(folder, began)
-        built = store.cache() / f"{folder.name}-{store.fingerprint(folder)}"
-        if not (built / store.MANIFEST).is_file():
-            engine = cls.learn(*_source(folder))
-            try:
-                engine.save(built)
-            except MotionMindError:
-                return engine  # nowhere to keep it: it is learned again next time
-        return cls._open(built, began)
+        manifest = parse_manifest(store.read_manifest(folder), SourceManifest, folder / store.MANIFEST)
+        files = [folder / store.MANIFEST, *(folder / clip.file for clip in manifest.clips)]
+        built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
+        try:
+            return cls._open(built, began)
+        except MotionMindError:  # it is not there yet, or is damaged
+            engine = cls.learn(*_source(folder, manifest))
+        with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
+            engine.save(built)
+        return replace(engine, load_seconds=perf_counter() - began)
 
     @classmethod
     def _open(cls, folder: Path, began: float) -> Engine:
-        manifest, arrays = store.load(folder)
-        body = manifest["skeleton"]
-        skeleton = Skeleton(
-            body["name"],
-            tuple(body["names"]),
-            tuple(body["parents"]),
-            np.array(body["offsets"]),
-            np.array(body["tips"]),
-        )
+        saved, arrays = store.load(folder)
+        path = folder / store.MANIFEST
+        manifest = parse_manifest(saved, BuiltManifest, path)
+        missing = [name for name in _ARRAYS if name not in arrays]
+        if missing:
+            raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
+        body, states = manifest.skeleton, manifest.space
         corpus = Corpus(
-            skeleton=skeleton,
-            clips=tuple(Clip(**clip) for clip in manifest["clips"]),
+            skeleton=Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips)),
+            clips=manifest.clips,
             rotations=arrays["rotations"],
             root=arrays["root"],
             times=arrays["times"],
-            faults=tuple(Fault(**fault) for fault in manifest["faults"]),
-            **{key: manifest[key] for key in _CORPUS_KEYS},
+            faults=manifest.faults,
+            **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
-        states = manifest["space"]
         space = StateSpace(
             corpus.lanes,
             arrays["centres"],
-            np.array(states["starts"]),
-            states["kind"],
-            np.array(states["tolerances"]),
-            tuple(tuple(labels) for labels in states["labels"]),
+            np.array(states.starts),
+            states.kind,
+            np.array(states.tolerances),
+            states.labels,
         )
         grammar = Grammar(
             corpus.lanes,
@@ -285,7 +290,7 @@ class Engine:
         states = self.space.assign(ends)
         snap = self.space.distance(ends, states)
         start, goal = states.astype(np.int64)
-        model = price(self.grammar, weights, lambda_, None if strict else bridge_price)
+        model = self._model(weights, lambda_, None if strict else bridge_price)
         rules = Rules(beta, tau, moves or 1, moves or max_moves, node_budget)
         posing = perf_counter() - began
         if moves is None and _same(a, b):
@@ -327,6 +332,14 @@ class Engine:
             },
             posed=Posed(model, start, goal, rules),
         )
+
+    def _model(self, weights: Weights, coordination: float, bridge_price: float | None) -> Model:
+        """The costs of the grammar, kept from one question to the next as long as they are asked for alike."""
+        asked = (weights, coordination, bridge_price)
+        if asked not in self._priced:
+            self._priced.clear()
+            self._priced[asked] = price(self.grammar, *asked)
+        return self._priced[asked]
 
     def _on_skeleton(self, posture: Posture, which: str) -> Posture:
         """The posture on the corpus's joints; SkeletonError names the difference."""
@@ -388,7 +401,11 @@ class Engine:
 
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
-_PARTS = ("transitions", "bridges", "coordination", "carriage")
+_PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
+_ARRAYS = (
+    *("rotations", "root", "times", "states", "centres"),
+    *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
+)
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
@@ -421,20 +438,20 @@ def _with_facing(space: StateSpace, turns: NDArray[np.float64]) -> tuple[StateSp
     return wider, steps
 
 
-def _source(folder: Path) -> tuple[Corpus, Discretization]:
+def _source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discretization]:
     """A corpus that people wrote: its clips, and the discretization that its manifest names."""
-    manifest = store.read_manifest(folder)
-    motions = [read_motion(folder / clip["file"]) for clip in manifest["clips"]]
+    try:
+        discretization = from_spec(manifest.discretization)
+    except FormatError as error:
+        raise FormatError(str(error), path=folder / store.MANIFEST) from error
+    motions = [replace(read_motion(folder / clip.file), name=clip.name) for clip in manifest.clips]
     corpus = gather(
-        manifest["name"],
-        [own_skeleton(motion) for motion in motions],
-        rate=manifest["rate"],
-        facing=manifest["facing"],
+        motions=[own_skeleton(motion) for motion in motions],
         flips="keep",
-        about={clip["name"]: clip["about"] for clip in manifest["clips"]},
-        **{key: manifest[key] for key in ("title", "author", "source", "licence")},
+        about={clip.name: clip.about for clip in manifest.clips},
+        **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
     )
-    return corpus, from_spec(manifest["discretization"])
+    return corpus, discretization
 
 
 def _same(a: Posture, b: Posture) -> bool:
@@ -445,11 +462,15 @@ def _same(a: Posture, b: Posture) -> bool:
 def _check_options(
     moves: int | None, max_moves: int, node_budget: int, fps: float, weights: str, *prices: float
 ) -> None:
-    for name, value in (("moves", moves), ("max_moves", max_moves), ("node_budget", node_budget)):
-        if value is not None and value < 1:
-            raise MotionMindError(f"{name} must be at least 1, not {value}")
-    if not (np.isfinite(fps) and fps > 0.0):
-        raise MotionMindError(f"fps must be a positive number of frames a second, not {fps}")
+    for name, value, most in (
+        ("moves", moves, MOST_MOVES),
+        ("max_moves", max_moves, MOST_MOVES),
+        ("node_budget", node_budget, MOST_NODES),
+    ):
+        if value is not None and not (isinstance(value, int | np.integer) and 1 <= value <= most):
+            raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
+    if not SLOWEST <= fps <= FASTEST:
+        raise MotionMindError(f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {fps}")
     if weights not in ("conditional", "printed"):
         raise MotionMindError(f"weights must be 'conditional' or 'printed', not {weights!r}")
     for name, price_ in zip(("lambda", "beta", "tau", "bridge_price"), prices, strict=True):

@@ -13,6 +13,8 @@ from motionmind.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 
+FASTEST = 10_000.0  # frames a second; more is a slip of the keyboard, not a camera
+
 
 @dataclass(frozen=True, eq=False)
 class Posture:
@@ -64,7 +66,10 @@ class Motion:
         if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError(f"{self.name or 'motion'}: times must be finite and increasing")
         _settle(self, (len(times), len(self.skeleton), 4), (len(times), 3))
-        for name, array in (("times", times), ("moves", np.array(self.moves, dtype=np.float64))):
+        moves = np.array(self.moves, dtype=np.float64)
+        if moves.ndim != 1 or not np.isfinite(moves).all() or np.any(np.diff(moves) <= 0.0):
+            raise MotionMindError(f"{self.name or 'motion'}: the moves' times must be finite and increasing")
+        for name, array in (("times", times), ("moves", moves)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -99,15 +104,17 @@ class Motion:
         Frames that fall on a frame of the source are that frame. A motion shorter than one step keeps its
         first posture. Jitter of the source's clock of up to a thousandth of a step does not lose the last one.
         """
-        if not (np.isfinite(rate) and rate > 0.0):
-            raise MotionMindError(f"a rate must be a positive number of postures a second, not {rate}")
+        if not 0.0 < rate <= FASTEST:
+            raise MotionMindError(
+                f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
+            )
+        if len(self) == 1:
+            return self
         span = self.times[-1] - self.times[0]
         steps = int(np.floor(span * rate + 1e-3))
         times = self.times[0] + np.arange(steps + 1) / rate
         at = np.minimum(times, self.times[-1])
-        after = np.clip(np.searchsorted(self.times, at, side="right"), 1, max(len(self) - 1, 1))
-        if len(self) == 1:
-            return self
+        after = np.clip(np.searchsorted(self.times, at, side="right"), 1, len(self) - 1)
         before = after - 1
         share = (at - self.times[before]) / (self.times[after] - self.times[before])
         return replace(

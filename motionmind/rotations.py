@@ -7,6 +7,8 @@ global rotation is `mul(parent_global, local)`. Angles are in radians. Formulas 
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,17 +20,14 @@ IDENTITY.setflags(write=False)
 
 def mul(a: Array, b: Array) -> Array:
     """Product [..., 4]: the rotation `b` followed by the rotation `a`."""
-    ax, ay, az, aw = np.moveaxis(a, -1, 0)
-    bx, by, bz, bw = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
-    )
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 4))
+    out[..., 0] = aw * bx + ax * bw + ay * bz - az * by
+    out[..., 1] = aw * by - ax * bz + ay * bw + az * bx
+    out[..., 2] = aw * bz + ax * by - ay * bx + az * bw
+    out[..., 3] = aw * bw - ax * bx - ay * by - az * bz
+    return out
 
 
 def inv(q: Array) -> Array:
@@ -48,10 +47,17 @@ def mul_inv(a: Array, b: Array) -> Array:
 
 def mul_vec(q: Array, v: Array) -> Array:
     """The vectors `v` [..., 3] turned by `q` [..., 4]."""
-    # v + 2 w (u x v) + 2 u x (u x v), with u the vector part: 15 products fewer than two quaternion products.
+    # v + w t + u x t with t = 2 (u x v) and u the vector part: fewer products than two of quaternions.
     u, w = q[..., :3], q[..., 3:]
-    t = 2.0 * np.cross(u, v)
-    return np.asarray(v + w * t + np.cross(u, t), dtype=np.float64)
+    t = 2.0 * _cross(u, v)
+    return np.asarray(v + w * t + _cross(u, t))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Vector product [..., 3]; np.cross takes several times as long on small arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def normalise(q: ArrayLike) -> Array:
@@ -117,31 +123,34 @@ def from_euler(order: str, angles: Array) -> Array:
     "ZXY" turns about z, then about the new x, then about the newest y: the product Rz Rx Ry, BVH's meaning of
     channels in that order. Any number of letters x, y, z, in either case.
     """
-    q = np.broadcast_to(IDENTITY, (*angles.shape[:-1], 4))
-    for i, letter in enumerate(order.lower()):
-        q = mul(q, from_axis_angle(np.eye(3)["xyz".index(letter)], angles[..., i]))
-    return np.array(q)
+    axes = np.eye(3)
+    turns = [from_axis_angle(axes["xyz".index(letter)], angles[..., i]) for i, letter in enumerate(order.lower())]
+    return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
 
 
 def to_euler(order: str, q: Array) -> Array:
     """Angles [..., 3] in radians with `from_euler(order, angles) == q`, for three different axes.
 
-    At gimbal lock (middle angle of 90 degrees) the last angle is set to 0. Source: Shuster, "A survey of
-    attitude representations", J. Astronaut. Sci. 41:4 (1993), the asymmetric sequences.
+    At gimbal lock (middle angle within 1e-9 of a right angle) the last angle is set to 0. Source: Shuster, "A survey
+    of attitude representations", J. Astronaut. Sci. 41:4 (1993), the asymmetric sequences.
     """
     i, j, k = ("xyz".index(letter) for letter in order.lower())
     if len({i, j, k}) != 3:
         raise ValueError(f"rotation order must name x, y and z once each, not {order!r}")
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     m = to_matrix(q)
-    middle = np.arcsin(np.clip(sign * m[..., i, k], -1.0, 1.0))
-    locked = np.abs(m[..., i, k]) > 1.0 - 1e-14
+    cosine = np.hypot(m[..., i, i], m[..., i, j])
+    middle = np.arctan2(sign * m[..., i, k], cosine)  # arcsin would lose half the digits near a right angle
+    locked = cosine < 1e-9
     first = np.where(
         locked,
         np.arctan2(sign * m[..., k, j], m[..., j, j]),
         np.arctan2(-sign * m[..., j, k], m[..., k, k]),
     )
-    last = np.where(locked, 0.0, np.arctan2(-sign * m[..., i, j], m[..., i, i]))
+    # Of what is left when the first turn is undone: near the lock, where the first is ill-determined, the last
+    # makes up for it.
+    undone = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
+    last = np.where(locked, 0.0, np.arctan2(sign * undone[..., i], undone[..., j]))
     return np.stack([first, middle, last], axis=-1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -35,16 +36,16 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        offsets = np.array(self.offsets, dtype=np.float64).reshape(-1, 3)
+        offsets = np.array(self.offsets, dtype=np.float64)
         tips = np.zeros((count, 3)) if len(self.tips) == 0 else np.array(self.tips, dtype=np.float64)
         if count == 0:
             raise SkeletonError(f"skeleton {self.name!r} has no joints")
         if len(self.parents) != count or offsets.shape != (count, 3) or tips.shape != (count, 3):
             raise SkeletonError(
-                f"skeleton {self.name!r}: {count} joints need as many parents, offsets and tips, "
-                f"not {len(self.parents)}, {len(offsets)} and {len(tips)}"
+                f"skeleton {self.name!r}: {count} joints need as many parents, offsets and tips in metres x, y, z, "
+                f"not {len(self.parents)}, {list(offsets.shape)} and {list(tips.shape)}"
             )
-        twice = sorted({name for name in self.names if self.names.count(name) > 1})
+        twice = sorted(name for name, times in Counter(self.names).items() if times > 1)
         if twice:
             raise SkeletonError(f"skeleton {self.name!r} names {', '.join(twice)} more than once")
         if self.parents[0] != -1:
@@ -88,22 +89,22 @@ class Skeleton:
 
         Proportions do not count: orientations mean the same on a taller body.
         """
-        missing = [name for name in self.names if name not in other.names]
-        extra = [name for name in other.names if name not in self.names]
+        mine, theirs = self._parent_names(), other._parent_names()
+        missing = [name for name in mine if name not in theirs]
+        extra = [name for name in theirs if name not in mine]
         if missing or extra:
             parts = [f"lacks {_some(missing)}"] * bool(missing) + [f"adds {_some(extra)}"] * bool(extra)
             return f"{other.name} {' and '.join(parts)}"
-        for name in self.names:
-            mine, theirs = self._parent_name(name), other._parent_name(name)
-            if mine != theirs:
-                return f"{name} hangs from {theirs} in {other.name}, from {mine} in {self.name}"
+        for name, parent in mine.items():
+            if theirs[name] != parent:
+                return f"{name} hangs from {theirs[name]} in {other.name}, from {parent} in {self.name}"
         if self.names != other.names:
             return f"{other.name} lists the same joints in another order"
         return None
 
-    def _parent_name(self, joint: str) -> str:
-        parent = self.parents[self.index(joint)]
-        return "nothing" if parent < 0 else self.names[parent]
+    def _parent_names(self) -> dict[str, str]:
+        above = ("nothing" if parent < 0 else self.names[parent] for parent in self.parents)
+        return dict(zip(self.names, above, strict=True))
 
     @property
     def height(self) -> float:

@@ -45,6 +45,8 @@ def check(
     """
     if pairs < 1:
         raise MotionMindError(f"the number of pairs must be at least 1, not {pairs}")
+    if seed < 0:
+        raise MotionMindError(f"a seed must be a whole number of at least 0, not {seed}")
     graph = grammar.transitions
     degree = np.diff(graph.indptr[graph.starts]) / graph.sizes()
     return {

@@ -534,7 +534,8 @@ class TestBundled:
 
     def test_a_wheel_carries_them_inside(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / "motionmind").mkdir()
-        monkeypatch.setattr("motionmind.__file__", str(tmp_path / "motionmind" / "__init__.py"))
+        there = tmp_path / "motionmind" / "corpus" / "bundled.py"
+        monkeypatch.setattr("motionmind.corpus.bundled.__file__", str(there))
         with pytest.raises(CorpusError, match="missing"):
             bundled("corpora")
         (tmp_path / "corpora").mkdir()

@@ -944,7 +944,6 @@ def compose(folder: Path) -> None:
         "source": "Composed by hand for MotionMind: compose.py, beside this file, holds every position and phrase",
         "facing": "stage",
         "rate": None,
-        "tolerance": TOLERANCE,
         "discretization": {"kind": "codebook", "tolerance": TOLERANCE},
         "clips": clips,
     }

@@ -78,8 +78,20 @@ class Corpus:
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:
             raise CorpusError(f"corpus {self.name!r} has no postures")
+        count = len(self.rotations)
+        if (self.rotations.shape, self.root.shape, self.times.shape) != (
+            (count, len(self.skeleton), 4),
+            (count, 3),
+            (count,),
+        ):
+            raise CorpusError(f"corpus {self.name!r}: rotations, root and times are not those of {count} postures")
+        bounds = [(clip.start, clip.stop) for clip in self.clips]
+        if [0, *(stop for _, stop in bounds)] != [*(start for start, _ in bounds), count]:
+            raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {count}")
         if self.facing not in ("free", "stage"):
             raise CorpusError(f"corpus {self.name!r}: facing must be 'free' or 'stage', not {self.facing!r}")
+        if FACING in self.skeleton.names:
+            raise CorpusError(f"corpus {self.name!r}: a joint cannot be called {FACING!r}; that is the body's turn")
 
     def __len__(self) -> int:
         return len(self.rotations)

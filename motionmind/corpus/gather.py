@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from dataclasses import replace
+from itertools import chain, count
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -51,7 +53,7 @@ def gather(
 
     Args:
         name: of the corpus.
-        motions: the recordings, named.
+        motions: the recordings, named; one of a name that is taken is numbered.
         rate: postures a second; None keeps every frame with its own time.
         skip: frames to drop at each recording's start, such as an added T-pose.
         facing: see Corpus.
@@ -64,10 +66,18 @@ def gather(
         source: where it comes from.
         licence: under which it may be used.
 
-    Raises CorpusError where nothing is left to learn from, or two recordings differ in their joints.
+    Raises CorpusError where nothing is left to learn from, two recordings differ in their joints, or an option is out
+    of its range.
     """
+    if skip < 0:
+        raise CorpusError(f"the number of frames to skip must be at least 0, not {skip}")
+    if flips not in get_args(Flips):
+        raise CorpusError(f"flips must be one of {', '.join(get_args(Flips))}, not {flips!r}")
+    if not 0.0 < flip_degrees <= 180.0:
+        raise CorpusError(f"the angle of a flip must be above 0 and at most 180 degrees, not {flip_degrees}")
     pieces: list[Motion] = []
     faults: list[Fault] = []
+    names: set[str] = set()
     first: Motion | None = None
     for recording in motions:
         first = first or recording
@@ -79,18 +89,19 @@ def gather(
             )
         if skip >= len(recording):
             raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
-        motion = recording.slice(skip, len(recording))
+        motion = replace(recording.slice(skip, len(recording)), name=_free(recording.name or "clip", names))
+        names.add(motion.name)
         found = find_flips(motion, flip_degrees)
         faults += [Fault(f.clip, f.joint, f.frame + skip, f.degrees) for f in found]
         if found and flips == "drop":
             continue
         cuts = sorted({f.frame for f in found}) if flips == "split" else []
         parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
-        pieces += _named([part.resample(rate) if rate else part for part in parts], motion.name)
+        pieces += _named([part if rate is None else part.resample(rate) for part in parts], motion.name)
     if first is None:
         raise CorpusError(f"corpus {name!r}: no recordings given")
     if not pieces:
-        raise CorpusError(f"corpus {name!r}: every recording has faults and was dropped")
+        raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
     lengths = np.cumsum([0, *(len(piece) for piece in pieces)])
     if lengths[-1] == len(pieces):
         what = f" at {rate:g} postures a second" if rate else ""
@@ -118,8 +129,12 @@ def gather(
 
 def _named(parts: list[Motion], name: str) -> list[Motion]:
     """Parts of a recording that was cut are numbered; a part of a single posture teaches no move and is left out."""
-    from dataclasses import replace
-
     if len(parts) == 1:
         return parts
     return [replace(part, name=f"{name}.{i}") for i, part in enumerate(parts, start=1) if len(part) > 1]
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """The name, or "name (2)" and so on if it is taken."""
+    numbered = (f"{name} ({i})" for i in count(2))
+    return next(free for free in chain([name], numbered) if free not in taken)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError
+from motionmind.formats.files import read_bytes
 
 FORMAT, VERSION = "motionmind-corpus", 1
 BUILT = "motionmind-built-corpus"
@@ -43,15 +46,16 @@ def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     corpora = known(folder)
     if name in corpora:
         return corpora[name]
-    if (Path(name) / MANIFEST).is_file():
-        return Path(name)
+    with suppress(OSError, ValueError):  # what cannot be a path at all: too long, with a zero byte
+        if name and (Path(name) / MANIFEST).is_file():
+            return Path(name)
     raise CorpusError(f"no corpus {name!r}; there are {', '.join(corpora) or 'none'}")
 
 
 def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Where a corpus that a user builds goes; CorpusError for a name that is none, or a bundled corpus's."""
-    if not name or name != Path(name).name or name.startswith("."):
-        raise CorpusError(f"{name!r} cannot be a corpus's name: use letters, digits, - and _")
+    if not re.fullmatch(r"\w[\w.-]{0,63}", name):
+        raise CorpusError(f"{name!r:.80} cannot be a corpus's name: use letters, digits, -, _ and . (64 at most)")
     if (bundled("corpora") / name / MANIFEST).is_file():
         raise CorpusError(f"{name!r} is the name of a bundled corpus; choose another")
     return home(folder) / "corpora" / name
@@ -62,7 +66,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
         manifest = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
-    except (OSError, msgspec.MsgspecError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
         raise FormatError(f"cannot be read as a corpus's manifest: {error}", path=path) from error
     if manifest.get("format") not in (FORMAT, BUILT) or manifest.get("version") != VERSION:
         raise FormatError(
@@ -74,45 +78,67 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a folder with its manifest and one .npy file an array; an older one is replaced when all is there."""
+    """Write a folder with its manifest and one .npy file an array; an older one is replaced when all is there.
+
+    CorpusError where it cannot be written, or where the folder holds anything that this did not write.
+    """
     aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     try:
+        if folder.exists() and any(entry.suffix != ".npy" and entry.name != MANIFEST for entry in folder.iterdir()):
+            raise CorpusError(f"{folder}: is no built corpus, so it is not replaced; choose another place")
         aside.mkdir(parents=True)
         for name, array in arrays.items():
             np.save(aside / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
-        head = {"format": BUILT, "version": VERSION, **manifest}
+        shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
+        head = {"format": BUILT, "version": VERSION, **manifest, "arrays": shapes}
         (aside / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(head), indent=1) + b"\n")
-        if folder.exists():
-            old = aside.with_name(f"{aside.name}-old")
-            folder.rename(old)
-            aside.rename(folder)
-            shutil.rmtree(old)
-        else:
-            aside.rename(folder)
+        _swap(aside, folder)
     except OSError as error:
         raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(aside, ignore_errors=True)
 
 
+def _swap(new: Path, folder: Path) -> None:
+    """Put a new folder in the place of an older one, which comes back if that fails."""
+    if not folder.exists():
+        new.rename(folder)
+        return
+    old = new.with_name(f"{new.name}-old")
+    folder.rename(old)
+    try:
+        new.rename(folder)
+    except BaseException:
+        old.rename(folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
 def load(folder: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """The manifest and the arrays of a folder, memory-mapped."""
+    """The manifest and the arrays of a folder, memory-mapped; FormatError where any is not as it was saved."""
     manifest = read_manifest(folder)
+    shapes = manifest.get("arrays")
+    if not isinstance(shapes, dict):
+        raise FormatError("does not say which arrays there are; build the corpus again", path=folder / MANIFEST)
     arrays = {}
-    for name in manifest["arrays"]:
+    for name, shape in shapes.items():
         path = folder / f"{name}.npy"
         try:
-            arrays[name] = np.load(path, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError) as error:
+            # A plain view: still mapped, without the subclass that makes every slice slower.
+            arrays[name] = np.asarray(np.lib.format.open_memmap(path, mode="r"))
+        except Exception as error:  # the header is Python, and a damaged one can raise whatever its parser does
             raise FormatError(f"cannot be read as an array: {error}; build the corpus again", path=path) from error
+        if [arrays[name].dtype.str, *arrays[name].shape] != shape:
+            raise FormatError("is not the array that was saved; build the corpus again", path=path)
     return manifest, arrays
 
 
-def fingerprint(folder: Path) -> str:
-    """A name for what a source corpus holds: a hash of all its files that a build reads."""
+def fingerprint(files: Iterable[Path]) -> str:
+    """A name for what is learned from these files: a hash of them, and of the code that learns."""
     digest = hashlib.sha256()
-    for path in sorted([folder / MANIFEST, *folder.glob("clips/*")]):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in [*sorted(Path(__file__).parents[1].rglob("*.py")), *files]:
+        data = read_bytes(path)
+        digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:16]
 
 

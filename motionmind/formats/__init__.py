@@ -88,7 +88,10 @@ def read_posture(
     """
     motion = read_motion(path, unit=unit, asf=asf, skeleton=skeleton)
     if frame is None and len(motion) > 1:
-        raise FormatError(f"{len(motion)} frames, where one posture was expected; say which frame", path=path)
+        raise FormatError(
+            f"{len(motion)} frames, where one posture was expected; say which frame (motionmind posture takes one out)",
+            path=path,
+        )
     return motion.posture(frame or 0)
 
 

@@ -61,7 +61,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
     body, times = _read_body(path)
     if unit is None:
         name, scale = guess_unit(body.skeleton)
-        _log.info("%s: one unit taken as %.5g m (%s)", path, scale, name)
+        _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
     else:
         scale = metres_per_unit(unit)
     for message in body.mended(scale):

@@ -43,7 +43,7 @@ def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Brid
     for lane, size in enumerate(transitions.sizes()):
         first = transitions.starts[lane]
         # Rounded, so that which of equally near states comes first does not hang on the last bit.
-        angles = np.round(np.degrees(_angles(centres[first : first + size])), 9)
+        angles = np.asarray(np.degrees(_angles(centres[first : first + size])).round(9), dtype=np.float64)
         near = _nearest(angles) | _spanning_tree(angles)
         rows = transitions.indptr[first : first + size + 1]
         attested = transitions.targets[rows[0] : rows[-1]]

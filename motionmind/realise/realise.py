@@ -9,7 +9,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Motion, Posture
-from motionmind.realise.root import Carriage, carry, stand
+from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.samples import choose_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
@@ -32,7 +32,8 @@ def realise(
     Its first and last frames are `a` and `b`, exactly. Between them each lane passes, at the times of the moves,
     through orientations that the corpus shows in its states; a C2 spline joins them. The root travels as the corpus's
     root does in these moves and ends where `b` stands. Its height keeps the lowest point of the body as far
-    above the floor as the postures have it that the orientations come from.
+    above the floor as the postures have it that the orientations come from; the floor is at 0, or lower under ends that
+    are.
 
     Args:
         path: states of the lanes.
@@ -45,7 +46,7 @@ def realise(
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
     """
     if len(path) == 1:
-        return a.as_motion()
+        return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", np.zeros(1))
     seconds = durations(path, grammar.transitions)
     frames = max(1, round(float(seconds.sum()) * fps))
     seconds *= frames / fps / seconds.sum()
@@ -56,12 +57,12 @@ def realise(
     # The facing's states are steps of a circle, which the corpus need not show: its lane is not sampled but turned.
     joints = len(a.skeleton)
     first, last = corpus.to_lanes(a.rotations), corpus.to_lanes(b.rotations)
-    orientations = corpus.to_lanes(corpus.rotations)
-    chosen = choose_samples(path[:, :joints], states, orientations, first, last)
+    orientations = corpus.to_lanes(corpus.rotations)[:, :joints]
+    chosen = choose_samples(path[:, :joints], states, orientations, first[:joints], last[:joints])
     inner = orientations[chosen, np.arange(joints)]
     between = rotation_spline(keys, np.concatenate([first[None, :joints], inner, last[None, :joints]]), times)
     if corpus.facing == "free":
-        headings = _headings(path[:, -1], grammar, first[-1], last[-1])
+        headings = _headings(path[:, -1], grammar, seconds, first[-1], last[-1])
         turn = rot.about_vertical(natural_spline(keys, headings, times))
         between = np.concatenate([between, turn[:, None]], axis=1)
     else:
@@ -70,28 +71,48 @@ def realise(
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     places = carry(path, headings, seconds, carriage.travel, grammar.transitions, a.root, b.root)
-    heights = np.array([_lowest(a), *np.median(carriage.clearance[chosen], axis=1), _lowest(b)])
+    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
+    low_a, low_b = (lowest(a.skeleton, end.rotations, end.root) for end in (a, b))
+    # Where they are below 0 so is their floor: a recording's own zero is often off.
+    floor = np.interp(keys[1:-1], keys[[0, -1]], np.minimum([low_a, low_b], 0.0))
+    heights = np.array([low_a, *(floor + np.median(carriage.clearance[chosen], axis=1)), low_b])
     root = stand(a.skeleton, rotations, natural_spline(keys, places, times), _eased(keys, heights, times))
     root[0], root[-1] = a.root, b.root
     return Motion(a.skeleton, rotations, root, times, "tween", keys)
 
 
-def _headings(path: NDArray[np.int32], grammar: Grammar, a: Floats, b: Floats) -> Floats:
+def _headings(path: NDArray[np.int32], grammar: Grammar, seconds: Floats, a: Floats, b: Floats) -> Floats:
     """Headings in radians [T + 1] of a path through facing states, unwrapped, `a` and `b` [4] at its ends.
 
-    Each move turns the short way between its states, as it was counted; what the ends lie off their states is spread
-    over the moves, so that steady turning stays steady.
+    Each move turns the short way between its states, as it was counted. A state is a step of the circle, and the body
+    may face anywhere in it: of all headings in the path's states those that turn most evenly, so that steady turning
+    stays steady however coarse the steps.
     """
-    first = grammar.transitions.starts[-2]
-    centres = rot.heading(grammar.centres[first + path])
-    turned = np.unwrap(centres)
+    ring = grammar.centres[grammar.transitions.starts[-2] :]
+    centres = np.unwrap(rot.heading(ring[path]))
     off = rot.heading(np.stack([a, b])) - centres[[0, -1]]
-    off -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
-    return np.asarray(turned + off[0] + (off[1] - off[0]) * np.linspace(0.0, 1.0, len(path)))
+    ends = centres[[0, -1]] + off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))
+    half = np.pi / len(ring)
+    return _evenest(ends, centres[1:-1] - half, centres[1:-1] + half, seconds)
 
 
-def _lowest(posture: Posture) -> float:
-    return float(posture.skeleton.positions_and_tips(posture.rotations, posture.root)[:, 1].min())
+def _evenest(ends: Floats, low: Floats, high: Floats, seconds: Floats) -> Floats:
+    """Numbers [T + 1] from ends[0] to ends[1], from `low` to `high` [T - 1] on the way, for which the sum of squared
+    steps, each over its seconds [T], is least: the taut string.
+
+    By relaxation: every other number is pulled to where its neighbours would have it, in turns, until all lie still.
+    """
+    out = np.concatenate([ends[:1], 0.5 * (low + high), ends[1:]])
+    pull = 1.0 / seconds
+    moved = np.inf
+    while moved > 1e-6:
+        before = out.copy()
+        for first in (1, 2):
+            here = np.arange(first, len(out) - 1, 2)
+            mean = (pull[here - 1] * out[here - 1] + pull[here] * out[here + 1]) / (pull[here - 1] + pull[here])
+            out[here] = np.clip(mean, low[here - 1], high[here - 1])
+        moved = float(np.abs(out - before).max())
+    return out
 
 
 def _eased(times: Floats, values: Floats, at: Floats) -> Floats:

@@ -32,9 +32,9 @@ class Carriage:
 
 def learn_carriage(corpus: Corpus, states: NDArray[np.int32], transitions: Transitions) -> Carriage:
     """How the bodies of a corpus travel and stand; `states` [N, L] are those of its postures."""
-    lowest = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)[..., 1].min(axis=-1)
-    floor = [np.quantile(lowest[clip.start : clip.stop], 0.05) for clip in corpus.clips]
-    clearance = np.maximum(lowest - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
+    low = lowest(corpus.skeleton, corpus.rotations, corpus.root)
+    floor = [np.quantile(low[clip.start : clip.stop], 0.05) for clip in corpus.clips]
+    clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
     return Carriage(_travel(corpus, states, transitions), clearance)
 
 
@@ -77,7 +77,11 @@ def carry(
 
 def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats) -> Floats:
     """Root positions [N, 3] that put each posture's lowest point `clearance` [N] metres above y = 0."""
-    lowest = skeleton.positions_and_tips(rotations, root)[..., 1].min(axis=-1)
     lifted = root.copy()
-    lifted[:, 1] += clearance - lowest
+    lifted[:, 1] += clearance - lowest(skeleton, rotations, root)
     return lifted
+
+
+def lowest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
+    """Heights [...] of the lowest joint or tip of postures with local rotations [..., J, 4] and root [..., 3]."""
+    return np.asarray(skeleton.positions_and_tips(rotations, root)[..., 1].min(axis=-1))

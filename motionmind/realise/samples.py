@@ -24,44 +24,37 @@ def choose_samples(
 
     Args:
         path: states [T + 1, L].
-        states: of the corpus's postures [N, L]; every inner state occurs, or (a pooled facing) is simply its centre's.
-        orientations: of the corpus's lanes [N, L, 4].
-        a: the first posture's lanes [L, 4].
-        b: the last posture's lanes [L, 4].
+        states: of the corpus's postures [N, L]; every inner state occurs.
+        orientations: of the corpus's postures [N, L, 4].
+        a: of the first posture [L, 4].
+        b: of the last posture [L, 4].
     """
     moves, lanes = len(path) - 1, path.shape[1]
-    chosen = np.zeros((max(moves - 1, 0), lanes), dtype=np.int64)
-    for lane in range(lanes):
-        layers = [_observed(states[:, lane], path[t, lane]) for t in range(1, moves)]
-        if layers:
-            chosen[:, lane] = _smoothest(layers, [orientations[layer, lane] for layer in layers], a[lane], b[lane])
-    return chosen
+    if moves < 2:
+        return np.zeros((0, lanes), dtype=np.int64)
+    observed = np.array(
+        [[_observed(states[:, lane], path[t, lane]) for lane in range(lanes)] for t in range(1, moves)]
+    )  # [T - 1, L, MOST]
+    keys = orientations[observed, np.arange(lanes)[:, None]]
+    # cost[l, k]: the least sum of squared angles in lane l from `a` to its k-th sample; back: from which sample before.
+    cost, back = _squared_angles(a[:, None], keys[0])[:, 0], []
+    for before, after in pairwise(keys):
+        through = cost[:, :, None] + _squared_angles(before, after)
+        back.append(through.argmin(axis=1))
+        cost = through.min(axis=1)
+    cost = cost + _squared_angles(keys[-1], b[:, None])[:, :, 0]
+    picked = [cost.argmin(axis=1)]
+    for pointer in back[::-1]:
+        picked.append(pointer[np.arange(lanes), picked[-1]])
+    return np.asarray(np.take_along_axis(observed, np.stack(picked[::-1])[..., None], axis=-1)[..., 0])
 
 
 def _observed(states: NDArray[np.int32], state: int) -> Ints:
-    """Postures in a state, thinned evenly to `MOST`."""
+    """Postures in a state: `MOST` of them, thinned evenly, or some more than once where there are fewer."""
     found = np.flatnonzero(states == state)
-    if len(found) <= MOST:
-        return found
-    return found[np.linspace(0, len(found) - 1, MOST).round().astype(np.int64)]
-
-
-def _smoothest(layers: list[Ints], keys: list[Floats], a: Floats, b: Floats) -> list[int]:
-    """cost[k] of layer t: the least sum of squared angles from `a` to its k-th sample."""
-    cost = _squared_angles(a[None], keys[0])[0]
-    back = []
-    for before, after in pairwise(keys):
-        through = cost[:, None] + _squared_angles(before, after)
-        back.append(through.argmin(axis=0))
-        cost = through.min(axis=0)
-    k = int((cost + _squared_angles(keys[-1], b[None])[:, 0]).argmin())
-    picked = [int(layers[-1][k])]
-    for layer, pointer in zip(layers[-2::-1], back[::-1], strict=True):
-        k = int(pointer[k])
-        picked.append(int(layer[k]))
-    return picked[::-1]
+    return found[np.arange(MOST) * len(found) // MOST]
 
 
 def _squared_angles(a: Floats, b: Floats) -> Floats:
-    """Squared angles in radians between all pairs of a [m, 4] and b [n, 4]."""
-    return np.asarray((2.0 * np.arccos(np.clip(np.abs(a @ b.T), 0.0, 1.0))) ** 2)
+    """Squared angles in radians between all pairs of a [L, m, 4] and b [L, n, 4]: [L, m, n]."""
+    return np.asarray((2.0 * np.arccos(np.minimum(np.abs(a @ np.swapaxes(b, -1, -2)), 1.0))) ** 2)

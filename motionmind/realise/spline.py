@@ -8,56 +8,89 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
     """The natural cubic spline through `values` [K, ...] at `times` [K], evaluated at `at` [N]: [N, ...].
 
-    Twice continuously differentiable, its second derivative 0 at both ends. The second derivatives M at the knots
-    solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with steps h
-    and slopes d; source: de Boor, "A Practical Guide to Splines" (1978), chapter IV. Two knots give a straight line.
+    Twice continuously differentiable, its second derivative 0 at both ends. Two knots give a straight line.
     """
-    h = np.diff(times)
-    if len(h) == 0:
+    if len(times) == 1:
         return np.broadcast_to(values[0], (len(at), *values.shape[1:])).copy()
-    column = (-1,) + (1,) * (values.ndim - 1)
-    slope = np.diff(values, axis=0) / h.reshape(column)
-    bend = np.zeros_like(values, dtype=np.float64)
-    if len(h) > 1:
-        system = np.diag(2.0 * (h[:-1] + h[1:])) + np.diag(h[1:-1], 1) + np.diag(h[1:-1], -1)
-        right = 6.0 * np.diff(slope, axis=0)
-        bend[1:-1] = np.linalg.solve(system, right.reshape(len(right), -1)).reshape(right.shape)
-    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(h) - 1)
-    after, before = (times[i + 1] - at).reshape(column), (at - times[i]).reshape(column)
-    step = h[i].reshape(column)
-    # On each piece: the straight line, plus what both bends add, which is 0 at its knots.
-    line = (values[i] * after + values[i + 1] * before) / step
-    bent = bend[i] * (after**3 / step - step * after) + bend[i + 1] * (before**3 / step - step * before)
-    return np.asarray(line + bent / 6.0)
+    piece, bends = _pieces(times, at), _bends(times, values)
+    return _cubic(times, piece, at, values[piece], values[piece + 1], bends[piece], bends[piece + 1])
 
 
 def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     """A twice continuously differentiable curve of rotations through `keys` [K, ..., 4] at `times` [K]: [N, ..., 4].
 
-    A natural cubic spline of the rotation vectors that lead to the keys from a middle one (the chart of SO(3) centred
-    there), unrolled so that neighbouring keys lie within half a turn of each other. As the exponential is smooth, so is
-    the curve; it is exact at the keys, and for keys that turn about one axis it is the spline of their angle.
+    Around each key the natural spline of the rotation vectors that lead from it to all keys (the chart of SO(3) centred
+    there), unrolled so that neighbouring keys lie within half a turn of each other. From each key to the next the curve
+    passes from the one's spline to the other's, by a weight whose first two derivatives are 0 at both. It is exact at
+    the keys, and for keys that turn about one axis all charts agree: it is the spline of their angle. One chart for
+    all would not do, for it ends a whole turn from its centre, where vectors in all directions are one rotation.
     """
-    if len(keys) < 2:
+    if len(times) == 1:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
-    centre = keys[len(keys) // 2]
-    vectors = _unroll(rot.log(rot.inv_mul(centre[None], keys)), len(keys) // 2)
-    return rot.mul(centre[None], rot.exp(natural_spline(times, vectors, at)))
+    vectors = _unroll(rot.log(rot.inv_mul(keys[None], keys[:, None])))
+    piece, bends = _pieces(times, at), _bends(times, vectors)
+
+    def around(key: Ints) -> Floats:
+        ends = vectors[piece, key], vectors[piece + 1, key], bends[piece, key], bends[piece + 1, key]
+        return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, *ends)))
+
+    s = ((at - times[piece]) / np.diff(times)[piece]).reshape(-1, *(1,) * (keys.ndim - 2))
+    return rot.slerp(around(piece), around(piece + 1), s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
-def _unroll(vectors: Floats, middle: int) -> Floats:
-    """Rotation vectors [K, ..., 3], whole turns added so that each is nearest to its neighbour towards `middle`."""
+def _unroll(vectors: Floats) -> Floats:
+    """Rotation vectors [K, K, ..., 3] to each key from each centre, whole turns added so that each is nearest to that
+    of the neighbouring key towards the centre."""
     out = vectors.copy()
-    for k in [*range(middle - 1, -1, -1), *range(middle + 1, len(out))]:
-        toward = out[k + 1] if k < middle else out[k - 1]
-        angle = np.linalg.norm(out[k], axis=-1, keepdims=True)
-        axis = out[k] / np.where(angle > 1e-9, angle, 1.0)
-        along = np.sum(axis * toward, axis=-1, keepdims=True)
-        turns = np.where(angle > 1e-9, np.round((along - angle) / (2.0 * np.pi)), 0.0)
-        out[k] += 2.0 * np.pi * turns * axis
+    for distance in range(2, len(out)):
+        for side in (1, -1):
+            key = np.arange(distance, len(out)) if side > 0 else np.arange(len(out) - distance)
+            centre = key - side * distance
+            toward, own = out[key - side, centre], out[key, centre]
+            angle = np.linalg.norm(own, axis=-1, keepdims=True)
+            # No rotation at all may be a turn about any axis; where its neighbour has none either, about none.
+            along = np.where(angle > 1e-9, own, toward)
+            axis = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
+            turns = np.round((np.sum(axis * toward, axis=-1, keepdims=True) - angle) / (2.0 * np.pi))
+            out[key, centre] += 2.0 * np.pi * turns * axis
     return out
+
+
+def _pieces(times: Floats, at: Floats) -> Ints:
+    """Index [N] of the knot at which the piece begins that each of `at` lies in."""
+    return np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+
+
+def _bends(times: Floats, values: Floats) -> Floats:
+    """Second derivatives [K, ...] of the natural spline at its knots.
+
+    They solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with
+    steps h and slopes d; source: de Boor, "A Practical Guide to Splines" (1978), chapter IV.
+    """
+    h = np.diff(times)
+    bends = np.zeros_like(values, dtype=np.float64)
+    if len(h) > 1:
+        slopes = np.diff(values, axis=0) / h.reshape(-1, *(1,) * (values.ndim - 1))
+        system = np.diag(2.0 * (h[:-1] + h[1:])) + np.diag(h[1:-1], 1) + np.diag(h[1:-1], -1)
+        right = 6.0 * np.diff(slopes, axis=0)
+        bends[1:-1] = np.linalg.solve(system, right.reshape(len(right), -1)).reshape(right.shape)
+    return bends
+
+
+def _cubic(
+    times: Floats, piece: Ints, at: Floats, left: Floats, right: Floats, left_bend: Floats, right_bend: Floats
+) -> Floats:
+    """Values [N, ...] on pieces between knots with these values and second derivatives [N, ...]."""
+    column = (-1, *(1,) * (left.ndim - 1))
+    after, before = (times[piece + 1] - at).reshape(column), (at - times[piece]).reshape(column)
+    step = after + before
+    # On each piece: the straight line, plus what both bends add, which is 0 at its knots.
+    line = (left * after + right * before) / step
+    bent = left_bend * (after**3 / step - step * after) + right_bend * (before**3 / step - step * before)
+    return np.asarray(line + bent / 6.0)

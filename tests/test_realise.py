@@ -1,0 +1,382 @@
+"""From a path of states to movement: splines, samples, durations, the root, and the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from motionmind import rotations as rot
+from motionmind.corpus.corpus import Corpus, Facing
+from motionmind.corpus.gather import gather
+from motionmind.grammar.transitions import Transitions, count_transitions
+from motionmind.motion import Motion, Posture
+from motionmind.realise.realise import _headings, realise
+from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
+from motionmind.realise.samples import MOST, choose_samples
+from motionmind.realise.spline import natural_spline, rotation_spline
+from motionmind.realise.timing import durations
+from motionmind.skeleton import Skeleton, human23
+
+Array = NDArray[np.float64]
+Z = np.array([0.0, 0.0, 1.0])
+
+
+# --- splines ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 9])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+def test_a_natural_spline_is_scipys(count: int, shape: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(count)
+    times = np.cumsum(rng.uniform(0.1, 2.0, count))
+    values = rng.normal(size=(count, *shape))
+    at = np.sort(np.concatenate([times, rng.uniform(times[0], times[-1], 50)]))
+    expected = CubicSpline(times, values, bc_type="natural")(at)
+    np.testing.assert_allclose(natural_spline(times, values, at), expected, atol=1e-12)
+
+
+def test_a_spline_through_one_knot_stays_there() -> None:
+    np.testing.assert_array_equal(natural_spline(np.zeros(1), np.ones((1, 3)), np.arange(4.0)), np.ones((4, 3)))
+    key = rot.about_vertical(0.3)[None]
+    np.testing.assert_array_equal(rotation_spline(np.zeros(1), key, np.arange(4.0)), np.tile(key, (4, 1)))
+
+
+def wander(count: int, degrees: float, seed: int, lanes: int = 5) -> tuple[Array, Array]:
+    """Times [K] and rotations [K, lanes, 4] that turn by at most so many degrees from one to the next."""
+    rng = np.random.default_rng(seed)
+    keys = [rot.normalise(rng.normal(size=(lanes, 4)))]
+    for _ in range(count - 1):
+        axis = rng.normal(size=(lanes, 3))
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        keys.append(rot.mul(keys[-1], rot.from_axis_angle(axis, np.radians(degrees) * rng.uniform(0.2, 1.0, lanes))))
+    return np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.3, count - 1))]), np.array(keys)
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(3, 20.0), (6, 90.0), (12, 170.0), (30, 45.0)])
+def test_a_rotation_spline_meets_its_keys_whatever_their_signs(count: int, degrees: float) -> None:
+    times, keys = wander(count, degrees, seed=count)
+    assert rot.angle(rotation_spline(times, keys, times), keys).max() < 1e-12
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (*keys.shape[:2], 1))
+    at = np.linspace(0.0, times[-1], 100)
+    assert rot.angle(rotation_spline(times, signs * keys, at), rotation_spline(times, keys, at)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(3, 60.0), (7, 40.0), (9, 100.0)])
+def test_a_rotation_spline_has_a_continuous_angular_velocity_and_acceleration(count: int, degrees: float) -> None:
+    times, keys = wander(count, degrees, seed=count + 1)
+    h = 1e-4
+    # Angular velocities at half steps h before and after each inner key, then their differences.
+    steps = np.arange(-3, 4) * h
+    at = (times[1:-1, None] + steps).ravel()
+    curve = rotation_spline(times, keys, at).reshape(count - 2, len(steps), -1, 4)
+    velocity = rot.log(rot.mul_inv(curve[:, 1:], curve[:, :-1])) / h
+    acceleration = np.diff(velocity, axis=1) / h
+    speed, bend = np.abs(velocity).max(), np.abs(acceleration).max()
+    assert np.abs(velocity[:, 3] - velocity[:, 2]).max() < 2.0 * bend * h + 1e-9 * speed
+    across = np.abs(acceleration[:, 3] - acceleration[:, 1]).max()  # one is before the key, one after it
+    assert across < 0.02 * bend
+
+
+def test_keys_about_one_axis_give_the_spline_of_their_angle_through_any_number_of_turns() -> None:
+    rng = np.random.default_rng(3)
+    axis = np.array([0.48, 0.6, 0.64])
+    at = np.linspace(0.0, 1.0, 200)
+    for count, most in ((3, 100.0), (8, 170.0), (20, 120.0), (30, 60.0)):
+        times = np.linspace(0.0, 1.0, count)
+        angles = np.cumsum(np.radians(rng.uniform(-0.2 * most, most, count)))
+        keys = rot.from_axis_angle(axis, angles)
+        expected = rot.from_axis_angle(axis, natural_spline(times, angles, at))
+        assert rot.angle(rotation_spline(times, keys, at), expected).max() < 1e-9
+    # Exactly a turn and two away from where it began.
+    turns = np.radians(120.0) * np.arange(7)
+    expected = rot.about_vertical(np.radians(720.0) * at)
+    found = rotation_spline(np.linspace(0.0, 1.0, 7), rot.about_vertical(turns), at)
+    assert rot.angle(found, expected).max() < 1e-9
+
+
+def test_two_keys_give_slerp() -> None:
+    times, keys = wander(2, 175.0, seed=5)
+    shares = np.linspace(0.0, 1.0, 30)
+    expected = rot.slerp(keys[:1], keys[1:], shares[:, None])
+    assert rot.angle(rotation_spline(times, keys, shares * times[-1]), expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("tilt", [0.0, 5.0, 15.0, 30.0])
+@pytest.mark.parametrize("step", [40.0, 60.0, 90.0, 120.0])
+def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: float) -> None:
+    tilts = rot.exp(np.radians(tilt) * np.random.default_rng(1).uniform(-1.0, 1.0, (16, 3)))
+    keys = rot.mul(rot.about_vertical(np.radians(step) * np.arange(16)), tilts)
+    times = np.arange(16) * 0.2
+    at = np.linspace(0.0, times[-1], 15 * 60 + 1)
+    curve = rotation_spline(times, keys, at)
+    fastest_between_keys = rot.angle(keys[1:], keys[:-1]).max() / 0.2
+    assert rot.angle(curve[1:], curve[:-1]).max() / (at[1] - at[0]) < 1.5 * fastest_between_keys
+
+
+# --- samples ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_chosen_samples_are_the_smoothest_of_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lanes, moves = 3, int(rng.integers(2, 6))
+    states = rng.integers(0, 3, (14, lanes)).astype(np.int32)
+    states[:3] = np.arange(3)[:, None]  # every state occurs
+    orientations = rot.normalise(rng.normal(size=(14, lanes, 4)))
+    a, b = rot.normalise(rng.normal(size=(2, lanes, 4)))
+    path = rng.integers(0, 3, (moves + 1, lanes)).astype(np.int32)
+    chosen = choose_samples(path, states, orientations, a, b)
+    assert chosen.shape == (moves - 1, lanes)
+    for lane in range(lanes):
+        layers = [np.flatnonzero(states[:, lane] == state) for state in path[1:-1, lane]]
+
+        def cost(pick: tuple[int, ...] | NDArray[np.int64], lane: int = lane) -> float:
+            through = np.concatenate([a[None, lane], orientations[list(pick), lane], b[None, lane]])
+            return float(np.sum(rot.angle(through[1:], through[:-1]) ** 2))
+
+        assert all(pick in layer for pick, layer in zip(chosen[:, lane], layers, strict=True))
+        assert cost(chosen[:, lane]) == pytest.approx(min(map(cost, product(*layers))), abs=1e-9)
+
+
+def test_one_move_passes_through_nothing() -> None:
+    path = np.zeros((2, 3), dtype=np.int32)
+    ends = np.tile(rot.IDENTITY, (3, 1))
+    chosen = choose_samples(path, np.zeros((4, 3), dtype=np.int32), np.tile(rot.IDENTITY, (4, 3, 1)), ends, ends)
+    assert chosen.shape == (0, 3)
+
+
+def test_of_many_samples_even_ones_are_considered() -> None:
+    angles = np.linspace(0.0, 1.0, 10 * MOST)
+    states = np.zeros((len(angles), 1), dtype=np.int32)
+    a, b = rot.about_vertical(np.zeros(1)), rot.about_vertical(np.ones(1))
+    chosen = choose_samples(np.zeros((3, 1), np.int32), states, rot.about_vertical(angles)[:, None], a, b)
+    assert abs(angles[chosen[0, 0]] - 0.5) <= 0.5 / MOST
+
+
+# --- durations and the root -------------------------------------------------------------------------------------------
+
+
+def graph(states: NDArray[np.int32], seconds: list[float]) -> Transitions:
+    """The transitions of one clip whose postures are in `states` [N, L]."""
+    return count_transitions(
+        states.astype(np.int32), states.max(axis=0) + 1, np.arange(len(states) - 1), np.array(seconds)
+    )
+
+
+def test_moves_take_the_time_that_moving_lanes_took() -> None:
+    clip = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [0, 0, 0]])
+    transitions = graph(clip, [0.1, 0.2, 5.0, 0.4])
+    path = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [1, 1, 0]], dtype=np.int32)
+    usual = np.median(transitions.seconds)
+    # A hold is timed by holds only where nothing moves; a bridge has no time of its own.
+    np.testing.assert_allclose(durations(path, transitions), [0.1, 0.2, np.median([5.0, 5.0, 5.7 / 4.0]), usual])
+
+
+def test_the_root_is_carried_in_the_bodys_heading_and_ends_at_b() -> None:
+    transitions = graph(np.array([[0], [1], [2]]), [0.5, 0.5])
+    travel = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])  # a step ahead, then one twice as long
+    path = np.array([[0], [1], [2], [0]], dtype=np.int32)
+    seconds = np.array([1.0, 1.0, 2.0])
+    a, headings = np.array([1.0, 1.0, 1.0]), np.array([0.0, np.pi / 2.0, 0.0, 0.0])
+    ahead = a + np.array([[0.0, 0, 0], [0.0, 0, 1], [2.0, 0, 1], [2.0, 0, 1]])
+    np.testing.assert_allclose(carry(path, headings, seconds, travel, transitions, a, ahead[-1]), ahead, atol=1e-12)
+    b = ahead[-1] + np.array([0.4, 0.0, -0.8])
+    shared = ahead + np.array([0.0, 0.25, 0.5, 1.0])[:, None] * (b - ahead[-1])
+    np.testing.assert_allclose(carry(path, headings, seconds, travel, transitions, a, b), shared, atol=1e-12)
+
+
+def test_bodies_stand_as_high_as_they_are_told() -> None:
+    rng = np.random.default_rng(0)
+    q, root = rot.normalise(rng.normal(size=(20, 23, 4))), rng.normal(size=(20, 3))
+    heights = rng.uniform(0.0, 0.5, 20)
+    placed = stand(human23(), q, root, heights)
+    np.testing.assert_allclose(lowest(human23(), q, placed), heights, atol=1e-12)
+    np.testing.assert_array_equal(placed[:, [0, 2]], root[:, [0, 2]])
+
+
+# --- the whole --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Learned:
+    """As much of an engine's grammar as realisation reads; the only state of each lane is what a posture shows."""
+
+    corpus: Corpus
+    states: NDArray[np.int32]
+    transitions: Transitions
+    centres: Array
+    carriage: Carriage
+
+
+def walk(frames: int = 40, sink: float = 0.0, seed: int = 0) -> Motion:
+    """A body that walks in a curve, each joint on a course of its own, its lowest point on the floor."""
+    rng = np.random.default_rng(seed)
+    body, t = human23(), np.arange(frames) * 0.2
+    phase, size = rng.uniform(0.0, 6.0, (23, 3)), rng.uniform(0.0, 0.35, (23, 3))
+    q = rot.exp(size * np.sin(1.3 * t[:, None, None] + phase))
+    q[:, 0] = rot.mul(rot.about_vertical(0.3 * t), q[:, 0])
+    root = np.stack([np.sin(t), 0.0 * t, np.cos(t)], axis=1)
+    return Motion(body, q, stand(body, q, root, np.full(frames, -sink)), t, "walk")
+
+
+def learned(motion: Motion, facing: Facing = "free") -> Learned:
+    corpus = gather("walks", [motion], facing=facing)
+    states = np.repeat(np.arange(len(corpus), dtype=np.int32)[:, None], 23, axis=1)
+    sizes = [len(corpus)] * 23
+    ring = rot.about_vertical(np.arange(24) * np.pi / 12.0)
+    centres = list(np.swapaxes(corpus.to_lanes(corpus.rotations)[:, :23], 0, 1))
+    if facing == "free":
+        steps = np.round(rot.heading(corpus.rotations[:, 0]) / (np.pi / 12.0)).astype(np.int32) % 24
+        states, sizes, centres = np.concatenate([states, steps[:, None]], axis=1), [*sizes, 24], [*centres, ring]
+    pooled = 23 if facing == "free" else None
+    transitions = count_transitions(states, np.array(sizes), corpus.begins, corpus.seconds, pooled=pooled)
+    return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus, states, transitions))
+
+
+def realised(known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0) -> Motion:
+    """The motion along postures `rows` of the corpus."""
+    return realise(
+        known.states[rows], a, b, known.corpus, known.states, known, known.carriage, fps  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=["free", "stage"])
+def walking(request: pytest.FixtureRequest) -> Learned:
+    return learned(walk(), request.param)
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0, 24.0, 7.0])
+@pytest.mark.parametrize("rows", [[3, 4], [3, 4, 5, 6, 7], [3, 4, 5, 5, 6, 20, 21]])
+def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, rows: list[int], fps: float) -> None:
+    motion = walk()
+    a, b = motion.posture(rows[0]), motion.posture(rows[-1])
+    a = replace(a, rotations=-a.rotations, root=a.root + np.array([7.0, 0.0, 3.0]))
+    found = realised(walking, rows, a, b, fps)
+    np.testing.assert_array_equal(found.rotations[[0, -1]], [a.rotations, b.rotations])
+    np.testing.assert_array_equal(found.root[[0, -1]], [a.root, b.root])
+    np.testing.assert_allclose(np.diff(found.times), 1.0 / fps, rtol=1e-9)
+    assert found.times[0] == 0.0
+    assert len(found.moves) == len(rows)
+    assert (found.moves[0], found.moves[-1]) == (0.0, found.times[-1])
+    assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
+
+
+def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
+    motion = walk()
+    rows = list(range(5, 25))
+    found = realised(walking, rows, motion.posture(5), motion.posture(24), fps=5.0)
+    lanes = [walking.corpus.to_lanes(q)[:, :23] for q in (found.rotations, motion.rotations[rows])]
+    assert rot.angle(*lanes).max() < 1e-6
+    # Every state was left by one move only, so its travel is that move's.
+    if walking.corpus.facing == "stage":  # the free facing is known to within its states' width only
+        np.testing.assert_allclose(found.root, motion.root[rows], atol=1e-6)
+    turned = rot.heading(found.rotations[:, 0]) - rot.heading(motion.rotations[rows, 0])
+    assert np.degrees(np.abs(turned)).max() < 15.0
+
+
+def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned) -> None:
+    motion = walk()
+    for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
+        found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
+        assert lowest(human23(), found.rotations, found.root).min() > -1e-3
+
+
+def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
+    sunk = walk(sink=0.11)
+    found = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
+    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), -0.11, atol=1e-9)
+    up = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
+    heights = lowest(human23(), up.rotations, up.root)
+    assert np.all(np.diff(heights) > -1e-9)
+    assert np.diff(heights).max() < 0.01
+
+
+def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
+    jumping = walk(sink=0.4)
+    root = jumping.root.copy()
+    root[10:13, 1] += 0.25
+    known = learned(replace(jumping, root=root))
+    grounded = walk()
+    found = realised(known, list(range(5, 18)), grounded.posture(5), grounded.posture(17), fps=5.0)
+    heights = lowest(human23(), found.rotations, found.root)
+    np.testing.assert_allclose(heights, [0.0] * 5 + [0.25] * 3 + [0.0] * 5, atol=1e-6)
+
+
+def test_no_frame_jumps(walking: Learned) -> None:
+    motion = walk()
+    rows = [3, 4, 5, 6, 7, 8, 9, 10]
+    found = realised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
+    keys = motion.rotations[rows]
+    fastest = rot.angle(keys[1:], keys[:-1]).max(axis=0) / 0.2
+    assert np.all(rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0 < 2.0 * fastest + 1e-6)
+    assert np.linalg.norm(np.diff(found.root, axis=0), axis=1).max() * 60.0 < 2.0 * 1.2
+    turned = np.diff(found.rotations * np.sign(np.sum(found.rotations * found.rotations[:1], -1, keepdims=True)), 2, 0)
+    assert np.abs(turned).max() < 0.01
+
+
+def test_the_motion_is_on_the_body_of_a_even_where_b_was_on_shorter_legs() -> None:
+    known, motion = learned(walk()), walk()
+    a, b = motion.posture(3), motion.posture(6)
+    small = Skeleton("small", a.skeleton.names, a.skeleton.parents, 0.7 * a.skeleton.offsets, 0.7 * a.skeleton.tips)
+    root = stand(small, b.rotations[None], b.root[None], np.zeros(1))[0]
+    found = realised(known, [3, 4, 5, 6], a, Posture(small, b.rotations, root))
+    assert found.skeleton is a.skeleton
+    np.testing.assert_array_equal(found.root[-1], root)
+    assert np.abs(np.diff(found.root[:, 1])).max() < 0.1  # lower by 0.35 in the last of three moves
+
+
+def test_no_moves_are_one_frame(walking: Learned) -> None:
+    a = walk().posture(3)
+    found = realised(walking, [3], a, a)
+    assert (len(found), found.name, found.moves.tolist()) == (1, "tween", [0.0])
+    np.testing.assert_array_equal(found.rotations[0], a.rotations)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
+    """From north to 170 degrees off, by the short way or all the way round the other."""
+    known = learned(walk())
+    motion = walk()
+    goal = np.radians(170.0)
+    ends = [replace(motion.posture(row), rotations=motion.rotations[row].copy()) for row in (3, 9)]
+    turned = []
+    for end, heading in zip(ends, (0.0, goal), strict=True):
+        q = end.rotations.copy()
+        q[0] = rot.mul(rot.about_vertical(heading - rot.heading(q[0])), q[0])
+        turned.append(replace(end, rotations=q))
+    whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
+    path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
+    path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
+    found = realise(path, *turned, known.corpus, known.states, known, known.carriage, 60.0)  # type: ignore[arg-type]
+    headings = np.unwrap(rot.heading(found.rotations[:, 0]))
+    assert headings[-1] - headings[0] == pytest.approx(goal if way > 0 else goal - 2.0 * np.pi, abs=1e-9)
+    assert np.all(way * np.diff(headings) > -1e-3)
+
+
+@pytest.mark.parametrize("seconds", [np.full(8, 0.2), np.array([0.2, 0.4, 0.1, 0.3, 0.3, 0.2, 0.5, 0.2])])
+def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Array) -> None:
+    known = learned(walk())
+    keys = np.concatenate([[0.0], np.cumsum(seconds)])
+    for speed in (-200.0, -17.0, 0.0, 5.0, 40.0, 170.0):
+        turn = np.radians(356.0 + speed * keys)
+        path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
+        a, b = rot.about_vertical(turn[[0, -1]])
+        found = _headings(path, known, seconds, a, b)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
+
+
+def test_headings_stay_in_their_states() -> None:
+    known, rng = learned(walk()), np.random.default_rng(0)
+    for _ in range(20):
+        path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
+        a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
+        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), a, b)  # type: ignore[arg-type]
+        off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
+        assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
+        assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9
+        assert np.abs(np.diff(found)).max() <= 4.0 * np.pi / 12.0 + 1e-9
