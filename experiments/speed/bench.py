@@ -61,15 +61,12 @@ def compare(engine: Engine, pairs: int, seed: int, built: float) -> None:
         theirs.append(seconds)
         agree += optimum is not None and abs(optimum - tween.cost) < 1e-3
     ms, other = 1e3 * np.array(ours), 1e3 * np.array(theirs)
-    print(
-        f"corpus: {len(engine.corpus)} postures, largest joint {engine.space.sizes.max()} states; built in {built:.2f} s"
-    )
+    size = f"{len(engine.corpus)} postures, largest joint {engine.space.sizes.max()} states"
+    print(f"corpus: {size}; read, learned and saved in {built:.2f} s")
     print(f"tween, all numbers of moves: median {np.median(ms):.0f} ms, 95th percentile {np.percentile(ms, 95):.0f} ms")
     print(f"proven optimal: {proven} of {pairs}; gaps of the rest: {[f'{gap:.2%}' for gap in gaps]}")
     print(f"expansions: median {np.median(expansions):.0f}, most {max(expansions)}; attested {np.mean(attested):.1%}")
-    print(
-        f"toulbar2, that number of moves alone: median {np.median(other):.0f} ms, 95th {np.percentile(other, 95):.0f} ms"
-    )
+    print(f"toulbar2, that number of moves: median {np.median(other):.0f} ms, 95th {np.percentile(other, 95):.0f} ms")
     print(f"toulbar2 / tween: median {np.median(other) / np.median(ms):.2f}, mean {other.mean() / ms.mean():.2f}")
     print(f"the same optimum: {agree} of {pairs} (limit {TIME_LIMIT} s a problem)")
 
@@ -113,9 +110,7 @@ def command(engine: Engine, home: Path, seed: int) -> None:
     bare = perf_counter()
     subprocess.run([sys.executable, "-c", "import numpy, numba"], check=True)
     bare = perf_counter() - bare
-    print(
-        f"whole command: median {np.median(seconds):.2f} s of {len(seconds)}; importing numpy and numba alone {bare:.2f} s"
-    )
+    print(f"whole command: median {np.median(seconds):.2f} s of {len(seconds)}; of it numpy and numba {bare:.2f} s")
 
 
 if __name__ == "__main__":

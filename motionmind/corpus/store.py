@@ -84,8 +84,11 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
     """
     aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     try:
-        if folder.exists() and any(entry.suffix != ".npy" and entry.name != MANIFEST for entry in folder.iterdir()):
-            raise CorpusError(f"{folder}: is no built corpus, so it is not replaced; choose another place")
+        for entry in folder.iterdir() if folder.exists() else ():
+            if entry.suffix != ".npy" and entry.name != MANIFEST:
+                raise CorpusError(
+                    f"{folder}: holds {entry.name}, which is no part of a built corpus; it is not replaced"
+                )
         aside.mkdir(parents=True)
         for name, array in arrays.items():
             np.save(aside / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
