@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from motionmind.discretize import make as make_discretization
-    from motionmind.engine import Engine, own_skeleton
+    from motionmind.engine import Engine
     from motionmind.errors import (
         CorpusError,
         FormatError,
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         SkeletonError,
     )
     from motionmind.formats import read_motion, read_posture, write_motion, write_posture
+    from motionmind.learned import own_skeleton
     from motionmind.motion import Motion, Posture
     from motionmind.retarget import to_human23
     from motionmind.skeleton import Skeleton, human23
@@ -59,7 +60,7 @@ __all__ = [
 
 _HOMES = {
     "discretize": ("make_discretization",),
-    "engine": ("Engine", "own_skeleton"),
+    "engine": ("Engine",),
     "errors": (
         "CorpusError",
         "FormatError",
@@ -69,6 +70,7 @@ _HOMES = {
         "SkeletonError",
     ),
     "formats": ("read_motion", "read_posture", "write_motion", "write_posture"),
+    "learned": ("own_skeleton",),
     "motion": ("Motion", "Posture"),
     "retarget": ("to_human23",),
     "skeleton": ("Skeleton", "human23"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import math
@@ -83,7 +84,7 @@ HOME = click.option(
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
-def reading(command: _Command) -> _Command:
+def _reading(command: _Command) -> _Command:
     """Options of the commands that read movement."""
     for option in (
         click.option("--asf", type=FILE, help="AMC's skeleton  [default: the one beside it]"),
@@ -99,7 +100,7 @@ def reading(command: _Command) -> _Command:
     return command
 
 
-def example(line: str) -> str:
+def _example(line: str) -> str:
     """An epilog that is not wrapped, so that it can be copied."""
     return f"\b\nExample:\n  {line}"
 
@@ -120,7 +121,7 @@ def app(context: click.Context) -> None:
 
 
 @app.command(
-    epilog=example(
+    epilog=_example(
         "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
         "--corpus ballet -o tween.bvh"
     )
@@ -158,6 +159,7 @@ def tween(
 
     Exit code 3 says that nothing joins them under the rules that were asked for.
     """
+    gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     from motionmind.engine import Engine
     from motionmind.formats import read_posture, write_atomically, write_motion
     from motionmind.search.jit import is_compiled
@@ -183,20 +185,20 @@ def tween(
     _print_tween(result, written)
 
 
-@app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))
+@app.command(epilog=_example("motionmind posture clip.bvh --frame 240 -o A.json"))
 @click.argument("clip", type=FILE)
 @click.option(
     "--frame", type=int, metavar="N", required=True, help="Number of the frame, from 0; negative from the end."
 )
 @click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .txt.")
-@reading
+@_reading
 def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str | None, asf: Path | None) -> None:
     """Take one posture out of a clip.
 
     It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own.
     """
-    from motionmind.engine import own_skeleton
     from motionmind.formats import write_posture
+    from motionmind.learned import own_skeleton
 
     _check_outputs([(output, (".json", ".bvh", ".txt"))])
     motion = own_skeleton(_read(clip, unit, asf), _mapping(joints))
@@ -204,12 +206,12 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
 
-@app.command(epilog=example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
+@app.command(epilog=_example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
 @click.argument("source", type=FILE, metavar="IN")
 @click.argument("output", type=FILE, metavar="OUT")
 @click.option("--skeleton", type=click.Choice(["own", "human23"]), default="own", help="The file's joints, or human23.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: as they are]")
-@reading
+@_reading
 def convert(
     source: Path,
     output: Path,
@@ -243,7 +245,7 @@ def corpora(context: click.Context) -> None:
     _help_alone(context)
 
 
-@corpora.command(epilog=example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
+@corpora.command(epilog=_example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
 @click.argument("name")
 @click.argument("files", type=FILE, nargs=-1, required=True)
 @click.option("--rate", type=RATE, help="Postures a second  [default: every frame]")
@@ -280,7 +282,7 @@ def corpora(context: click.Context) -> None:
     help="Where a joint jumps: split the clip there, keep it, or drop it.",
 )
 @click.option("--flip-angle", type=Number(0, 180), default=45.0, help="Degrees in one frame that are a jump.")
-@reading
+@_reading
 @click.option("--title", default="", show_default=False, help="A line on what it is.")
 @click.option("--author", default="", show_default=False, help="Who made the movement.")
 @click.option("--source", default="", show_default=False, help="Where it comes from.")
@@ -308,7 +310,8 @@ def build(
     """
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make
-    from motionmind.engine import Engine, own_skeleton
+    from motionmind.engine import Engine
+    from motionmind.learned import own_skeleton
 
     place = place_for(name, home)
     discretization = make(discretize, *_tolerances(tolerance))
@@ -337,7 +340,7 @@ def build(
     click.echo(f"built {place}")
 
 
-@corpora.command("list", epilog=example("motionmind corpus list"))
+@corpora.command("list", epilog=_example("motionmind corpus list"))
 @JSON
 @HOME
 def list_corpora(as_json: bool, home: Path | None) -> None:
@@ -360,7 +363,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
         click.echo(f"{entry['name']:{width}}  {entry['title'] or '-'}  ({entry['folder']})")
 
 
-@corpora.command(epilog=example("motionmind corpus info ballet --json"))
+@corpora.command(epilog=_example("motionmind corpus info ballet --json"))
 @click.argument("name")
 @JSON
 @HOME
@@ -379,7 +382,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         click.echo(f"  {clip['name']:16} {clip['postures']:5}  {clip['about']}".rstrip())
 
 
-@corpora.command(epilog=example("motionmind corpus check ballet --pairs 500 --seed 1"))
+@corpora.command(epilog=_example("motionmind corpus check ballet --pairs 500 --seed 1"))
 @click.argument("name")
 @JSON
 @click.option("--pairs", type=COUNT, metavar="N", default=2000, help="Random pairs of postures to try to join.")
@@ -533,6 +536,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(_run(arguments))
     finally:
         log.removeHandler(notes)
+        gc.enable()
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -9,8 +9,9 @@ import pytest
 from toys import random_toy
 
 from motionmind.discretize import Codebook
-from motionmind.engine import Engine, own_skeleton
+from motionmind.engine import Engine
 from motionmind.formats import read_motion
+from motionmind.learned import own_skeleton
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import price
 from motionmind.search.solve import Rules, solve

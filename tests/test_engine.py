@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.corpus import store
 from motionmind.discretize import Codebook
-from motionmind.engine import Engine, own_skeleton
+from motionmind.engine import Engine
 from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError
 from motionmind.formats import read_motion, read_posture, write_motion
+from motionmind.learned import own_skeleton
 from motionmind.motion import Motion, Posture
 from motionmind.realise.root import stand
 from motionmind.skeleton import Skeleton, human23

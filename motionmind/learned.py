@@ -1,0 +1,282 @@
+"""What is learned from a corpus: learning it, keeping it on disk, finding it again."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.corpus import store
+from motionmind.corpus.corpus import FACING, Corpus, Facing
+from motionmind.corpus.gather import FLIP_DEGREES, Flips, gather
+from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
+from motionmind.discretize import Codebook, Discretization, StateSpace, from_spec
+from motionmind.errors import FormatError, MotionMindError
+from motionmind.formats import read_motion
+from motionmind.grammar.bridges import Bridges
+from motionmind.grammar.coordination import Coordination
+from motionmind.grammar.grammar import Grammar, learn
+from motionmind.grammar.transitions import Transitions
+from motionmind.motion import Motion, Posture
+from motionmind.realise.root import Carriage, learn_carriage
+from motionmind.retarget import joint_mapping, to_human23
+from motionmind.skeleton import Skeleton
+
+States = NDArray[np.int32]
+_Movement = TypeVar("_Movement", Motion, Posture)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
+
+
+def own_skeleton(movement: _Movement, joints: Mapping[str, str] | None = None) -> _Movement:
+    """The movement on human23 where its joints map there, by `joints` or by known names; as it is where they do not."""
+    mapped = joints is not None or joint_mapping(movement.skeleton) is not None
+    return to_human23(movement, joints) if mapped else movement
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What was learned from a corpus.
+
+    Attributes:
+        corpus: the movement that was learned from.
+        space: the states of each lane.
+        states: of the corpus's postures [N, L].
+        grammar: joint graphs, bridges and coordination.
+        carriage: how the corpus's bodies travel and stand.
+        load_seconds: time that loading took.
+    """
+
+    corpus: Corpus
+    space: StateSpace
+    states: States
+    grammar: Grammar
+    carriage: Carriage
+    load_seconds: float = 0.0
+
+    # --- learning ---------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def fit(
+        cls,
+        clips: Iterable[Motion],
+        *,
+        name: str = "corpus",
+        rate: float | None = None,
+        skip: int = 0,
+        facing: Facing = "free",
+        discretization: Discretization | None = None,
+        flips: Flips = "split",
+        flip_degrees: float = FLIP_DEGREES,
+        title: str = "",
+        author: str = "",
+        source: str = "",
+        licence: str = "",
+    ) -> Self:
+        """Learn from clips, all on the same joints (`own_skeleton` brings known rigs together).
+
+        Args:
+            clips: the movement; names tell where a move comes from.
+            name: of the corpus.
+            rate: postures a second; None keeps every frame with its own time.
+            skip: frames to drop at each clip's start, such as an added T-pose.
+            facing: "free" takes the turn about the vertical out of the root's state, to be a lane of its own; "stage"
+                leaves it there, so that what faces the wall is another state than what faces the public.
+            discretization: how orientations become states; a learned codebook of 15 degrees by default.
+            flips: what becomes of clips in which a joint jumps: `split` there, `keep`, or `drop` the clip.
+            flip_degrees: what counts as a jump from one frame to the next.
+            title: a line on what the corpus is.
+            author: who made it.
+            source: where it comes from.
+            licence: under which it may be used.
+
+        Raises:
+            CorpusError: nothing to learn from, or clips on different joints.
+        """
+        corpus = gather(
+            name,
+            clips,
+            rate=rate,
+            skip=skip,
+            facing=facing,
+            flips=flips,
+            flip_degrees=flip_degrees,
+            title=title,
+            author=author,
+            source=source,
+            licence=licence,
+        )
+        return cls.learn(corpus, discretization or Codebook(15.0))
+
+    @classmethod
+    def learn(cls, corpus: Corpus, discretization: Discretization) -> Self:
+        """Learn from a corpus."""
+        orientations = corpus.to_lanes(corpus.rotations)
+        joints = corpus.skeleton.names
+        space = discretization.fit(joints, orientations[:, : len(joints)])
+        space, states = _seen(space, space.assign(orientations[:, : len(joints)]))
+        if corpus.facing == "free":
+            space, facing = _with_facing(space, orientations[:, -1])
+            states = np.concatenate([states, facing[:, None]], axis=1)
+        grammar = learn(
+            corpus.lanes, corpus.lane_parents, space.centres, states, space.sizes, corpus.begins, corpus.seconds
+        )
+        return cls(corpus, space, states, grammar, learn_carriage(corpus, states, grammar.transitions))
+
+    # --- saving and loading -----------------------------------------------------------------------------------------
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write all that was learned to a folder, whole or not at all."""
+        corpus, space = self.corpus, self.space
+        arrays: dict[str, NDArray[Any]] = {
+            "rotations": corpus.rotations,
+            "root": corpus.root,
+            "times": corpus.times,
+            "states": self.states,
+            "centres": space.centres,
+        }
+        for name, kind in _PARTS.items():
+            part = self.carriage if kind is Carriage else getattr(self.grammar, name)
+            arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
+        skeleton = corpus.skeleton
+        manifest = {
+            **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
+            "skeleton": {
+                "name": skeleton.name,
+                "names": skeleton.names,
+                "parents": skeleton.parents,
+                "offsets": skeleton.offsets.tolist(),
+                "tips": skeleton.tips.tolist(),
+            },
+            "clips": [asdict(clip) for clip in corpus.clips],
+            "faults": [asdict(fault) for fault in corpus.faults],
+            "space": {
+                "kind": space.kind,
+                "starts": space.starts.tolist(),
+                "tolerances": space.tolerances.tolist(),
+                "labels": space.labels,
+            },
+        }
+        store.save(Path(folder), manifest, arrays)
+
+    @classmethod
+    def load(cls, name: str, home: str | os.PathLike[str] | None = None) -> Self:
+        """What was learned from a corpus, by its name or folder: one that was built, or a bundled one.
+
+        A bundled corpus is learned on first use and kept in the platform's cache directory.
+
+        Raises:
+            CorpusError: there is no such corpus; the message names those there are.
+            FormatError: it cannot be read.
+        """
+        began = perf_counter()
+        folder = store.locate(name, home)
+        if store.read_manifest(folder)["format"] == store.BUILT:
+            return cls._open(folder, began)
+        manifest = parse_manifest(store.read_manifest(folder), SourceManifest, folder / store.MANIFEST)
+        files = [folder / store.MANIFEST, *(folder / clip.file for clip in manifest.clips)]
+        built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
+        try:
+            return cls._open(built, began)
+        except MotionMindError:  # it is not there yet, or is damaged
+            engine = cls.learn(*_source(folder, manifest))
+        with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
+            engine.save(built)
+        return replace(engine, load_seconds=perf_counter() - began)
+
+    @classmethod
+    def _open(cls, folder: Path, began: float) -> Self:
+        saved, arrays = store.load(folder)
+        path = folder / store.MANIFEST
+        manifest = parse_manifest(saved, BuiltManifest, path)
+        missing = [name for name in _ARRAYS if name not in arrays]
+        if missing:
+            raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
+        body, states = manifest.skeleton, manifest.space
+        corpus = Corpus(
+            skeleton=Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips)),
+            clips=manifest.clips,
+            rotations=arrays["rotations"],
+            root=arrays["root"],
+            times=arrays["times"],
+            faults=manifest.faults,
+            **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
+        )
+        space = StateSpace(
+            corpus.lanes,
+            arrays["centres"],
+            np.array(states.starts),
+            states.kind,
+            np.array(states.tolerances),
+            states.labels,
+        )
+        grammar = Grammar(
+            corpus.lanes,
+            arrays["centres"],
+            _part(Transitions, "transitions", arrays),
+            _part(Bridges, "bridges", arrays),
+            _part(Coordination, "coordination", arrays),
+        )
+        carriage = _part(Carriage, "carriage", arrays)
+        return cls(corpus, space, arrays["states"], grammar, carriage, perf_counter() - began)
+
+
+_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
+_PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
+_ARRAYS = (
+    *("rotations", "root", "times", "states", "centres"),
+    *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
+)
+
+
+def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
+    return kind(**{field.name: arrays[f"{name}.{field.name}"] for field in fields(kind)})
+
+
+def _seen(space: StateSpace, states: States) -> tuple[StateSpace, States]:
+    """The state space without states that no posture is in, for nothing is known of them; and the states in it."""
+    kept = [np.unique(column) for column in states.T]
+    labels = [[named[s] for s in seen] if named else [] for named, seen in zip(space.labels, kept, strict=True)]
+    centres = [space.of(joint)[seen] for joint, seen in enumerate(kept)]
+    smaller = StateSpace.of_joints(space.names, centres, kind=space.kind, tolerances=space.tolerances, labels=labels)
+    renamed = [np.searchsorted(seen, column) for seen, column in zip(kept, states.T, strict=True)]
+    return smaller, np.stack(renamed, axis=1).astype(np.int32)
+
+
+def _with_facing(space: StateSpace, turns: NDArray[np.float64]) -> tuple[StateSpace, States]:
+    """The state space with a lane for the facing, whose states are equal steps of a circle as wide as the root's
+    tolerance, and the states [N] of the corpus's turns [N, 4] in it."""
+    count = max(8, round(360.0 / float(space.tolerances[0])))
+    ring = rot.canonical(rot.about_vertical(np.arange(count) * 2.0 * np.pi / count))
+    wider = StateSpace.of_joints(
+        (*space.names, FACING),
+        [*(space.of(joint) for joint in range(len(space))), ring],
+        kind=space.kind,
+        tolerances=np.append(space.tolerances, 360.0 / count),
+        labels=(*space.labels, ()),
+    )
+    steps = np.round(rot.heading(turns) / (2.0 * np.pi / count)).astype(np.int32) % count
+    return wider, steps
+
+
+def _source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discretization]:
+    """A corpus that people wrote: its clips, and the discretization that its manifest names."""
+    try:
+        discretization = from_spec(manifest.discretization)
+    except FormatError as error:
+        raise FormatError(str(error), path=folder / store.MANIFEST) from error
+    motions = [replace(read_motion(folder / clip.file), name=clip.name) for clip in manifest.clips]
+    corpus = gather(
+        motions=[own_skeleton(motion) for motion in motions],
+        flips="keep",
+        about={clip.name: clip.about for clip in manifest.clips},
+        **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
+    )
+    return corpus, discretization
