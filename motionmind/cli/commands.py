@@ -1,111 +1,27 @@
-"""The command line: parse, call, print."""
+"""The commands: parse, call, print."""
 
 from __future__ import annotations
 
 import gc
 import json
-import logging
-import math
 import os
 import sys
-import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
+from motionmind.cli.options import COUNT, FILE, HOME, JSON, NATS, RATE, InOrder, Number, example, reading
+from motionmind.cli.printing import count, note, print_check, print_tween, progress
+from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
     from motionmind.corpus.gather import Flips
     from motionmind.motion import Motion
-    from motionmind.tween import Tween
-
-BAD_INPUT = 2  # exit code for everything that the user can put right
-NO_PATH = 3  # where nothing joins A and B
-INTERRUPTED = 130  # by Ctrl-C, as shells have it
-
-_Command = TypeVar("_Command", bound=Callable[..., Any])
-
-
-class InOrder(click.Group):
-    """Commands in the order in which a user comes to need them."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Their names."""
-        return list(self.commands)
-
-
-class Notes(logging.Handler):
-    """Notes on what was taken for granted, such as a file's unit: for the first file of which each is true."""
-
-    def __init__(self, level: int) -> None:
-        super().__init__(level)
-        self.said: set[object] = set()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print it, to standard error."""
-        what = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
-        if what not in self.said:
-            self.said.add(what)
-            click.echo(f"note: {record.getMessage()}", err=True)
-
-
-class Number(click.FloatRange):
-    """A finite number in a range."""
-
-    name = "number"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number; a usage error where it is none."""
-        number = float(super().convert(value, param, ctx))
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
-        return number
-
-
-FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
-FOLDER = click.Path(file_okay=False, path_type=Path)
-COUNT = click.IntRange(min=1)
-NATS = Number(min=0)
-RATE = Number(min=0, min_open=True, max=1000)  # beyond it lies no camera, only memory
-
-HOME = click.option(
-    "--home",
-    type=FOLDER,
-    envvar="MOTIONMIND_HOME",
-    show_envvar=True,
-    help="Folder of the corpora that you built  [default: the platform's data directory]",
-)
-JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-
-
-def _reading(command: _Command) -> _Command:
-    """Options of the commands that read movement."""
-    for option in (
-        click.option("--asf", type=FILE, help="AMC's skeleton  [default: the one beside it]"),
-        click.option(
-            "--unit",
-            metavar="UNIT",
-            help="BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres in "
-            "one  [default: told from the body's height]",
-        ),
-        click.option("--joints", type=FILE, help="Whose joints they are: a TOML or JSON file, your joint = human23's."),
-    ):
-        command = option(command)
-    return command
-
-
-def _example(line: str) -> str:
-    """An epilog that is not wrapped, so that it can be copied."""
-    return f"\b\nExample:\n  {line}"
-
-
-# --- commands -------------------------------------------------------------------------------------------------------
 
 
 @click.group(
@@ -121,7 +37,7 @@ def app(context: click.Context) -> None:
 
 
 @app.command(
-    epilog=_example(
+    epilog=example(
         "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
         "--corpus ballet -o tween.bvh"
     )
@@ -160,6 +76,7 @@ def tween(
     Exit code 3 says that nothing joins them under the rules that were asked for.
     """
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
+    _load_numba()
     from motionmind.engine import Engine
     from motionmind.formats import read_posture, write_atomically, write_motion
     from motionmind.search.jit import is_compiled
@@ -170,7 +87,7 @@ def tween(
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
     if not is_compiled():
-        _progress("compiling the search, which takes half a minute, once")
+        progress("compiling the search, which takes half a minute, once")
     result = engine.tween(*ends, **options)
     if output:
         write_motion(output, result.motion)
@@ -182,16 +99,16 @@ def tween(
         return
     if report:
         write_atomically(report, f"{text}\n".encode())
-    _print_tween(result, written)
+    print_tween(result, written)
 
 
-@app.command(epilog=_example("motionmind posture clip.bvh --frame 240 -o A.json"))
+@app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))
 @click.argument("clip", type=FILE)
 @click.option(
     "--frame", type=int, metavar="N", required=True, help="Number of the frame, from 0; negative from the end."
 )
 @click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .txt.")
-@_reading
+@reading
 def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str | None, asf: Path | None) -> None:
     """Take one posture out of a clip.
 
@@ -206,12 +123,12 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
 
-@app.command(epilog=_example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
+@app.command(epilog=example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
 @click.argument("source", type=FILE, metavar="IN")
 @click.argument("output", type=FILE, metavar="OUT")
 @click.option("--skeleton", type=click.Choice(["own", "human23"]), default="own", help="The file's joints, or human23.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: as they are]")
-@_reading
+@reading
 def convert(
     source: Path,
     output: Path,
@@ -235,7 +152,7 @@ def convert(
     if fps is not None:
         motion = motion.resample(fps)
     write_motion(output, motion)
-    click.echo(f"{output}: {_count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
+    click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 
 
 @app.group("corpus", cls=InOrder, invoke_without_command=True)
@@ -245,7 +162,7 @@ def corpora(context: click.Context) -> None:
     _help_alone(context)
 
 
-@corpora.command(epilog=_example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
+@corpora.command(epilog=example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
 @click.argument("name")
 @click.argument("files", type=FILE, nargs=-1, required=True)
 @click.option("--rate", type=RATE, help="Postures a second  [default: every frame]")
@@ -282,7 +199,7 @@ def corpora(context: click.Context) -> None:
     help="Where a joint jumps: split the clip there, keep it, or drop it.",
 )
 @click.option("--flip-angle", type=Number(0, 180), default=45.0, help="Degrees in one frame that are a jump.")
-@_reading
+@reading
 @click.option("--title", default="", show_default=False, help="A line on what it is.")
 @click.option("--author", default="", show_default=False, help="Who made the movement.")
 @click.option("--source", default="", show_default=False, help="Where it comes from.")
@@ -322,7 +239,7 @@ def build(
         with click.progressbar(files, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
             for file in bar:
                 yield own_skeleton(replace(_read(file, unit, asf), name=names[file]), mapping)
-        _progress("learning")
+        progress("learning")
 
     engine = Engine.fit(
         clips(),
@@ -336,11 +253,11 @@ def build(
         **about,
     )
     engine.save(place)
-    _print_check(engine.check())
+    print_check(engine.check())
     click.echo(f"built {place}")
 
 
-@corpora.command("list", epilog=_example("motionmind corpus list"))
+@corpora.command("list", epilog=example("motionmind corpus list"))
 @JSON
 @HOME
 def list_corpora(as_json: bool, home: Path | None) -> None:
@@ -353,7 +270,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
             title = str(read_manifest(folder).get("title") or "")
         except MotionMindError as error:
             title = "cannot be read"
-            click.echo(f"note: {error}", err=True)
+            note(str(error))
         found.append({"name": name, "title": title, "folder": str(folder)})
     if as_json:
         click.echo(json.dumps(found))
@@ -363,7 +280,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
         click.echo(f"{entry['name']:{width}}  {entry['title'] or '-'}  ({entry['folder']})")
 
 
-@corpora.command(epilog=_example("motionmind corpus info ballet --json"))
+@corpora.command(epilog=example("motionmind corpus info ballet --json"))
 @click.argument("name")
 @JSON
 @HOME
@@ -382,7 +299,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         click.echo(f"  {clip['name']:16} {clip['postures']:5}  {clip['about']}".rstrip())
 
 
-@corpora.command(epilog=_example("motionmind corpus check ballet --pairs 500 --seed 1"))
+@corpora.command(epilog=example("motionmind corpus check ballet --pairs 500 --seed 1"))
 @click.argument("name")
 @JSON
 @click.option("--pairs", type=COUNT, metavar="N", default=2000, help="Random pairs of postures to try to join.")
@@ -396,10 +313,23 @@ def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) ->
     if as_json:
         click.echo(json.dumps(found))
     else:
-        _print_check(found)
+        print_check(found)
 
 
 # --- what the commands share ----------------------------------------------------------------------------------------
+
+
+def _load_numba() -> None:
+    """Import numba without SciPy's linear algebra, which it looks for, for a fifth of a second, and nothing here calls.
+
+    Only while numba looks: what needs SciPy later finds it.
+    """
+    if "scipy.linalg" not in sys.modules:
+        sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
+        try:
+            import numba.np.arraymath  # noqa: F401
+        finally:
+            del sys.modules["scipy.linalg"]
 
 
 def _help_alone(context: click.Context) -> None:
@@ -463,111 +393,3 @@ def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]]) -> list[Path]
             continue
         raise MotionMindError(f"{path}: cannot be written: {fault}")
     return paths
-
-
-def _progress(message: str) -> None:
-    """Say on a terminal what takes long."""
-    if sys.stderr.isatty():
-        click.echo(message, err=True)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
-
-
-def _print_tween(result: Tween, files: Sequence[Path]) -> None:
-    seconds = float(result.motion.times[-1])
-    bridged = [f"{b.joint} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
-    waited = Counter(wait.joint for wait in result.waits)
-    lines = [
-        ("moves", f"{result.moves}, in {seconds:.2f} s ({_count(len(result.motion), 'frame')})"),
-        ("cost", f"{result.cost:.3f} nats"),
-        ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
-        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus"),
-        ("bridged", ", ".join(bridged) or "none"),
-        ("waited", ", ".join(f"{joint} {_count(count, 'move')}" for joint, count in waited.items()) or "none"),
-    ]
-    for end, row in zip("AB", result.snap_degrees, strict=True):
-        worst = int(row.argmax())
-        mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
-        lines.append((end, f"{mean} off the corpus's states, at most {most}"))
-    if files:
-        lines.append(("written", ", ".join(map(click.format_filename, files))))
-    for name, line in lines:
-        click.echo(f"{name:10}{line}")
-
-
-def _print_check(found: dict[str, Any]) -> None:
-    rate = f"{found['rate']:g} a second" if found["rate"] else "keyframes"
-    click.echo(
-        f"{found['name']}: {_count(len(found['clips']), 'clip')}, {found['postures']} postures ({rate}), "
-        f"{found['skeleton']}"
-    )
-    width = max(len(joint) for joint in found["states"])
-    click.echo(f"{'joint':{width}}  states  edges  out-degree")
-    for joint, states in found["states"].items():
-        click.echo(f"{joint:{width}}  {states:6}  {found['edges'][joint]:5}  {found['out_degree'][joint]:10.2f}")
-    click.echo(f"{found['joinable']:.1%} of {found['pairs']} random pairs of postures can be joined without a bridge")
-    faults: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for fault in found["faults"]:
-        faults.setdefault((fault["clip"], fault["joint"]), []).append(fault)
-    if faults:
-        total = _count(len(found["faults"]), "fault")
-        click.echo(f"{total} of the recordings, where a joint turns too far in one frame (all with --json):")
-    for (clip, joint), jumps in faults.items():
-        frames = ", ".join(str(jump["frame"]) for jump in jumps[:3])
-        more = f" and {len(jumps) - 3} more" if len(jumps) > 3 else ""
-        most = max(jump["degrees"] for jump in jumps)
-        click.echo(f"  {clip}: {joint} by up to {most:.0f} degrees, at frame {frames}{more}")
-
-
-# --- the door -------------------------------------------------------------------------------------------------------
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 2 for bad input, in one line; 3 where there is no path, with the diagnosis."""
-    log, notes = logging.getLogger("motionmind"), Notes(logging.INFO)
-    log.addHandler(notes)
-    log.setLevel(logging.INFO)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("always", MotionMindWarning)
-            warnings.showwarning = _say
-            sys.exit(_run(arguments))
-    finally:
-        log.removeHandler(notes)
-        gc.enable()
-
-
-def _run(arguments: Sequence[str] | None) -> int:
-    """The exit code of the command line; what was wrong goes to standard error."""
-    code = BAD_INPUT
-    try:
-        return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
-    except click.Abort:  # Ctrl-C
-        return INTERRUPTED
-    except click.UsageError as error:
-        message = error.format_message() + (f" ({error.ctx.command_path} --help shows how)" if error.ctx else "")
-    except NoPathError as error:
-        message, code = str(error), NO_PATH
-    except MotionMindError as error:
-        message = str(error)
-    except OSError as error:  # of standard output: files are written by those who catch theirs
-        message = f"cannot write: {error.strerror or error}"
-    except MemoryError:
-        message = "not enough memory for this"
-    click.echo(f"error: {message}", err=True)
-    return code
-
-
-def _say(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    """Warnings of our own are notes to the user; others are for developers and stay away from the command line."""
-    if issubclass(category, MotionMindWarning):
-        click.echo(f"note: {message}", err=True)

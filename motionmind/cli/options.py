@@ -1,0 +1,70 @@
+"""What the command line's options are made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+class InOrder(click.Group):
+    """Commands in the order in which a user comes to need them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Their names."""
+        return list(self.commands)
+
+
+class Number(click.FloatRange):
+    """A finite number in a range."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number; a usage error where it is none."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+COUNT = click.IntRange(min=1)
+NATS = Number(min=0)
+RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.motion.FASTEST`
+
+HOME = click.option(
+    "--home",
+    type=FOLDER,
+    envvar="MOTIONMIND_HOME",
+    show_envvar=True,
+    help="Folder of the corpora that you built  [default: the platform's data directory]",
+)
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+
+
+def reading(command: _Command) -> _Command:
+    """Options of the commands that read movement."""
+    for option in (
+        click.option("--asf", type=FILE, help="AMC's skeleton  [default: the one beside it]"),
+        click.option(
+            "--unit",
+            metavar="UNIT",
+            help="BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres in "
+            "one  [default: told from the body's height]",
+        ),
+        click.option("--joints", type=FILE, help="Whose joints they are: a TOML or JSON file, your joint = human23's."),
+    ):
+        command = option(command)
+    return command
+
+
+def example(line: str) -> str:
+    """An epilog that is not wrapped, so that it can be copied."""
+    return f"\b\nExample:\n  {line}"

@@ -1,0 +1,110 @@
+"""What the command line prints."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
+
+from motionmind.errors import MotionMindWarning
+
+if TYPE_CHECKING:
+    from motionmind.tween import Tween
+
+
+class Notes(logging.Handler):
+    """Notes on what was taken for granted, such as a file's unit: for the first file of which each is true."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.said: set[object] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it, to standard error."""
+        what = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
+        if what not in self.said:
+            self.said.add(what)
+            note(record.getMessage())
+
+
+def progress(message: str) -> None:
+    """Say on a terminal what takes long."""
+    if sys.stderr.isatty():
+        click.echo(message, err=True)
+
+
+def note(message: str) -> None:
+    """Say what is worth knowing, on a line of its own where a progress bar stands."""
+    clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
+    click.echo(f"{clear}note: {message}", err=True)
+
+
+def count(number: int, what: str) -> str:
+    """A number of things, in words: "1 move", "2 moves"."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def print_tween(result: Tween, files: Sequence[Path]) -> None:
+    """A tween in a few lines: moves, cost, what is proven, what it is made of, and the files written."""
+    seconds = float(result.motion.times[-1])
+    bridged = [f"{b.joint} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
+    waited = Counter(wait.joint for wait in result.waits)
+    lines = [
+        ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
+        ("cost", f"{result.cost:.3f} nats"),
+        ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
+        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus"),
+        ("bridged", ", ".join(bridged) or "none"),
+        ("waited", ", ".join(f"{joint} {count(times, 'move')}" for joint, times in waited.items()) or "none"),
+    ]
+    for end, row in zip("AB", result.snap_degrees, strict=True):
+        worst = int(row.argmax())
+        mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
+        lines.append((end, f"{mean} off the corpus's states, at most {most}"))
+    if files:
+        lines.append(("written", ", ".join(map(click.format_filename, files))))
+    for name, line in lines:
+        click.echo(f"{name:10}{line}")
+
+
+def print_check(found: dict[str, Any]) -> None:
+    """What `survey.check` found: states, edges and out-degree of each joint, what can be joined, faults."""
+    rate = f"{found['rate']:g} a second" if found["rate"] else "keyframes"
+    click.echo(
+        f"{found['name']}: {count(len(found['clips']), 'clip')}, {found['postures']} postures ({rate}), "
+        f"{found['skeleton']}"
+    )
+    width = max(len(joint) for joint in found["states"])
+    click.echo(f"{'joint':{width}}  states  edges  out-degree")
+    for joint, states in found["states"].items():
+        click.echo(f"{joint:{width}}  {states:6}  {found['edges'][joint]:5}  {found['out_degree'][joint]:10.2f}")
+    click.echo(f"{found['joinable']:.1%} of {found['pairs']} random pairs of postures can be joined without a bridge")
+    faults: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for fault in found["faults"]:
+        faults.setdefault((fault["clip"], fault["joint"]), []).append(fault)
+    if faults:
+        total = count(len(found["faults"]), "fault")
+        click.echo(f"{total} of the recordings, where a joint turns too far in one frame (all with --json):")
+    for (clip, joint), jumps in faults.items():
+        frames = ", ".join(str(jump["frame"]) for jump in jumps[:3])
+        more = f" and {len(jumps) - 3} more" if len(jumps) > 3 else ""
+        most = max(jump["degrees"] for jump in jumps)
+        click.echo(f"  {clip}: {joint} by up to {most:.0f} degrees, at frame {frames}{more}")
+
+
+def say(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Warnings of our own are notes to the user; others are for developers and stay away from the command line."""
+    if issubclass(category, MotionMindWarning):
+        note(str(message))
