@@ -48,7 +48,8 @@ def compare(engine: Engine, pairs: int, seed: int, built: float) -> None:
     """Tweens between random pairs of postures, each beside the general solver on the problem of as many moves."""
     drawn = np.random.default_rng(seed).integers(len(engine.corpus), size=(pairs, 2))
     engine.tween(posture(engine, 0), posture(engine, len(engine.corpus) - 1), node_budget=10)  # load compiled code
-    ours, theirs, proven, gaps, expansions, attested, agree = [], [], 0, [], [], [], 0
+    ours, fixed, reading, solving = [], [], [], []
+    proven, gaps, expansions, attested, agree = 0, [], [], [], 0
     for a, b in drawn:
         began = perf_counter()
         tween = engine.tween(posture(engine, a), posture(engine, b))
@@ -57,17 +58,27 @@ def compare(engine: Engine, pairs: int, seed: int, built: float) -> None:
         gaps += [tween.gap] * (tween.status != "optimal")
         expansions.append(tween.expansions)
         attested.append(tween.attested)
-        seconds, optimum = general_solver(tween)
-        theirs.append(seconds)
+        if tween.moves == 0:
+            agree += 1
+            continue
+        again = engine.tween(posture(engine, a), posture(engine, b), moves=tween.moves)
+        fixed.append(sum(again.seconds[part] for part in ("problem", "bound", "search")))
+        read, solved, optimum = general_solver(tween)
+        reading.append(read)
+        solving.append(solved)
         agree += optimum is not None and abs(optimum - tween.cost) < 1e-3
-    ms, other = 1e3 * np.array(ours), 1e3 * np.array(theirs)
+    ms, same, read, other = (1e3 * np.array(seconds) for seconds in (ours, fixed, reading, solving))
     size = f"{len(engine.corpus)} postures, largest joint {engine.space.sizes.max()} states"
     print(f"corpus: {size}; read, learned and saved in {built:.2f} s")
     print(f"tween, all numbers of moves: median {np.median(ms):.0f} ms, 95th percentile {np.percentile(ms, 95):.0f} ms")
     print(f"proven optimal: {proven} of {pairs}; gaps of the rest: {[f'{gap:.2%}' for gap in gaps]}")
     print(f"expansions: median {np.median(expansions):.0f}, most {max(expansions)}; attested {np.mean(attested):.1%}")
-    print(f"toulbar2, that number of moves: median {np.median(other):.0f} ms, 95th {np.percentile(other, 95):.0f} ms")
-    print(f"toulbar2 / tween: median {np.median(other) / np.median(ms):.2f}, mean {other.mean() / ms.mean():.2f}")
+    print("that number of moves alone, posed and solved:      median      95th      mean")
+    for name, times in (("here", same), ("toulbar2, solving", other), ("toulbar2, reading and solving", read + other)):
+        print(f"{name:45}{np.median(times):9.1f} {np.percentile(times, 95):9.1f} {times.mean():9.1f} ms")
+    for name, times in (("solving", other), ("reading and solving", read + other)):
+        ratios = [f(times) / f(same) for f in (np.median, lambda t: np.percentile(t, 95), np.mean)]
+        print(f"toulbar2 {name} / here: " + ", ".join(f"{ratio:.1f}" for ratio in ratios))
     print(f"the same optimum: {agree} of {pairs} (limit {TIME_LIMIT} s a problem)")
 
 
@@ -76,19 +87,18 @@ def posture(engine: Engine, index: int) -> Posture:
     return Posture(engine.corpus.skeleton, engine.corpus.rotations[index], engine.corpus.root[index])
 
 
-def general_solver(tween: Tween) -> tuple[float, float | None]:
-    """Seconds that toulbar2 takes to solve the problem (reading it does not count), and its optimum."""
-    if tween.moves == 0:
-        return 0.0, tween.cost
+def general_solver(tween: Tween) -> tuple[float, float, float | None]:
+    """Seconds that toulbar2 takes to read the problem and to solve it, and its optimum."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "problem.cfn"
         path.write_text(tween.problem())
+        began = perf_counter()
         network = pytoulbar2.CFN(verbose=-1)
         network.Read(str(path))
+        read = perf_counter() - began
         network.CFN.timer(TIME_LIMIT)
-        began = perf_counter()
         found = network.Solve()
-        return perf_counter() - began, found[1] if found else None
+        return read, perf_counter() - began - read, found[1] if found else None
 
 
 def command(engine: Engine, home: Path, seed: int) -> None:

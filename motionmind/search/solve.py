@@ -114,19 +114,20 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
 def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
     """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
 
-    Every few sweeps the path is polished, and positions that no better path goes through are taken out of the grid;
-    until both meet, or what separates them no longer shrinks.
+    Every few sweeps the path that they met, if better than those before, is polished, and positions that no better
+    path goes through are taken out of the grid; until both meet, or what separates them no longer shrinks.
     """
     messages = bound.no_messages(grid)
-    proven, cost, states = -np.inf, np.inf, np.zeros((0, grid.lanes), dtype=np.int32)
+    proven, rough, cost, states = -np.inf, np.inf, np.inf, np.zeros((0, grid.lanes), dtype=np.int32)
     for done in range(0, sweeps, SWEEPS_AT_ONCE):
         gap, size = min(cost, below) - proven, len(grid.dom)
         chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        latest, _ = bound.tighten(grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), min(cost, below))
+        latest, met = bound.tighten(grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), min(cost, below))
         proven = max(proven, latest)
-        found = polish(grid, chosen)
-        if found < cost:
-            cost, states = found, _states(grid, chosen)
+        if met < rough:
+            rough, found = met, polish(grid, chosen)
+            if found < cost:
+                cost, states = found, _states(grid, chosen)
         known = min(cost, below)
         if proven >= known - PROVEN:
             break
