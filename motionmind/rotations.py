@@ -77,15 +77,6 @@ def canonical(q: Array) -> Array:
     return np.asarray(q * np.where(sign < 0.0, -1.0, 1.0)[..., None], dtype=np.float64)
 
 
-def unroll(q: Array) -> Array:
-    """The sequence `q` [T, ..., 4] with signs chosen so that neighbours in time lie in one hemisphere."""
-    if len(q) < 2:
-        return q.copy()
-    flip = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
-    sign = np.concatenate([np.ones((1, *flip.shape[1:])), np.cumprod(np.where(flip, -1.0, 1.0), axis=0)])
-    return np.asarray(q * sign[..., None], dtype=np.float64)
-
-
 def angle(a: Array, b: Array) -> Array:
     """Angle in [0, pi] between rotations [..., 4]; accurate near 0 and near pi."""
     # atan2 of the relative rotation's vector and scalar parts; acos of the dot product loses half the digits.

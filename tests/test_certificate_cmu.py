@@ -19,7 +19,7 @@ from motionmind.search.solve import Rules, solve
 pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
 
 PAIRS = 50
-SECONDS = 4  # that toulbar2 may take for one problem
+SECONDS = 100  # that toulbar2 may take for one problem
 SAME = 1e-3  # nats; the written costs are rounded to 1e-6 each
 
 
@@ -60,7 +60,7 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
             finished += 1
             assert theirs == pytest.approx(ours.cost, abs=SAME), pair
     assert optimal >= 0.95 * PAIRS
-    assert finished >= 48
+    assert finished == PAIRS
 
 
 def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:

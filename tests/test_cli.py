@@ -129,7 +129,7 @@ def test_every_command_and_option_has_help(path: tuple[str, ...], run: Run) -> N
 def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", clip("plies"))
-    assert len(EXAMPLES) == 7
+    assert len(EXAMPLES) == 8
     for line in EXAMPLES:
         program, *words = shlex.split(line)
         assert program == "motionmind"
@@ -566,3 +566,50 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
     process = start("corpus", "info", "ballet", cwd=tmp_path, stdout=begin)
     os.close(begin)
     assert process.communicate()[1] == ""
+
+
+# --- files are safe -------------------------------------------------------------------------------------------------
+
+
+def test_what_is_read_is_not_written_over(run: Run, tmp_path: Path) -> None:
+    write_motion(tmp_path / "clip.bvh", clip())
+    before = files_under(tmp_path)
+    (tmp_path / "down").mkdir()
+    done = run("convert", "clip.bvh", "down/../clip.bvh")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "it is read from" in done.err
+    (tmp_path / "down").rmdir()
+    assert files_under(tmp_path) == before
+
+
+def test_one_file_under_two_names_is_not_written_twice(run: Run, tmp_path: Path) -> None:
+    posture = BALLET / "postures" / "fifth.json"
+    done = run("tween", posture, posture, "--corpus", "ballet", "-o", "a.json", "--report", tmp_path / "a.json")
+    assert done.code == 2
+    assert "written twice" in done.err
+    assert not (tmp_path / "a.json").exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full to write to in vain")
+def test_outputs_are_written_all_or_none(run: Run, tmp_path: Path) -> None:
+    posture = BALLET / "postures" / "fifth.json"
+    done = run("tween", posture, posture, "--corpus", "ballet", "-o", "a.bvh", "--report", "/dev/full")
+    assert done.code == 2
+    assert not (tmp_path / "a.bvh").exists()
+    assert Path("/dev/full").exists()
+
+
+def test_the_papers_two_forms_and_their_rate(run: Run) -> None:
+    write_motion("clip.bvh", clip())
+    assert run("convert", "clip.bvh", "braces.txt").code == 0
+    done = run("convert", "clip.bvh", "lines.txt", "--form", "lines")
+    assert done.code == 0
+    assert "no place for times" in done.err
+    assert "{" in Path("braces.txt").read_text()
+    assert "{" not in Path("lines.txt").read_text()
+    for name in ("braces", "lines"):
+        assert run("convert", f"{name}.txt", f"{name}.json", "--source-fps", 30).code == 0
+        again = read_motion(f"{name}.json")
+        assert len(again) == len(clip())
+        assert again.fps == pytest.approx(30.0)
+        assert float(rot.angle(again.rotations, clip().rotations).max()) < 1e-6

@@ -210,16 +210,6 @@ def test_mirror_is_an_involution_and_a_homomorphism_and_reflects_vectors() -> No
     np.testing.assert_allclose(rot.mul_vec(rot.mirror(A), flip * v), flip * rot.mul_vec(A, v), atol=1e-14)
 
 
-def test_unroll_changes_signs_only_and_leaves_neighbours_in_one_hemisphere() -> None:
-    q = some(200, 40).reshape(50, 4, 4)
-    unrolled = rot.unroll(q)
-    np.testing.assert_array_equal(np.abs(unrolled), np.abs(q))
-    np.testing.assert_array_equal(unrolled[0], q[0])
-    assert np.sum(unrolled[1:] * unrolled[:-1], axis=-1).min() >= 0.0
-    assert_same(unrolled, q, 0.0)
-    np.testing.assert_array_equal(rot.unroll(q[:1]), q[:1])
-
-
 def test_canonical_is_the_same_for_both_signs_and_idempotent() -> None:
     q = np.concatenate([A, np.eye(4), -np.eye(4), [[0.6, -0.8, 0.0, 0.0], [-0.6, 0.0, 0.8, 0.0]]])
     np.testing.assert_array_equal(rot.canonical(q), rot.canonical(-q))
@@ -256,7 +246,7 @@ def test_normalise_refuses_what_has_no_direction() -> None:
 
 def test_functions_broadcast_over_leading_axes() -> None:
     q = A[:24].reshape(2, 3, 4, 4)
-    for function in (rot.inv, rot.canonical, rot.mirror, lambda p: rot.exp(rot.log(p)), rot.unroll):
+    for function in (rot.inv, rot.canonical, rot.mirror, lambda p: rot.exp(rot.log(p))):
         assert function(q).shape == q.shape
     assert rot.to_matrix(q).shape == (2, 3, 4, 3, 3)
     assert rot.from_matrix(rot.to_matrix(q)).shape == q.shape

@@ -8,6 +8,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,12 +22,14 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
     from motionmind.corpus.gather import Flips
+    from motionmind.formats.papers import Form
     from motionmind.motion import Motion
 
 
 @click.group(
     cls=InOrder,
     invoke_without_command=True,
+    epilog=example("motionmind tween A.json B.json --corpus ballet -o tween.bvh"),
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
 @click.version_option(package_name="motionmind", message="%(prog)s %(version)s")
@@ -83,23 +86,24 @@ def tween(
 
     alone = report == Path("-")
     wanted = ((output, (".json", ".bvh")), (None if alone else report, ()), (problem, (".cfn",)))
-    written = _check_outputs([(path, suffixes) for path, suffixes in wanted if path])
+    written = _check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
     if not is_compiled():
         progress("compiling the search, which takes half a minute, once")
     result = engine.tween(*ends, **options)
-    if output:
-        write_motion(output, result.motion)
-    if problem:
-        write_atomically(problem, result.problem().encode())
     text = json.dumps(result.report())
+    with _all_or_none(written):
+        if output:
+            write_motion(output, result.motion)
+        if problem:
+            write_atomically(problem, result.problem().encode())
+        if report and not alone:
+            write_atomically(report, f"{text}\n".encode())
     if alone:
         click.echo(text)
-        return
-    if report:
-        write_atomically(report, f"{text}\n".encode())
-    print_tween(result, written)
+    else:
+        print_tween(result, written)
 
 
 @app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))
@@ -109,7 +113,7 @@ def tween(
 )
 @click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .txt.")
 @reading
-def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str | None, asf: Path | None) -> None:
+def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
     """Take one posture out of a clip.
 
     It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own.
@@ -117,45 +121,49 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, unit: str
     from motionmind.formats import write_posture
     from motionmind.learned import own_skeleton
 
-    _check_outputs([(output, (".json", ".bvh", ".txt"))])
-    motion = own_skeleton(_read(clip, unit, asf), _mapping(joints))
+    _check_outputs([(output, (".json", ".bvh", ".txt"))], [clip])
+    motion = own_skeleton(_read(clip, **source), _mapping(joints))
     write_posture(output, motion.posture(frame))
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
 
 @app.command(epilog=example("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30"))
-@click.argument("source", type=FILE, metavar="IN")
+@click.argument("file", type=FILE, metavar="IN")
 @click.argument("output", type=FILE, metavar="OUT")
 @click.option("--skeleton", type=click.Choice(["own", "human23"]), default="own", help="The file's joints, or human23.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: as they are]")
+@click.option(
+    "--form", type=click.Choice(["braces", "lines"]), default="braces", help="Which of the papers' two, for .txt."
+)
 @reading
 def convert(
-    source: Path,
-    output: Path,
-    skeleton: str,
-    fps: float | None,
-    joints: Path | None,
-    unit: str | None,
-    asf: Path | None,
+    file: Path, output: Path, skeleton: str, fps: float | None, form: Form, joints: Path | None, **source: Any
 ) -> None:
     """Convert movement from one format to another.
 
-    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json or .txt.
+    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json or .txt,
+    which is on human23 and holds orientations alone.
     """
     from motionmind.formats import write_motion
+    from motionmind.formats.papers import write_papers
     from motionmind.retarget import to_human23
 
-    _check_outputs([(output, (".bvh", ".json", ".txt"))])
-    motion = _read(source, unit, asf)
-    if skeleton == "human23" or joints:
+    _check_outputs([(output, (".bvh", ".json", ".txt"))], [file])
+    motion = _read(file, **source)
+    papers = output.suffix.lower() == ".txt"
+    if papers or skeleton == "human23" or joints:
         motion = to_human23(motion, _mapping(joints))
     if fps is not None:
         motion = motion.resample(fps)
-    write_motion(output, motion)
+    if papers:
+        write_papers(output, motion, form=form)
+        note(f"{output}: the notation has no place for times and for where the body is")
+    else:
+        write_motion(output, motion)
     click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 
 
-@app.group("corpus", cls=InOrder, invoke_without_command=True)
+@app.group("corpus", cls=InOrder, invoke_without_command=True, epilog=example("motionmind corpus check ballet"))
 @click.pass_context
 def corpora(context: click.Context) -> None:
     """Build corpora from movement, and look at them."""
@@ -218,6 +226,7 @@ def build(
     joints: Path | None,
     unit: str | None,
     asf: Path | None,
+    source_fps: float | None,
     home: Path | None,
     **about: str,
 ) -> None:
@@ -238,7 +247,7 @@ def build(
     def clips() -> Iterator[Motion]:
         with click.progressbar(files, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
             for file in bar:
-                yield own_skeleton(replace(_read(file, unit, asf), name=names[file]), mapping)
+                yield own_skeleton(replace(_read(file, unit, asf, source_fps), name=names[file]), mapping)
         progress("learning")
 
     engine = Engine.fit(
@@ -337,10 +346,10 @@ def _help_alone(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-def _read(path: Path, unit: str | None, asf: Path | None) -> Motion:
+def _read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
     from motionmind.formats import read_motion
 
-    return read_motion(path, unit=unit, asf=asf)
+    return read_motion(path, unit=unit, asf=asf, fps=source_fps)
 
 
 def _mapping(path: Path | None) -> dict[str, str] | None:
@@ -376,15 +385,18 @@ def _tolerances(given: Sequence[str]) -> tuple[float, dict[str, float]]:
     return default, per_joint
 
 
-def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]]) -> list[Path]:
+def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence[Path]) -> list[Path]:
     """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
     paths = [path for path, _ in wanted]
+    places, sources = [path.resolve() for path in paths], [path.resolve() for path in read]
     for path, suffixes in wanted:
         folder = path.resolve().parent
         if suffixes and path.suffix.lower() not in suffixes:
             fault = f"the name must end in one of {', '.join(suffixes)}"
-        elif paths.count(path) > 1:
+        elif places.count(path.resolve()) > 1:
             fault = "it is to be written twice"
+        elif path.resolve() in sources:
+            fault = "it is read from"
         elif not folder.is_dir():
             fault = f"there is no folder {folder}"
         elif not os.access(path if path.exists() else folder, os.W_OK):
@@ -393,3 +405,15 @@ def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]]) -> list[Path]
             continue
         raise MotionMindError(f"{path}: cannot be written: {fault}")
     return paths
+
+
+@contextmanager
+def _all_or_none(files: Sequence[Path]) -> Iterator[None]:
+    """Of files that are written one after another, leave none that is new behind if one cannot be."""
+    new = [file for file in files if not file.exists()]
+    try:
+        yield
+    except MotionMindError:
+        for file in new:
+            file.unlink(missing_ok=True)
+        raise

@@ -34,6 +34,7 @@ class Number(click.FloatRange):
 
 
 FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
+EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 COUNT = click.IntRange(min=1)
 NATS = Number(min=0)
@@ -52,7 +53,10 @@ JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def reading(command: _Command) -> _Command:
     """Options of the commands that read movement."""
     for option in (
-        click.option("--asf", type=FILE, help="AMC's skeleton  [default: the one beside it]"),
+        click.option(
+            "--source-fps", type=RATE, help="Frames a second of formats that do not say  [default: .amc 120, .txt 1]"
+        ),
+        click.option("--asf", type=EXISTING, help="AMC's skeleton  [default: the one beside it]"),
         click.option(
             "--unit",
             metavar="UNIT",

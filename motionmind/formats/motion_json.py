@@ -30,7 +30,7 @@ import numpy as np
 
 from motionmind.errors import FormatError
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, read_bytes, write_atomically
+from motionmind.formats.files import FilePath, write_atomically
 from motionmind.motion import Motion
 
 
@@ -47,21 +47,16 @@ class MotionSchema(msgspec.Struct, forbid_unknown_fields=True):
     moves: list[float] = []  # msgspec gives each object its own
 
 
-def read_motion_json(path: FilePath) -> Motion:
-    """The motion in a JSON file.
+def motion_from_json(data: bytes, path: FilePath) -> Motion:
+    """The motion in `data`, the content of the file at `path`.
 
     Raises:
-        FormatError: the file is not there or holds no motion of version 1; or its lists do not fit together, times
+        FormatError: it holds no motion of version 1; or its lists do not fit together, times
             do not increase, or a quaternion is zero. The message names file, joint and frame.
 
     Warns:
         MotionMindWarning: quaternions' lengths were off by more than 1e-6 and have been made 1.
     """
-    return motion_from_json(read_bytes(path), path)
-
-
-def motion_from_json(data: bytes, path: FilePath) -> Motion:
-    """The motion in `data`, the content of the file at `path`; see `read_motion_json`."""
     kind = _json.kind_of(data, path)
     if kind != _json.MOTION:
         raise FormatError(f"this holds a posture, where a motion ({_json.MOTION!r}) was expected", path=path)

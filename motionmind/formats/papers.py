@@ -47,6 +47,8 @@ _WRITTEN = 1e-9
 # One joint as it stands in the file: its name, the four words that should be numbers, and their line.
 _Entry = tuple[str, list[str], int]
 
+Form = Literal["braces", "lines"]
+
 
 def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float = 1.0) -> Motion:
     """Movement from a file in the papers' notation, in either form.
@@ -80,7 +82,7 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     return Motion(body, rotations, root, np.arange(len(postures), dtype=np.float64) / rate, name=Path(path).stem)
 
 
-def write_papers(path: FilePath, motion: Motion, *, form: Literal["braces", "lines"] = "braces") -> None:
+def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> None:
     """Write the rotations of `motion` in the papers' notation; the notation has no place for root and times.
 
     Read back, rotations agree to 1e-9. Names are written with blanks in braces, as the papers do, and with

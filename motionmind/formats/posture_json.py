@@ -25,7 +25,7 @@ import numpy as np
 
 from motionmind.errors import FormatError
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, read_bytes, write_atomically
+from motionmind.formats.files import FilePath, write_atomically
 from motionmind.motion import Posture
 
 
@@ -39,21 +39,16 @@ class PostureSchema(msgspec.Struct, forbid_unknown_fields=True):
     rotations: dict[str, _json.Quaternion]
 
 
-def read_posture_json(path: FilePath) -> Posture:
-    """The posture in a JSON file.
+def posture_from_json(data: bytes, path: FilePath) -> Posture:
+    """The posture in `data`, the content of the file at `path`.
 
     Raises:
-        FormatError: the file is not there or holds no posture of version 1; or a joint is missing, unknown, or has
+        FormatError: it holds no posture of version 1; or a joint is missing, unknown, or has
             a zero quaternion. The message names file and joint.
 
     Warns:
         MotionMindWarning: a quaternion's length was off by more than 1e-6 and has been made 1.
     """
-    return posture_from_json(read_bytes(path), path)
-
-
-def posture_from_json(data: bytes, path: FilePath) -> Posture:
-    """The posture in `data`, the content of the file at `path`; see `read_posture_json`."""
     kind = _json.kind_of(data, path)
     if kind != _json.POSTURE:
         raise FormatError(f"this holds a motion, where a posture ({_json.POSTURE!r}) was expected", path=path)
