@@ -32,35 +32,30 @@ def cmu05(shared_data: Path) -> Engine:
     return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
 
 
-def toulbar2(path: Path, seconds: int) -> tuple[float, float]:
-    """Cost of the best solution that toulbar2 finds within a time, and the bound it proves; equal where it finished."""
+def toulbar2(path: Path) -> float:
+    """The optimum that toulbar2 finds and proves, given a hundred seconds; infinite where it finds nothing."""
     network = pytoulbar2.CFN(verbose=-1)
     network.Read(str(path))
-    solution = network.Solve(timeLimit=seconds)
-    return (np.inf if solution is None else solution[1]), network.GetDDualBound()
+    network.CFN.timer(SECONDS)
+    solution = network.Solve()
+    return np.inf if solution is None else solution[1]
 
 
 def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
     model = price(cmu05.grammar, "conditional", 1.0, 1.0)
     rules = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
     rng = np.random.default_rng(7)
-    optimal = finished = 0
+    optimal = 0
     for pair in range(PAIRS):
         start, goal = cmu05.states[rng.integers(len(cmu05.states), size=2)].astype(np.int64)
         ours = solve(model, start, goal, rules)
         assert ours is not None
         moves = len(ours.path) - 1
         (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.lanes))
-        theirs, proven = toulbar2(tmp_path / "problem.cfn", SECONDS)
+        assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
+        assert ours.lower_bound <= ours.cost
         optimal += ours.status == "optimal"
-        # Of exactly these moves ours is the best known; the bound on all numbers of moves holds for these as well.
-        assert ours.lower_bound <= theirs + SAME, pair
-        assert proven <= ours.cost + SAME, pair
-        if theirs - proven < SAME:
-            finished += 1
-            assert theirs == pytest.approx(ours.cost, abs=SAME), pair
     assert optimal >= 0.95 * PAIRS
-    assert finished == PAIRS
 
 
 def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:
@@ -72,5 +67,4 @@ def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_
             if ours is not None:
                 text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, lanes)
                 (tmp_path / "problem.cfn").write_text(text)
-                theirs, _ = toulbar2(tmp_path / "problem.cfn", SECONDS)
-                assert theirs == pytest.approx(ours.cost, abs=SAME), (seed, moves)
+                assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), (seed, moves)

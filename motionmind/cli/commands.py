@@ -329,16 +329,19 @@ def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) ->
 
 
 def _load_numba() -> None:
-    """Import numba without SciPy's linear algebra, which it looks for, for a fifth of a second, and nothing here calls.
+    """Import numba without what it looks for, for a quarter of a second, and nothing here needs.
 
-    Only while numba looks: what needs SciPy later finds it.
+    That is SciPy's linear algebra, and YAML where no file configures numba. Only while numba looks: who needs them
+    later finds them.
     """
-    if "scipy.linalg" not in sys.modules:
-        sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
-        try:
-            import numba.np.arraymath  # noqa: F401
-        finally:
-            del sys.modules["scipy.linalg"]
+    spared = {"scipy.linalg"} | ({"yaml"} if not Path(".numba_config.yaml").exists() else set())
+    spared -= sys.modules.keys()
+    sys.modules.update(dict.fromkeys(spared))  # type: ignore[arg-type]
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        for name in spared:
+            del sys.modules[name]
 
 
 def _help_alone(context: click.Context) -> None:
