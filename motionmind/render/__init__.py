@@ -1,0 +1,1 @@
+"""Pictures of postures, from bodies down to pixels: `anatomy`, `solids`, `figure`, `sheet`."""
