@@ -206,6 +206,8 @@ def about_vertical(theta: ArrayLike) -> Array:
     return from_axis_angle([0.0, 1.0, 0.0], theta)
 
 
-def mirror(q: Array) -> Array:
-    """The rotation [..., 4] seen in a mirror that exchanges left and right (+x and -x)."""
-    return np.asarray(q * np.array([1.0, -1.0, -1.0, 1.0]))
+def mirror(q: Array, axis: int = 0) -> Array:
+    """The rotation [..., 4] seen in a mirror that exchanges + and - of an axis: left and right (x) by default."""
+    sign = np.array([-1.0, -1.0, -1.0, 1.0])
+    sign[axis] = 1.0
+    return np.asarray(q * sign)

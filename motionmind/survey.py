@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 
@@ -21,9 +21,8 @@ def info(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "author": corpus.author,
         "source": corpus.source,
         "licence": corpus.licence,
-        "clips": [
-            {"name": clip.name, "postures": clip.stop - clip.start, "about": clip.about} for clip in corpus.clips
-        ],
+        "clips": [{"name": clip.label, "postures": len(clip), "about": clip.about} for clip in corpus.clips],
+        "origins": origins(corpus),
         "postures": len(corpus),
         "moves": len(corpus.begins),
         "skeleton": corpus.skeleton.name,
@@ -33,6 +32,32 @@ def info(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "states": _by_lane(grammar, graph.sizes()),
         "edges": _by_lane(grammar, np.diff(graph.indptr[graph.starts])),
     }
+
+
+def origins(corpus: Corpus) -> list[dict[str, Any]]:
+    """Where a corpus comes from, as plain values for JSON: for each corpus that it was made of, and for what of that is
+    mirrored, reversed or of another weight, the clips, postures and moves, what each move counts, and the share of all
+    moves that they make."""
+    found: dict[tuple[str, bool, bool, float], list[Clip]] = {}
+    for backwards in (False, True):
+        for clip in corpus.clips:
+            if clip.reverse is not None or not backwards:
+                weight = clip.reverse_weight if backwards else clip.weight
+                found.setdefault((clip.corpus or corpus.name, clip.mirrored, backwards, weight), []).append(clip)
+    total = float(corpus.moves.weights.sum())
+    return [
+        {
+            "corpus": name,
+            "mirrored": is_mirrored,
+            "reversed": backwards,
+            "clips": len(clips),
+            "postures": sum(map(len, clips)),
+            "moves": sum(len(clip) - 1 for clip in clips),
+            "weight": weight,
+            "share": weight * sum(len(clip) - 1 for clip in clips) / total,
+        }
+        for (name, is_mirrored, backwards, weight), clips in found.items()
+    ]
 
 
 def check(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -40,10 +40,21 @@ class Wait:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a move of a joint was seen: a clip, and the number of the posture there from which it was made."""
+    """Where a move of a joint was seen.
+
+    Attributes:
+        clip: the clip's name.
+        posture: the number of the posture there from which it was made.
+        corpus: the corpus that the clip comes from.
+        mirrored: whether it was seen with left and right exchanged.
+        reversed: whether it was seen played backwards: it leads to the posture before.
+    """
 
     clip: str
     posture: int
+    corpus: str = ""
+    mirrored: bool = False
+    reversed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +139,7 @@ class Tween:
                 end: dict(zip(self.joints, map(float, row), strict=True))
                 for end, row in zip("AB", self.snap_degrees, strict=True)
             },
-            "sources": [
-                [None if s is None else {"clip": s.clip, "posture": s.posture} for s in row] for row in self.sources
-            ],
+            "sources": [[None if source is None else asdict(source) for source in row] for row in self.sources],
         }
 
     def problem(self) -> str:
@@ -152,7 +161,7 @@ def explain(
         row: list[Source | None] = []
         for lane, joint in enumerate(grammar.lanes):
             edge = graph.edge(lane, before[lane], after[lane])
-            row.append(Source(*corpus.where(int(graph.attests[edge]))) if edge >= 0 else None)
+            row.append(_source(corpus, int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None)
             holds_goal = before[lane] == after[lane] == path[-1, lane]
             if holds_goal and (edge < 0 or wait < weights[edge]):
                 waits.append(Wait(joint, move, wait))
@@ -162,6 +171,11 @@ def explain(
         sources.append(tuple(row))
     attested = [source is not None for row in sources for source in row]
     return float(np.mean(attested)) if attested else 1.0, tuple(bridges), tuple(waits), tuple(sources)
+
+
+def _source(corpus: Corpus, posture: int, to: int) -> Source:
+    clip = corpus.clip_of(posture)
+    return Source(clip.name, posture - clip.start, clip.corpus or corpus.name, clip.mirrored, to < posture)
 
 
 def diagnose(model: Model, grammar: Grammar, start: Ints, goal: Ints, rules: Rules, strict: bool) -> str:

@@ -58,7 +58,7 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
         ("cost", f"{result.cost:.3f} nats"),
         ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
-        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus"),
+        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus{_attesters(result)}"),
         ("bridged", ", ".join(bridged) or "none"),
         ("waited", ", ".join(f"{joint} {count(times, 'move')}" for joint, times in waited.items()) or "none"),
     ]
@@ -72,6 +72,35 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         click.echo(f"{name:10}{line}")
 
 
+def _attesters(result: Tween) -> str:
+    """What part of the corpus attests how much, where it has several."""
+    seen = [source for row in result.sources for source in row if source is not None]
+    times = Counter(origin(source.corpus, source.mirrored, source.reversed) for source in seen)
+    if len(times) < 2:
+        return ""
+    return ": " + ", ".join(f"{name} {number / len(seen):.0%}" for name, number in times.most_common())
+
+
+def origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:
+    """Where movement comes from: "ballet", "ballet (mirrored, reversed)"."""
+    changes = ", ".join(["mirrored"] * is_mirrored + ["reversed"] * is_reversed)
+    return f"{corpus} ({changes})" if changes else corpus
+
+
+def print_origins(found: dict[str, Any]) -> None:
+    """What a corpus was made of, where that is not only its own recordings as they are."""
+    rows = [(origin(row["corpus"], row["mirrored"], row["reversed"]), row) for row in found["origins"]]
+    if len(rows) < 2 and not any(name != found["name"] for name, _ in rows):
+        return
+    width = max(len(name) for name, _ in rows)
+    click.echo(f"{'learned from':{width}}  clips  postures  moves  each counts  of all moves")
+    for name, row in rows:
+        click.echo(
+            f"{name:{width}}  {row['clips']:5}  {row['postures']:8}  {row['moves']:5}  {row['weight']:11.4g}  "
+            f"{row['share']:12.1%}"
+        )
+
+
 def print_check(found: dict[str, Any]) -> None:
     """What `survey.check` found: states, edges and out-degree of each joint, what can be joined, faults."""
     rate = f"{found['rate']:g} a second" if found["rate"] else "keyframes"
@@ -79,6 +108,7 @@ def print_check(found: dict[str, Any]) -> None:
         f"{found['name']}: {count(len(found['clips']), 'clip')}, {found['postures']} postures ({rate}), "
         f"{found['skeleton']}"
     )
+    print_origins(found)
     width = max(len(joint) for joint in found["states"])
     click.echo(f"{'joint':{width}}  states  edges  out-degree")
     for joint, states in found["states"].items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.errors import CorpusError
+from motionmind.motion import Motion
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -18,16 +21,62 @@ Ints = NDArray[np.int64]
 Facing = Literal["free", "stage"]
 
 FACING = "facing"  # the lane of the body's turn about the vertical
+DEAREST = 100.0  # nats a move backwards; a count of exp(-100) is one that no search will ever pay
 
 
 @dataclass(frozen=True)
 class Clip:
-    """One unbroken stretch of movement: postures `start` to `stop - 1` of the corpus."""
+    """One unbroken stretch of movement: postures `start` to `stop - 1` of the corpus.
+
+    Attributes:
+        name: of the recording, or of a part of it.
+        start: its first posture.
+        stop: the one after its last.
+        about: a line on what it is.
+        corpus: the corpus that it was taken from; "" for this corpus itself.
+        weight: what each of its postures and moves counts; the heaviest clip's count 1.
+        mirrored: whether left and right are exchanged.
+        reverse: the price in nats a move at which it is learned backwards too; None where it is not.
+    """
 
     name: str
     start: int
     stop: int
     about: str = ""
+    corpus: str = ""
+    weight: float = 1.0
+    mirrored: bool = False
+    reverse: float | None = None
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    @property
+    def label(self) -> str:
+        """The name, with where it comes from and whether it is mirrored: "ballet: jump (mirrored)"."""
+        return f"{self.corpus}: " * bool(self.corpus) + self.name + " (mirrored)" * self.mirrored
+
+    @property
+    def reverse_weight(self) -> float:
+        """What each of its moves counts backwards: 0 where none does."""
+        return 0.0 if self.reverse is None else self.weight * math.exp(-self.reverse)
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """M moves between postures of a corpus.
+
+    Attributes:
+        begins: the posture that each leads from [M].
+        ends: the posture that it leads to [M]: the next one, or, where a clip is learned backwards, the one before.
+        seconds: how long it takes [M].
+        weights: what it counts [M].
+    """
+
+    begins: Ints
+    ends: Ints
+    seconds: Floats
+    weights: Floats
 
 
 @dataclass(frozen=True)
@@ -58,7 +107,7 @@ class Corpus:
         author: who made it.
         source: where it comes from.
         licence: under which it may be used.
-        faults: of the recordings.
+        faults: of the corpus's own recordings.
     """
 
     name: str
@@ -88,6 +137,12 @@ class Corpus:
         bounds = [(clip.start, clip.stop) for clip in self.clips]
         if [0, *(stop for _, stop in bounds)] != [*(start for start, _ in bounds), count]:
             raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {count}")
+        for clip in self.clips:
+            if not (0.0 < clip.weight < math.inf and (clip.reverse is None or 0.0 <= clip.reverse <= DEAREST)):
+                raise CorpusError(
+                    f"corpus {self.name!r}: {clip.label} weighs {clip.weight} and costs {clip.reverse} nats a move "
+                    f"backwards; a weight must be above 0, a price from 0 to {DEAREST:g}"
+                )
         if self.facing not in ("free", "stage"):
             raise CorpusError(f"corpus {self.name!r}: facing must be 'free' or 'stage', not {self.facing!r}")
         if FACING in self.skeleton.names:
@@ -97,16 +152,30 @@ class Corpus:
         return len(self.rotations)
 
     @cached_property
+    def moves(self) -> Moves:
+        """All moves from a posture to the next one in the same clip; then, of clips that are learned backwards too,
+        those to the one before."""
+        forward = _ranges((clip.start, clip.stop - 1) for clip in self.clips)
+        backward = _ranges((clip.start, clip.stop - 1) for clip in self.clips if clip.reverse is not None)
+        begins, ends = np.concatenate([forward, backward + 1]), np.concatenate([forward + 1, backward])
+        counts = np.array([(clip.weight, clip.reverse_weight) for clip in self.clips])[self._clip_of]
+        weights = np.concatenate([counts[forward, 0], counts[backward, 1]])
+        return Moves(begins, ends, np.abs(self.times[ends] - self.times[begins]), weights)
+
+    @property
     def begins(self) -> Ints:
-        """Postures from which a move leads to the next one in the same clip [M]."""
-        return np.concatenate(
-            [np.zeros(0, np.int64), *(np.arange(clip.start, clip.stop - 1) for clip in self.clips)]
-        ).astype(np.int64)
+        """Postures from which the moves lead [M]."""
+        return self.moves.begins
+
+    @property
+    def seconds(self) -> Floats:
+        """Durations of the moves [M]."""
+        return self.moves.seconds
 
     @cached_property
-    def seconds(self) -> Floats:
-        """Durations of those moves [M]."""
-        return np.asarray(self.times[self.begins + 1] - self.times[self.begins])
+    def weights(self) -> Floats:
+        """What each posture counts [N]. To see a clip backwards too says nothing new of how the body stands in it."""
+        return np.array([clip.weight for clip in self.clips])[self._clip_of]
 
     @cached_property
     def lanes(self) -> tuple[str, ...]:
@@ -140,5 +209,18 @@ class Corpus:
 
     def where(self, posture: int) -> tuple[str, int]:
         """The clip that a posture is in and its number there."""
-        clip = self.clips[self._clip_of[posture]]
+        clip = self.clip_of(posture)
         return clip.name, posture - clip.start
+
+    def clip_of(self, posture: int) -> Clip:
+        """The clip that a posture is in."""
+        return self.clips[int(self._clip_of[posture])]
+
+    def motion(self, clip: Clip) -> Motion:
+        """One of the corpus's clips as a motion."""
+        here = slice(clip.start, clip.stop)
+        return Motion(self.skeleton, self.rotations[here], self.root[here], self.times[here], clip.name)
+
+
+def _ranges(bounds: Iterable[tuple[int, int]]) -> Ints:
+    return np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in bounds)]).astype(np.int64)

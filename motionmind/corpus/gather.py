@@ -1,23 +1,43 @@
-"""From recordings to a corpus: frames dropped, faults found, postures made even in time."""
+"""From recordings, and from other corpora, to a corpus: faults found, postures made even in time, clips mirrored."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
-from typing import Literal, get_args
+from typing import Literal, TypedDict, get_args
 
 import numpy as np
 
 from motionmind import rotations as rot
-from motionmind.corpus.corpus import Clip, Corpus, Facing, Fault
-from motionmind.errors import CorpusError
+from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, Fault
+from motionmind.errors import CorpusError, SkeletonError
+from motionmind.mirror import mirrored
 from motionmind.motion import Motion
+from motionmind.skeleton import Skeleton
 
 Flips = Literal["drop", "keep", "split"]
 
 FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
+LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
+
+
+class Gathering(TypedDict, total=False):
+    """Options of `gather`, for those who hand them on."""
+
+    rate: float | None
+    skip: int
+    facing: Facing
+    flips: Flips
+    flip_degrees: float
+    mirror: bool
+    reverse: float | None
+    about: Mapping[str, str] | None
+    title: str
+    author: str
+    source: str
+    licence: str
 
 
 def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[Fault, ...]:
@@ -43,38 +63,147 @@ def gather(
     facing: Facing = "free",
     flips: Flips = "split",
     flip_degrees: float = FLIP_DEGREES,
-    about: dict[str, str] | None = None,
+    mirror: bool = False,
+    reverse: float | None = None,
+    mix: Sequence[tuple[Corpus, float]] = (),
+    about: Mapping[str, str] | None = None,
     title: str = "",
     author: str = "",
     source: str = "",
     licence: str = "",
 ) -> Corpus:
-    """A corpus of `motions`, all on the same joints.
+    """A corpus of `motions`, and of the corpora to `mix` with them, all on the same joints.
 
     Args:
         name: of the corpus.
         motions: the recordings, named; one of a name that is taken is numbered.
         rate: postures a second; None keeps every frame with its own time.
         skip: frames to drop at each recording's start, such as an added T-pose.
-        facing: see Corpus.
+        facing: "free" takes the turn about the vertical out of the root's state, to be a lane of its own; "stage"
+            leaves it there, so that what faces the wall is another state than what faces the public.
         flips: what becomes of a recording with faults (`find_flips`): `split` cuts it there, so that no jump is
             learned, `keep` takes it as it is, `drop` leaves it out.
         flip_degrees: what counts as one, in one frame.
+        mirror: whether to learn from all clips with left and right exchanged, too.
+        reverse: the price, nats a move, at which to learn from all clips played backwards, too: there each move counts
+            exp(-price). None leaves it with what is so in a corpus that is mixed in.
+        mix: other corpora, each with what its postures and moves count there where those of `motions` count 1. Only
+            the ratios matter: the heaviest is made 1. Their clips are taken as they are, and made even in time if
+            `rate` says so; `skip` and `flips` are for the recordings.
         about: a line on each clip, by its name.
         title: a line on what the corpus is.
         author: who made it.
         source: where it comes from.
         licence: under which it may be used.
 
-    Raises CorpusError where nothing is left to learn from, two recordings differ in their joints, or an option is out
-    of its range.
+    Raises:
+        CorpusError: nothing is left to learn from, two recordings or corpora differ in their joints or cannot be
+            brought to one rate, or an option is out of its range.
+        SkeletonError: the body cannot be mirrored.
     """
+    _check(skip, flips, flip_degrees, reverse)
+    _check_mix(name, mix, rate)
+    recordings, faults, body = _recorded(motions, rate, skip, flips, flip_degrees)
+    if body is None and not mix:
+        raise CorpusError(f"corpus {name!r}: no recordings given")
+    pieces = [(piece, Clip(piece.name, 0, 0, (about or {}).get(piece.name, ""))) for piece in recordings]
+    for other, weight in mix:
+        body = body or other.skeleton
+        difference = body.difference(other.skeleton)
+        if difference is not None:
+            raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
+        pieces += _taken(other, weight, rate)
+    if not pieces or body is None:
+        raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
+    if rate is None:
+        rate = _common_rate(bool(recordings), mix)
+    if mirror:
+        pieces += _mirror_images(pieces)
+    lengths = np.cumsum([0, *(len(piece) for piece, _ in pieces)])
+    if lengths[-1] == len(pieces):
+        what = f" at {rate:g} postures a second" if rate else ""
+        raise CorpusError(f"corpus {name!r}: no recording holds two postures{what}, so there is no move to learn")
+    heaviest = max(clip.weight for _, clip in pieces)
+    clips = tuple(
+        replace(
+            clip,
+            start=int(start),
+            stop=int(stop),
+            weight=clip.weight / heaviest,
+            reverse=clip.reverse if reverse is None else reverse,
+        )
+        for (_, clip), start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
+    )
+    return Corpus(
+        name,
+        body,
+        clips,
+        np.concatenate([piece.rotations for piece, _ in pieces]),
+        np.concatenate([piece.root for piece, _ in pieces]),
+        np.concatenate([piece.times for piece, _ in pieces]),
+        facing,
+        rate,
+        title,
+        author,
+        source,
+        licence,
+        tuple(faults),
+    )
+
+
+# --- what is asked for ------------------------------------------------------------------------------------------------
+
+
+def _check(skip: int, flips: Flips, flip_degrees: float, reverse: float | None) -> None:
     if skip < 0:
         raise CorpusError(f"the number of frames to skip must be at least 0, not {skip}")
     if flips not in get_args(Flips):
         raise CorpusError(f"flips must be one of {', '.join(get_args(Flips))}, not {flips!r}")
     if not 0.0 < flip_degrees <= 180.0:
         raise CorpusError(f"the angle of a flip must be above 0 and at most 180 degrees, not {flip_degrees}")
+    if reverse is not None and not 0.0 <= reverse <= DEAREST:
+        raise CorpusError(f"the price of a move backwards must be from 0 to {DEAREST:g} nats, not {reverse}")
+
+
+def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | None) -> None:
+    names = [other.name for other, _ in mix]
+    for other, weight in mix:
+        if not LIGHTEST <= weight <= HEAVIEST:
+            raise CorpusError(
+                f"the weight of corpus {other.name!r} must be from {LIGHTEST:g} to {HEAVIEST:g}, not {weight}"
+            )
+        if other.name == name:
+            raise CorpusError(f"corpus {name!r} cannot be mixed into itself; give what is built another name")
+        if names.count(other.name) > 1:
+            raise CorpusError(f"two of the corpora to mix are called {other.name!r}")
+        if rate is not None and other.rate is not None and rate > other.rate:
+            raise CorpusError(
+                f"corpus {other.name!r} has {other.rate:g} postures a second; {rate:g} cannot be made of them"
+            )
+
+
+def _common_rate(recordings: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
+    """The rate of corpora that are mixed as they are, and of recordings of which every frame is taken."""
+    found: dict[float | None, str] = {None: "the recordings"} if recordings else {}
+    for mixed, _ in mix:
+        found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
+    if len(found) > 1:
+        (a, one), (b, other) = list(found.items())[:2]
+        raise CorpusError(f"{one} and {other} are of different rates ({_pace(a)}, {_pace(b)}); give a rate for all")
+    return next(iter(found))
+
+
+def _pace(rate: float | None) -> str:
+    return "frame by frame" if rate is None else f"{rate:g} postures a second"
+
+
+# --- clips, which do not know yet where they lie ----------------------------------------------------------------------
+
+
+def _recorded(
+    motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
+) -> tuple[list[Motion], list[Fault], Skeleton | None]:
+    """The recordings without what is skipped, cut at faults and even in time; the faults; the first one's body."""
     pieces: list[Motion] = []
     faults: list[Fault] = []
     names: set[str] = set()
@@ -98,33 +227,31 @@ def gather(
         cuts = sorted({f.frame for f in found}) if flips == "split" else []
         parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
         pieces += _named([part if rate is None else part.resample(rate) for part in parts], motion.name)
-    if first is None:
-        raise CorpusError(f"corpus {name!r}: no recordings given")
-    if not pieces:
-        raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
-    lengths = np.cumsum([0, *(len(piece) for piece in pieces)])
-    if lengths[-1] == len(pieces):
-        what = f" at {rate:g} postures a second" if rate else ""
-        raise CorpusError(f"corpus {name!r}: no recording holds two postures{what}, so there is no move to learn")
-    clips = tuple(
-        Clip(piece.name, int(start), int(stop), (about or {}).get(piece.name, ""))
-        for piece, start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
-    )
-    return Corpus(
-        name,
-        first.skeleton,
-        clips,
-        np.concatenate([piece.rotations for piece in pieces]),
-        np.concatenate([piece.root for piece in pieces]),
-        np.concatenate([piece.times for piece in pieces]),
-        facing,
-        rate,
-        title,
-        author,
-        source,
-        licence,
-        tuple(faults),
-    )
+    return pieces, faults, first.skeleton if first else None
+
+
+def _taken(other: Corpus, weight: float, rate: float | None) -> list[tuple[Motion, Clip]]:
+    """The clips of another corpus, by which they go from then on, where each counts `weight` times as much."""
+    out = []
+    for clip in other.clips:
+        motion = other.motion(clip)
+        if rate is not None and rate != other.rate:
+            motion = motion.resample(rate)
+        out.append((motion, replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight)))
+    return out
+
+
+def _mirror_images(pieces: Sequence[tuple[Motion, Clip]]) -> list[tuple[Motion, Clip]]:
+    """The clips with left and right exchanged, but for those of which a corpus that is mixed in has the image."""
+    there = {(clip.corpus, clip.name) for _, clip in pieces if clip.mirrored}
+    out = []
+    for motion, clip in pieces:
+        if (clip.corpus, clip.name) not in there:
+            try:
+                out.append((mirrored(motion), replace(clip, mirrored=True)))
+            except SkeletonError as error:
+                raise SkeletonError(f"{clip.label}: {error}") from None
+    return out
 
 
 def _named(parts: list[Motion], name: str) -> list[Motion]:

@@ -2,8 +2,8 @@
 
 A pgmpy network is the model of record. A joint's conditional distribution is estimated from the corpus's postures
 with a Dirichlet prior of `PSEUDO_COUNT` virtual postures spread as the joint's marginal is, so that a pair that was
-never seen together costs what its parts cost: dear, but possible. With N the corpus's counts, m the marginal and a the
-pseudo-count,
+never seen together costs what its parts cost: dear, but possible. With N the corpus's counts (each posture by its
+weight), m the marginal and a the pseudo-count,
 
     P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
 
@@ -63,9 +63,11 @@ class Coordination:
 
 
 def fit_network(
-    names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints
+    names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints, weights: Floats | None = None
 ) -> DiscreteBayesianNetwork:
     """The pgmpy network over joints `names` [J] with `parents` [J], from `states` [N, J] of a corpus's postures.
+
+    What each posture counts is in `weights` [N]; None for 1.
 
     Every joint is a node, its states 0 .. S - 1 the state names; `get_cpds("left_knee")` is P(left_knee | left_hip).
     """
@@ -77,8 +79,9 @@ def fit_network(
     network.add_nodes_from(names)
     network.add_edges_from((names[p], name) for name, p in zip(names, parents, strict=True) if p >= 0)
     prior = {}
+    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
     for j, name in enumerate(names):
-        marginal = np.bincount(states[:, j], minlength=sizes[j]) / len(states)
+        marginal = np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
         columns = sizes[parents[j]] if parents[j] >= 0 else 1
         prior[name] = np.repeat(PSEUDO_COUNT * marginal[:, None], columns, axis=1)
     estimator = DiscreteBayesianEstimator(
@@ -87,17 +90,24 @@ def fit_network(
         pseudo_counts=prior,
     )
     frame = pd.DataFrame({name: states[:, j] for j, name in enumerate(names)})
-    network.add_cpds(*estimator.fit(network, frame).parameters_)
+    network.add_cpds(*estimator.fit(network, frame, sample_weight=weights).parameters_)
     return network
 
 
 def compile_network(
-    network: DiscreteBayesianNetwork, names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints
+    network: DiscreteBayesianNetwork,
+    names: tuple[str, ...],
+    parents: Ints,
+    states: NDArray[np.int32],
+    sizes: Ints,
+    weights: Floats | None = None,
 ) -> Coordination:
-    """The flat form of a network's CPDs, in the order of `names`; `states` [N, J] tell which pairs were seen.
+    """The flat form of a network's CPDs, in the order of `names`; `states` [N, J] and their weights [N] are what the
+    network was fitted to, and tell which pairs were seen.
 
     Lanes that are no node of the network are coupled to nothing.
     """
+    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     child_costs = np.zeros(starts[-1])
     pair_starts, pair_counts = [0], []
@@ -116,9 +126,9 @@ def compile_network(
         pair_counts.append(np.bincount(p, minlength=sizes[parent]))
         pair_states.append(c)
         pair_costs.append(-np.log(values[c, p]))
-        marginal = np.bincount(states[:, j], minlength=sizes[j]) / len(states)
+        marginal = np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
         child_costs[starts[j] : starts[j + 1]] = -np.log(PSEUDO_COUNT * marginal)
-        parent_costs.append(np.log(np.bincount(states[:, parent], minlength=sizes[parent]) + PSEUDO_COUNT))
+        parent_costs.append(np.log(np.bincount(states[:, parent], weights, sizes[parent]) + PSEUDO_COUNT))
         pair_starts.append(pair_starts[-1] + sizes[parent])
     return Coordination(
         coupled,

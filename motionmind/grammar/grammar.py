@@ -42,6 +42,10 @@ def learn(
     sizes: Ints,
     begins: Ints,
     seconds: Floats,
+    *,
+    ends: Ints | None = None,
+    weights: Floats | None = None,
+    posture_weights: Floats | None = None,
 ) -> Grammar:
     """Learn from a corpus's postures.
 
@@ -51,11 +55,23 @@ def learn(
         centres: orientation of each state, lane after lane [sum of sizes, 4].
         states: state of each lane in each posture [N, L]; every state of a joint occurs.
         sizes: number of states in each lane [L].
-        begins: postures from which a move leads to the next [M].
+        begins: postures from which a move leads [M].
         seconds: duration of those moves [M].
+        ends: the posture that each move leads to [M]; None for the next one.
+        weights: what each move counts [M]; None for 1.
+        posture_weights: what each posture counts [N]; None for 1.
     """
     joints = len(lanes) - (lanes[-1] == "facing")
-    transitions = count_transitions(states, sizes, begins, seconds, pooled=joints if joints < len(lanes) else None)
-    network = fit_network(lanes[:joints], parents[:joints], states[:, :joints], sizes[:joints])
-    coordination = compile_network(network, lanes, parents, states, sizes)
+    transitions = count_transitions(
+        states,
+        sizes,
+        begins,
+        seconds,
+        joints if joints < len(lanes) else None,
+        ends=ends,
+        weights=weights,
+        posture_weights=posture_weights,
+    )
+    network = fit_network(lanes[:joints], parents[:joints], states[:, :joints], sizes[:joints], posture_weights)
+    coordination = compile_network(network, lanes, parents, states, sizes, posture_weights)
     return Grammar(lanes, centres, transitions, find_bridges(centres, transitions), coordination)

@@ -26,9 +26,10 @@ class Transitions:
         starts: first row of each lane [L + 1].
         indptr: transitions of each state [G + 1].
         targets: the state that a transition leads to, increasing within a row [E].
-        counts: how often it was seen [E].
-        visits: how many postures are in each state [G].
+        counts: how often it was seen, each time by the weight of who made it [E].
+        visits: how many postures are in each state, each by its weight [G].
         attests: index of the first posture from which the transition was made [E].
+        arrives: index of the posture that it led to there [E].
         seconds: its mean duration [E].
     """
 
@@ -38,6 +39,7 @@ class Transitions:
     counts: Floats
     visits: Floats
     attests: Indices
+    arrives: Indices
     seconds: Floats
 
     @property
@@ -75,41 +77,56 @@ class Transitions:
 
 
 def count_transitions(
-    states: NDArray[np.int32], sizes: Ints, begins: Ints, seconds: Floats, pooled: int | None = None
+    states: NDArray[np.int32],
+    sizes: Ints,
+    begins: Ints,
+    seconds: Floats,
+    pooled: int | None = None,
+    *,
+    ends: Ints | None = None,
+    weights: Floats | None = None,
+    posture_weights: Floats | None = None,
 ) -> Transitions:
     """Count the transitions of all lanes.
 
     Args:
         states: state of each lane in each posture [N, L].
         sizes: number of states in each lane [L].
-        begins: postures from which a move leads to the next posture, none across clips [M].
+        begins: postures from which a move leads, none across clips [M]; of those that attest a transition the first in
+            this order is kept.
         seconds: duration of those moves [M].
         pooled: a lane whose states are equal steps of a circle: what is counted is by how many steps it turns, pooled
             over where it turns from, and holds from every state alike.
+        ends: the posture that each move leads to [M]; None for the next one.
+        weights: what each move counts [M]; None for 1.
+        posture_weights: what each posture counts [N]; None for 1.
     """
+    ends = begins + 1 if ends is None else ends
+    weights = np.ones(len(begins)) if weights is None else weights
+    posture_weights = np.ones(len(states)) if posture_weights is None else posture_weights
     lanes, size = states.shape[1], np.asarray(sizes, dtype=np.int64)
-    sources, targets, counts, attests, durations, visits = [], [], [], [], [], []
+    sources, targets, counts, attests, arrives, durations, visits = [], [], [], [], [], [], []
     for lane in range(lanes):
-        src, dst = states[begins, lane].astype(np.int64), states[begins + 1, lane].astype(np.int64)
+        src, dst = states[begins, lane].astype(np.int64), states[ends, lane].astype(np.int64)
         if lane == pooled:
             src, dst = np.zeros_like(src), (dst - src) % size[lane]
-        keys, first, which, count = np.unique(
-            src * size[lane] + dst, return_index=True, return_inverse=True, return_counts=True
-        )
-        mean = np.bincount(which, weights=seconds, minlength=len(keys)) / count
+        keys, first, which = np.unique(src * size[lane] + dst, return_index=True, return_inverse=True)
+        count = np.bincount(which, weights=weights, minlength=len(keys))
+        mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / count
         source, target, visited = keys // size[lane], keys % size[lane], states[:, lane]
         if lane == pooled:
             turned = (np.arange(size[lane])[:, None] + target[None, :]) % size[lane]
             order = np.argsort(turned, axis=1)
             source, target = np.repeat(np.arange(size[lane]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
             first, count, mean = first[order].ravel(), count[order].ravel(), mean[order].ravel()
-            visits.append(np.full(size[lane], len(visited) / size[lane]))
+            visits.append(np.full(size[lane], posture_weights.sum() / size[lane]))
         else:
-            visits.append(np.bincount(visited, minlength=size[lane]))
+            visits.append(np.bincount(visited, weights=posture_weights, minlength=size[lane]))
         sources.append(source)
         targets.append(target)
         counts.append(count)
         attests.append(begins[first])
+        arrives.append(ends[first])
         durations.append(mean)
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
     rows = np.concatenate([starts[lane] + source for lane, source in enumerate(sources)])
@@ -121,5 +138,6 @@ def count_transitions(
         np.concatenate(counts).astype(np.float64),
         np.concatenate(visits).astype(np.float64),
         np.concatenate(attests).astype(np.int32),
+        np.concatenate(arrives).astype(np.int32),
         np.concatenate(durations).astype(np.float64),
     )

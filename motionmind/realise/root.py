@@ -21,7 +21,7 @@ class Carriage:
 
     Attributes:
         travel: mean displacement that goes with each transition of the root's lane, metres, in the body's heading
-            [E_0, 3].
+            when it sets out [E_0, 3].
         clearance: height of each posture's lowest point above its clip's floor [N], metres, at least 0. The floor is
             where the lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
     """
@@ -39,16 +39,16 @@ def learn_carriage(corpus: Corpus, states: NDArray[np.int32], transitions: Trans
 
 
 def _travel(corpus: Corpus, states: NDArray[np.int32], transitions: Transitions) -> Floats:
-    begins = corpus.begins
+    begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
     turn = rot.about_vertical(rot.heading(corpus.rotations[begins, 0]))
-    moved = rot.mul_vec(rot.inv(turn), corpus.root[begins + 1] - corpus.root[begins])
+    moved = rot.mul_vec(rot.inv(turn), corpus.root[ends] - corpus.root[begins])
     count = int(transitions.indptr[transitions.starts[1]])
     size = int(transitions.starts[1])
-    key = states[begins, 0].astype(np.int64) * size + states[begins + 1, 0]
+    key = states[begins, 0].astype(np.int64) * size + states[ends, 0]
     listed = transitions.sources[:count] * size + transitions.targets[:count]
     edge = np.searchsorted(listed, key)
-    times = np.bincount(edge, minlength=count)
-    return np.stack([np.bincount(edge, weights=moved[:, k], minlength=count) / times for k in range(3)], axis=1)
+    counted = np.bincount(edge, weights, count)
+    return np.stack([np.bincount(edge, weights * moved[:, k], count) / counted for k in range(3)], axis=1)
 
 
 def carry(
