@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from motionmind.learned import own_skeleton
     from motionmind.motion import Motion, Posture
     from motionmind.retarget import to_human23
-    from motionmind.skeleton import Skeleton, human23
+    from motionmind.skeleton import Skeleton, human23, human44
     from motionmind.tween import Bridge, Source, Tween, Wait
 
 __version__ = "0.1.0"
@@ -49,6 +49,7 @@ __all__ = [
     "Tween",
     "Wait",
     "human23",
+    "human44",
     "make_discretization",
     "own_skeleton",
     "read_motion",
@@ -73,7 +74,7 @@ _HOMES = {
     "learned": ("own_skeleton",),
     "motion": ("Motion", "Posture"),
     "retarget": ("to_human23",),
-    "skeleton": ("Skeleton", "human23"),
+    "skeleton": ("Skeleton", "human23", "human44"),
     "tween": ("Bridge", "Source", "Tween", "Wait"),
 }
 _RENAMED = {"make_discretization": "make"}

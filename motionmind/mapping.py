@@ -35,7 +35,8 @@ def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -
     Args:
         skeleton: a file's own skeleton.
         joints: the user's mapping, from `read_joint_mapping`. Names of the file's joints may lack their namespace and
-            differ in case. None to know the rig by its names: CMU (BVH and ASF), Mixamo, Biovision, Bandai-Namco.
+            differ in case. None to know the rig by its names: CMU (BVH and ASF), Mixamo, Biovision, Bandai-Namco, or
+            human44.
 
     Returns:
         The mapping in the skeleton's order; None where `joints` is None and no rig has these names.
@@ -47,6 +48,12 @@ def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -
         return _own_mapping(skeleton, joints)
     known = known_rig(skeleton)
     return None if known is None else known[1]
+
+
+def is_human44(skeleton: Skeleton) -> bool:
+    """Whether the skeleton has human44's joints, by names as known rigs are; on human23 it would lose some of them."""
+    known = known_rig(skeleton)
+    return known is not None and known[0].name == "human44"
 
 
 def filled_joints(mapping: Mapping[str, str]) -> list[str]:

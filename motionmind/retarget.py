@@ -58,7 +58,8 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     one: there a bent chain has become a straight bone. (CMU, where three joints of the spine become two: neck and
     arms are 21 mm off on average in 20 clips of a dancer, 65 mm at most; 8 mm and 32 mm in 9 clips of karate; the
     legs are exact.) Joints that the file lacks, such as toes or fingers, go along with the joint they hang from, at
-    human23's place scaled by the length of the legs. Movement that is on human23 already is returned as it is.
+    human23's place scaled by the length of the legs. Movement that is on human23 already is returned as it is; what
+    came from there to human44, with the joints that are new there at rest, comes back as it was.
 
     Args:
         movement: on the file's own skeleton.
@@ -302,6 +303,8 @@ def _proportions(sources: _Sources, alignment: Array) -> Skeleton:
         if np.any(body.tips[i]):
             tip = rot.mul_vec(rot.inv(alignment[i]), sources.far_end(name))
             tips[i] = tip if np.linalg.norm(tip) > _NOWHERE else scale * body.tips[i]
+    if np.allclose(offsets, body.offsets, atol=_NOWHERE) and np.allclose(tips, body.tips, atol=_NOWHERE):
+        return body
     return Skeleton(body.name, body.names, body.parents, offsets, tips)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.skeleton import human23
+from motionmind.skeleton import human23, human44
 
 Array = NDArray[np.float64]
 
@@ -198,9 +198,22 @@ _BANDAI_FRAMES = (
 _CMU_TWISTS = {f"{side}_{joint}": np.radians(-30.0) for side in ("left", "right") for joint in ("shoulder", "elbow")}
 
 _OWN = {name.replace("_", ""): name for name in human23().names}
+_OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
+
+# Of human44's rows only the spine's are joined; the turn of the axial joint goes to the head, as it does in the body. A
+# fist is folded further than the fingers of human23 can be: they turn with the first row of knuckles, as toes do.
+_HUMAN44 = _OWN | {
+    "lumbarmiddle": "lumbar",
+    "lumbarupper": "lumbar",
+    "thoraxmiddle": "thorax",
+    "thoraxupper": "thorax",
+    "cervicalmiddle": "cervical",
+    "cervicalupper": "cervical",
+}
 
 RIGS: tuple[Rig, ...] = (
-    Rig("human23", _OWN, (), frames=dict.fromkeys(human23().names, rot.IDENTITY)),
+    Rig("human44", _HUMAN44, (), frozenset(plain_names(human44().names)), frames=_OWN_FRAMES),
+    Rig("human23", _OWN, (), frames=_OWN_FRAMES),
     Rig("CMU, BVH", _CMU_BVH, _HUMANIK_SPINE, frozenset({"lhipjoint", "neck1"}), neck_leans=True, twists=_CMU_TWISTS),
     Rig("CMU, ASF", _CMU_ASF, ("lowerback", "upperback", "thorax"), neck_leans=True, twists=_CMU_TWISTS),
     Rig("Mixamo", _HUMANIK, _HUMANIK_SPINE),

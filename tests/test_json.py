@@ -229,7 +229,7 @@ POSTURE_FAULTS = [
         ": rotations: human23 has no joint 'left_kne'; did you mean left_knee?",
     ),
     (turned("pelvis", [0, 0, 0, 1], "left_knee"), ": rotations: no left_knee; every joint of human23 needs one"),
-    (swap("skeleton", "human44"), ": skeleton 'human44' has no description here"),
+    (swap("skeleton", "human45"), ": skeleton 'human45' has no description here; only human23 and human44 go by"),
     (swap("skeleton", 3), ": skeleton: expected str | object, got int"),
     (swap("skeleton", {"name": "x", "joints": []}), ": skeleton 'x' has no joints"),
     (swap("skeleton", {"name": "x"}), ": skeleton: there is no field joints"),

@@ -38,7 +38,7 @@ def read_motion(
         unit: BVH's unit of length (`read_bvh`); None tells it from the skeleton. Other formats know their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
         fps: frames a second of formats that do not say: AMC (default 120), the papers' notation (default 1).
-        skeleton: the body of the papers' notation, which names joints only; human23 by default.
+        skeleton: the body of the papers' notation, which names joints only; None tells it from their names.
 
     Raises:
         FormatError: the suffix is unknown, or the file is not there, or is not what its suffix says.

@@ -17,7 +17,7 @@ from motionmind import rotations as rot
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError
 from motionmind.formats.files import FilePath
 from motionmind.formats.text import LARGEST, MOST_JOINTS, listed, meant, shown
-from motionmind.skeleton import Skeleton, human23
+from motionmind.skeleton import BODIES, Skeleton
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -125,11 +125,12 @@ def _in_words(message: str, schema: type) -> str:
 def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
     """The skeleton that a file names or describes."""
     if isinstance(schema, str):
-        if schema != "human23":
+        if schema not in BODIES:
+            ours = " and ".join(BODIES)
             raise FormatError(
-                f"skeleton {shown(schema)} has no description here; only human23 goes by its name alone", path=path
+                f"skeleton {shown(schema)} has no description here; only {ours} go by their names alone", path=path
             )
-        return human23()
+        return BODIES[schema]()
     if len(schema.joints) > MOST_JOINTS:
         raise FormatError(f"more than {MOST_JOINTS} joints are no body", path=path)
     index: dict[str, int] = {}
@@ -154,9 +155,9 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
 
 
 def skeleton_text(skeleton: Skeleton, indent: str) -> str:
-    """JSON of a skeleton: its name if it is human23 in its own proportions, else one joint a line."""
-    if skeleton.name == "human23" and skeleton == human23():
-        return '"human23"'
+    """JSON of a skeleton: its name if it is one of ours in its own proportions, else one joint a line."""
+    if skeleton.name in BODIES and skeleton == BODIES[skeleton.name]():
+        return text(skeleton.name)
     rows = []
     for joint, name in enumerate(skeleton.names):
         parent = skeleton.parents[joint]

@@ -18,7 +18,7 @@
 
 `times` in seconds, increasing; `root` the root's places in metres; `rotations` quaternions x, y, z, w, each joint's
 against its parent, in the skeleton's order. `moves`, the times between which a tween's moves were planned, is there
-only if there are any. `skeleton` is "human23" or a description, as in a posture's JSON.
+only if there are any. `skeleton` is "human23", "human44" or a description, as in a posture's JSON.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats.files import FilePath, write_atomically
 from motionmind.formats.text import listed, meant, read_lines, shown, to_numbers
 from motionmind.motion import Motion
-from motionmind.skeleton import Skeleton, human23
+from motionmind.skeleton import BODIES, Skeleton
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,8 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
 
     Args:
         path: the file; its stem becomes the motion's name.
-        skeleton: the body whose joints are named; human23 by default.
+        skeleton: the body whose joints are named; None takes human23, or human44 where only that has joints that are
+            named.
         rate: postures a second.
 
     Raises:
@@ -70,12 +71,12 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise MotionMindError(f"a rate must be a positive number of postures a second, not {rate}")
-    body = human23() if skeleton is None else skeleton
     lines = [line.split("#")[0] for line in read_lines(path)]
     braces = any("{" in line or "}" in line for line in lines)
     postures = list(_split_braces(lines, path) if braces else _split_lines(lines, path))
     if not postures:
         raise FormatError("no posture: write '{pelvis, 0, 0, 0, 1; ...}' or 'pelvis 0 0 0 1 ...'", path=path)
+    body = _body(postures) if skeleton is None else skeleton
     rotations = _rotations(postures, body, path)
     root = np.zeros((len(postures), 3))
     root[:, 1] = -body.positions_and_tips(rotations, root)[..., 1].min(axis=-1)
@@ -166,6 +167,12 @@ def _split_lines(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
             entries.append((" ".join(name), numbers, number))
         if entries:
             yield entries
+
+
+def _body(postures: list[list[_Entry]]) -> Skeleton:
+    """The first of the bodies that go by their names that lacks the fewest of the joints that are named."""
+    named = {_key(name) for entries in postures for name, _, _ in entries}
+    return min((body() for body in BODIES.values()), key=lambda body: len(named - set(body.names)))
 
 
 def _rotations(postures: list[list[_Entry]], skeleton: Skeleton, path: FilePath) -> Array:

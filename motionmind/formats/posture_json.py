@@ -13,7 +13,7 @@
     }
 
 `root` is the place of the root in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
-`skeleton` is "human23", or a description:
+`skeleton` is "human23", "human44", or a description:
 `{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`, metres,
 parents before their children; `tip` may be left out.
 """
