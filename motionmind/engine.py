@@ -13,9 +13,11 @@ from motionmind import survey
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
 from motionmind.grammar.coordination import fit_network
 from motionmind.grammar.transitions import Weights
-from motionmind.learned import Learned, own_skeleton
+from motionmind.learned import Learned
+from motionmind.mapping import joint_mapping
 from motionmind.motion import FASTEST, Posture
 from motionmind.realise.realise import realise
+from motionmind.retarget import to_human23
 from motionmind.search.costs import price
 from motionmind.search.problem import Model
 from motionmind.search.solve import Certificate, Rules, solve
@@ -139,8 +141,8 @@ class Engine(Learned):
     def _on_skeleton(self, posture: Posture, which: str) -> Posture:
         """The posture on the corpus's joints; SkeletonError names the difference."""
         skeleton = self.corpus.skeleton
-        if human23().difference(skeleton) is None:
-            posture = own_skeleton(posture)
+        if human23().difference(skeleton) is None and joint_mapping(posture.skeleton) is not None:
+            posture = to_human23(posture)
         difference = skeleton.difference(posture.skeleton)
         if difference is not None:
             raise SkeletonError(
@@ -184,7 +186,8 @@ class Engine(Learned):
         """The coordination net as a pgmpy network over the joints: what the search's costs were compiled from."""
         joints = len(self.corpus.skeleton)
         parents, sizes = self.corpus.lane_parents[:joints], self.space.sizes[:joints]
-        return fit_network(self.corpus.skeleton.names, parents, np.asarray(self.states[:, :joints]), sizes)
+        states, weights = np.asarray(self.states[:, :joints]), self.corpus.weights
+        return fit_network(self.corpus.skeleton.names, parents, states, sizes, weights)
 
     def info(self) -> dict[str, Any]:
         """What the corpus is and how large: see `survey.info`."""

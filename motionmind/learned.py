@@ -8,26 +8,29 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.corpus import store
-from motionmind.corpus.corpus import FACING, Corpus, Facing
-from motionmind.corpus.gather import FLIP_DEGREES, Flips, gather
+from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.corpus.gather import Gathering, gather
 from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Codebook, Discretization, StateSpace, from_spec
+from motionmind.discretize.library import library_path
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import read_motion
 from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions
+from motionmind.mapping import is_human44, joint_mapping
 from motionmind.motion import Motion, Posture
+from motionmind.notation.sources import sources
 from motionmind.realise.root import Carriage, learn_carriage
-from motionmind.retarget import joint_mapping, to_human23
+from motionmind.retarget import to_human23
 from motionmind.skeleton import Skeleton
 
 States = NDArray[np.int32]
@@ -36,9 +39,12 @@ _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
 
 
 def own_skeleton(movement: _Movement, joints: Mapping[str, str] | None = None) -> _Movement:
-    """The movement on human23 where its joints map there, by `joints` or by known names; as it is where they do not."""
-    mapped = joints is not None or joint_mapping(movement.skeleton) is not None
-    return to_human23(movement, joints) if mapped else movement
+    """The movement on human23 where its joints map there, by `joints` or by known names; as it is where they do not.
+
+    Movement on human44, which has joints that human23 lacks, stays there too, unless `joints` is given.
+    """
+    known = joint_mapping(movement.skeleton) is not None and not is_human44(movement.skeleton)
+    return to_human23(movement, joints) if known or joints is not None else movement
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,54 +72,32 @@ class Learned:
     @classmethod
     def fit(
         cls,
-        clips: Iterable[Motion],
+        clips: Iterable[Motion] = (),
         *,
         name: str = "corpus",
-        rate: float | None = None,
-        skip: int = 0,
-        facing: Facing = "free",
         discretization: Discretization | None = None,
-        flips: Flips = "split",
-        flip_degrees: float = FLIP_DEGREES,
-        title: str = "",
-        author: str = "",
-        source: str = "",
-        licence: str = "",
+        mix: Mapping[str, float] | None = None,
+        home: str | os.PathLike[str] | None = None,
+        **options: Unpack[Gathering],
     ) -> Self:
         """Learn from clips, all on the same joints (`own_skeleton` brings known rigs together).
 
         Args:
             clips: the movement; names tell where a move comes from.
             name: of the corpus.
-            rate: postures a second; None keeps every frame with its own time.
-            skip: frames to drop at each clip's start, such as an added T-pose.
-            facing: "free" takes the turn about the vertical out of the root's state, to be a lane of its own; "stage"
-                leaves it there, so that what faces the wall is another state than what faces the public.
             discretization: how orientations become states; a learned codebook of 15 degrees by default.
-            flips: what becomes of clips in which a joint jumps: `split` there, `keep`, or `drop` the clip.
-            flip_degrees: what counts as a jump from one frame to the next.
-            title: a line on what the corpus is.
-            author: who made it.
-            source: where it comes from.
-            licence: under which it may be used.
+            mix: other corpora to learn from as well, by name or folder, each with what its postures and moves count
+                where those of `clips` count 1.
+            home: where the corpora of these names are.
+            options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source and licence:
+                see `motionmind.corpus.gather.gather`.
 
         Raises:
-            CorpusError: nothing to learn from, or clips on different joints.
+            CorpusError: nothing to learn from, clips on different joints, or no such corpus to mix.
+            SkeletonError: the body cannot be mirrored.
         """
-        corpus = gather(
-            name,
-            clips,
-            rate=rate,
-            skip=skip,
-            facing=facing,
-            flips=flips,
-            flip_degrees=flip_degrees,
-            title=title,
-            author=author,
-            source=source,
-            licence=licence,
-        )
-        return cls.learn(corpus, discretization or Codebook(15.0))
+        others = [(cls.load(other, home).corpus, weight) for other, weight in (mix or {}).items()]
+        return cls.learn(gather(name, clips, mix=others, **options), discretization or Codebook(15.0))
 
     @classmethod
     def learn(cls, corpus: Corpus, discretization: Discretization) -> Self:
@@ -125,8 +109,18 @@ class Learned:
         if corpus.facing == "free":
             space, facing = _with_facing(space, orientations[:, -1])
             states = np.concatenate([states, facing[:, None]], axis=1)
+        moves = corpus.moves
         grammar = learn(
-            corpus.lanes, corpus.lane_parents, space.centres, states, space.sizes, corpus.begins, corpus.seconds
+            corpus.lanes,
+            corpus.lane_parents,
+            space.centres,
+            states,
+            space.sizes,
+            moves.begins,
+            moves.seconds,
+            ends=moves.ends,
+            weights=moves.weights,
+            posture_weights=corpus.weights,
         )
         return cls(corpus, space, states, grammar, learn_carriage(corpus, states, grammar.transitions))
 
@@ -181,8 +175,7 @@ class Learned:
         if store.read_manifest(folder)["format"] == store.BUILT:
             return cls._open(folder, began)
         manifest = parse_manifest(store.read_manifest(folder), SourceManifest, folder / store.MANIFEST)
-        files = [folder / store.MANIFEST, *(folder / clip.file for clip in manifest.clips)]
-        built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
+        built = store.cache() / f"{folder.name}-{store.fingerprint(_files(folder, manifest))}"
         try:
             return cls._open(built, began)
         except MotionMindError:  # it is not there yet, or is damaged
@@ -266,17 +259,34 @@ def _with_facing(space: StateSpace, turns: NDArray[np.float64]) -> tuple[StateSp
     return wider, steps
 
 
+def _files(folder: Path, manifest: SourceManifest) -> list[Path]:
+    """All that a corpus which people wrote is learned from."""
+    library = manifest.discretization.get("library")
+    return [
+        folder / store.MANIFEST,
+        *(folder / clip.file for clip in manifest.clips),
+        *(file for score in manifest.scores for file in sources(folder / score)),
+        *([library_path(library)] if isinstance(library, str) else []),
+    ]
+
+
 def _source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discretization]:
     """A corpus that people wrote: its clips, and the discretization that its manifest names."""
+    from motionmind.notation.compose import motions
+    from motionmind.notation.read import read_score
+
     try:
         discretization = from_spec(manifest.discretization)
     except FormatError as error:
         raise FormatError(str(error), path=folder / store.MANIFEST) from error
-    motions = [replace(read_motion(folder / clip.file), name=clip.name) for clip in manifest.clips]
+    scores = [read_score(folder / score) for score in manifest.scores]
+    clips = [own_skeleton(replace(read_motion(folder / clip.file), name=clip.name)) for clip in manifest.clips]
+    about = {clip.name: clip.about for clip in manifest.clips}
+    about |= {clip.name: clip.about for score in scores for clip in score.clips}
     corpus = gather(
-        motions=[own_skeleton(motion) for motion in motions],
+        motions=[*clips, *(motion for score in scores for motion in motions(score))],
         flips="keep",
-        about={clip.name: clip.about for clip in manifest.clips},
+        about=about,
         **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
     )
     return corpus, discretization

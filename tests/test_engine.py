@@ -448,7 +448,7 @@ def test_what_is_wrong_with_a_written_corpus_is_named(written: Path, tmp_path: P
         ({"discretization": None}, "discretization"),
         ({"discretization": {"kind": "sieve"}}, "manifest.json: discretization: the kind must be"),
         ({"discretization": {"kind": "codebook", "tolerance": -1}}, "manifest.json: discretization"),
-        ({"clips": []}, "no recordings given"),
+        ({"clips": []}, "nor `scores` with a score"),
         ({"clips": [{"name": "a", "file": "gone.json", "about": ""}]}, "gone.json: cannot be read"),
         ({"rate": -5}, "a rate must be"),
     ):

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import click
 
+import motionmind.cli.pictures
+import motionmind.cli.scores  # noqa: F401 (each adds its commands)
 from motionmind.cli.commands import app
 from motionmind.cli.printing import Notes, say
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError

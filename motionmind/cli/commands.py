@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import gc
 import json
-import os
 import sys
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.options import COUNT, FILE, HOME, JSON, NATS, RATE, InOrder, Number, example, reading
-from motionmind.cli.printing import count, note, print_check, print_tween, progress
+from motionmind.cli.files import all_or_none, check_outputs, clip_names, read, read_mapping
+from motionmind.cli.options import (
+    COUNT,
+    FILE,
+    HOME,
+    JSON,
+    NATS,
+    RATE,
+    InOrder,
+    Number,
+    example,
+    mixture,
+    reading,
+    tolerances,
+)
+from motionmind.cli.printing import count, note, print_check, print_origins, print_tween, progress
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
@@ -86,14 +97,14 @@ def tween(
 
     alone = report == Path("-")
     wanted = ((output, (".json", ".bvh")), (None if alone else report, ()), (problem, (".cfn",)))
-    written = _check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
+    written = check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
     if not is_compiled():
         progress("compiling the search, which takes half a minute, once")
     result = engine.tween(*ends, **options)
     text = json.dumps(result.report())
-    with _all_or_none(written):
+    with all_or_none(written):
         if output:
             write_motion(output, result.motion)
         if problem:
@@ -116,13 +127,14 @@ def tween(
 def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
     """Take one posture out of a clip.
 
-    It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own.
+    It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own, as on
+    human44.
     """
     from motionmind.formats import write_posture
     from motionmind.learned import own_skeleton
 
-    _check_outputs([(output, (".json", ".bvh", ".txt"))], [clip])
-    motion = own_skeleton(_read(clip, **source), _mapping(joints))
+    check_outputs([(output, (".json", ".bvh", ".txt"))], [clip])
+    motion = own_skeleton(read(clip, **source), read_mapping(joints))
     write_posture(output, motion.posture(frame))
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
@@ -142,17 +154,18 @@ def convert(
     """Convert movement from one format to another.
 
     IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json or .txt,
-    which is on human23 and holds orientations alone.
+    which is on human23 (or human44, if IN is) and holds orientations alone.
     """
     from motionmind.formats import write_motion
     from motionmind.formats.papers import write_papers
+    from motionmind.mapping import is_human44
     from motionmind.retarget import to_human23
 
-    _check_outputs([(output, (".bvh", ".json", ".txt"))], [file])
-    motion = _read(file, **source)
+    check_outputs([(output, (".bvh", ".json", ".txt"))], [file])
+    motion = read(file, **source)
     papers = output.suffix.lower() == ".txt"
-    if papers or skeleton == "human23" or joints:
-        motion = to_human23(motion, _mapping(joints))
+    if skeleton == "human23" or joints or (papers and not is_human44(motion.skeleton)):
+        motion = to_human23(motion, read_mapping(joints))
     if fps is not None:
         motion = motion.resample(fps)
     if papers:
@@ -172,7 +185,7 @@ def corpora(context: click.Context) -> None:
 
 @corpora.command(epilog=example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
 @click.argument("name")
-@click.argument("files", type=FILE, nargs=-1, required=True)
+@click.argument("files", type=FILE, nargs=-1)
 @click.option("--rate", type=RATE, help="Postures a second  [default: every frame]")
 @click.option(
     "--tolerance",
@@ -207,6 +220,20 @@ def corpora(context: click.Context) -> None:
     help="Where a joint jumps: split the clip there, keep it, or drop it.",
 )
 @click.option("--flip-angle", type=Number(0, 180), default=45.0, help="Degrees in one frame that are a jump.")
+@click.option("--mirror", is_flag=True, help="Learn from all clips with left and right exchanged, too.")
+@click.option(
+    "--reverse",
+    type=Number(0, 100),
+    metavar="PRICE",
+    help="Learn from all clips backwards, too: there a move costs PRICE more nats.",
+)
+@click.option(
+    "--mix",
+    multiple=True,
+    metavar="CORPUS[:WEIGHT]",
+    help="Learn from another corpus, too, each move of which counts WEIGHT where those of FILES count 1  [default: 1]; "
+    "as often as you like.",
+)
 @reading
 @click.option("--title", default="", show_default=False, help="A line on what it is.")
 @click.option("--author", default="", show_default=False, help="Who made the movement.")
@@ -223,31 +250,46 @@ def build(
     skip: int,
     flips: Flips,
     flip_angle: float,
+    mirror: bool,
+    reverse: float | None,
+    mix: tuple[str, ...],
     joints: Path | None,
     unit: str | None,
     asf: Path | None,
     source_fps: float | None,
     home: Path | None,
-    **about: str,
+    title: str,
+    author: str,
+    source: str,
+    licence: str,
 ) -> None:
-    """Learn a corpus from movement files.
+    """Learn a corpus from movement files, from other corpora (--mix), or from both.
 
-    They may be of any mix of formats, all on the same joints. A corpus of yours with the same name is replaced.
+    They may be of any mix of formats, scores too, all on the same joints. A corpus of yours with the same name is
+    replaced.
     """
+    if not (files or mix):
+        raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make
     from motionmind.engine import Engine
     from motionmind.learned import own_skeleton
+    from motionmind.notation.compose import motions
+    from motionmind.notation.read import read_score
 
     place = place_for(name, home)
-    discretization = make(discretize, *_tolerances(tolerance))
-    mapping = _mapping(joints)
-    names = _clip_names(files)
+    others = mixture(mix)
+    discretization = make(discretize, *tolerances(tolerance))
+    mapping = read_mapping(joints)
+    names = clip_names(files)
 
     def clips() -> Iterator[Motion]:
         with click.progressbar(files, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
             for file in bar:
-                yield own_skeleton(replace(_read(file, unit, asf, source_fps), name=names[file]), mapping)
+                if file.suffix.lower() == ".score":
+                    yield from motions(read_score(file))
+                else:
+                    yield own_skeleton(replace(read(file, unit, asf, source_fps), name=names[file]), mapping)
         progress("learning")
 
     engine = Engine.fit(
@@ -259,7 +301,14 @@ def build(
         discretization=discretization,
         flips=flips,
         flip_degrees=flip_angle,
-        **about,
+        mirror=mirror,
+        reverse=reverse,
+        mix=others,
+        home=home,
+        title=title,
+        author=author,
+        source=source,
+        licence=licence,
     )
     engine.save(place)
     print_check(engine.check())
@@ -304,8 +353,10 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
     for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    print_origins(found)
+    width = max([16, *(len(clip["name"]) for clip in found["clips"])])
     for clip in found["clips"]:
-        click.echo(f"  {clip['name']:16} {clip['postures']:5}  {clip['about']}".rstrip())
+        click.echo(f"  {clip['name']:{width}} {clip['postures']:5}  {clip['about']}".rstrip())
 
 
 @corpora.command(epilog=example("motionmind corpus check ballet --pairs 500 --seed 1"))
@@ -347,76 +398,3 @@ def _load_numba() -> None:
 def _help_alone(context: click.Context) -> None:
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
-
-
-def _read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
-    from motionmind.formats import read_motion
-
-    return read_motion(path, unit=unit, asf=asf, fps=source_fps)
-
-
-def _mapping(path: Path | None) -> dict[str, str] | None:
-    from motionmind.retarget import read_joint_mapping
-
-    return read_joint_mapping(path) if path else None
-
-
-def _clip_names(files: Sequence[Path]) -> dict[Path, str]:
-    """What each file's clip is called: its stem, or as much more of its path as tells it from the others."""
-    if len(set(files)) < len(files):
-        twice = next(file for file, count in Counter(files).items() if count > 1)
-        raise MotionMindError(f"{twice}: given twice")
-    shorter = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
-    taken = [Counter(names.values()) for names in shorter]
-    unique = ([names[f] for names, count in zip(shorter, taken, strict=True) if count[names[f]] == 1] for f in files)
-    return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
-
-
-def _tolerances(given: Sequence[str]) -> tuple[float, dict[str, float]]:
-    """The tolerance for all joints, and those of single ones, from words such as "15" and "left_hip=10"."""
-    default, per_joint = 15.0, {}
-    for word in given:
-        joint, equals, degrees = word.rpartition("=")
-        try:
-            value = float(degrees if joint or not equals else "")
-        except ValueError:
-            raise MotionMindError(f"--tolerance {word}: give degrees, or JOINT=DEGREES such as left_hip=10") from None
-        if joint:
-            per_joint[joint] = value
-        else:
-            default = value
-    return default, per_joint
-
-
-def _check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence[Path]) -> list[Path]:
-    """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
-    paths = [path for path, _ in wanted]
-    places, sources = [path.resolve() for path in paths], [path.resolve() for path in read]
-    for path, suffixes in wanted:
-        folder = path.resolve().parent
-        if suffixes and path.suffix.lower() not in suffixes:
-            fault = f"the name must end in one of {', '.join(suffixes)}"
-        elif places.count(path.resolve()) > 1:
-            fault = "it is to be written twice"
-        elif path.resolve() in sources:
-            fault = "it is read from"
-        elif not folder.is_dir():
-            fault = f"there is no folder {folder}"
-        elif not os.access(path if path.exists() else folder, os.W_OK):
-            fault = "not permitted"
-        else:
-            continue
-        raise MotionMindError(f"{path}: cannot be written: {fault}")
-    return paths
-
-
-@contextmanager
-def _all_or_none(files: Sequence[Path]) -> Iterator[None]:
-    """Of files that are written one after another, leave none that is new behind if one cannot be."""
-    new = [file for file in files if not file.exists()]
-    try:
-        yield
-    except MotionMindError:
-        for file in new:
-            file.unlink(missing_ok=True)
-        raise

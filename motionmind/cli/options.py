@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+
+from motionmind.errors import MotionMindError
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -72,3 +74,34 @@ def reading(command: _Command) -> _Command:
 def example(line: str) -> str:
     """An epilog that is not wrapped, so that it can be copied."""
     return f"\b\nExample:\n  {line}"
+
+
+def tolerances(given: Sequence[str]) -> tuple[float, dict[str, float]]:
+    """The tolerance for all joints, and those of single ones, from words such as "15" and "left_hip=10"."""
+    default, per_joint = 15.0, {}
+    for word in given:
+        joint, equals, degrees = word.rpartition("=")
+        try:
+            value = float(degrees if joint or not equals else "")
+        except ValueError:
+            raise MotionMindError(f"--tolerance {word}: give degrees, or JOINT=DEGREES such as left_hip=10") from None
+        if joint:
+            per_joint[joint] = value
+        else:
+            default = value
+    return default, per_joint
+
+
+def mixture(given: Sequence[str]) -> dict[str, float]:
+    """What the corpora to mix weigh, from words such as "ballet" and "ballet:0.3"; a path may have colons too."""
+    found: dict[str, float] = {}
+    for word in given:
+        name, colon, weight = word.rpartition(":")
+        try:
+            corpus, value = (name, float(weight)) if colon else (word, 1.0)
+        except ValueError:
+            raise MotionMindError(f"--mix {word}: give a corpus and its weight, such as ballet:0.3") from None
+        if corpus in found:
+            raise MotionMindError(f"--mix {word}: {corpus} is given twice")
+        found[corpus] = value
+    return found

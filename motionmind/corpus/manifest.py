@@ -35,10 +35,16 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SourceManifest(Provenance, frozen=True, kw_only=True):
-    """A corpus as people write it: its clips' files, and a discretization as `from_spec` reads it."""
+    """A corpus as people write it: its scores and clips' files, and a discretization as `from_spec` reads it."""
 
-    clips: list[ClipFile]
     discretization: dict[str, Any]
+    clips: list[ClipFile] = []
+    scores: list[str] = []
+
+    def __post_init__(self) -> None:
+        """A corpus has one or the other."""
+        if not (self.clips or self.scores):
+            raise ValueError("there is no key `clips` with a clip in it, nor `scores` with a score")
 
 
 class BodyEntry(msgspec.Struct, frozen=True):

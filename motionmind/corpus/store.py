@@ -137,9 +137,10 @@ def load(folder: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
 
 
 def fingerprint(files: Iterable[Path]) -> str:
-    """A name for what is learned from these files: a hash of them, and of the code that learns."""
+    """A name for what is learned from these files: a hash of them, and of code and bodies that it takes."""
     digest = hashlib.sha256()
-    for path in [*sorted(Path(__file__).parents[1].rglob("*.py")), *files]:
+    package = Path(__file__).parents[1]
+    for path in [*sorted(package.rglob("*.py")), *sorted(package.glob("notation/bodies/*.toml")), *files]:
         data = read_bytes(path)
         digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:16]

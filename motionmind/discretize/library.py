@@ -35,7 +35,7 @@ from motionmind.discretize.turns import format_turns, parse_turns
 from motionmind.errors import FormatError
 from motionmind.formats.files import FilePath, read_bytes, write_atomically
 from motionmind.formats.text import meant
-from motionmind.skeleton import human23
+from motionmind.skeleton import BODIES
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,6 @@ VERSION = 1
 SAME_DEGREES = 0.01
 
 _TEXTS = ("title", "author", "licence", "skeleton")
-_SKELETONS = {"human23": human23}
 
 
 @dataclass(frozen=True)
@@ -76,8 +75,8 @@ class Library:
             self._check_text(text)
         rotations = {table: self._read_table(table) for table in self.tables}
         object.__setattr__(self, "_rotations", rotations)
-        if self.skeleton in _SKELETONS:
-            self.tables_of(_SKELETONS[self.skeleton]().names)
+        if self.skeleton in BODIES:
+            self.tables_of(BODIES[self.skeleton]().names)
 
     def rotations(self, table: str) -> Array:
         """Orientations [S, 4] of the states in `table`, as written: for the left, where it is a pair."""
@@ -198,18 +197,24 @@ def library_to_mapping(library: Library) -> dict[str, object]:
     return head
 
 
-def read_library(name_or_path: FilePath) -> Library:
-    """The library in a file, or the bundled one of that name ("human23")."""
+def library_path(name_or_path: FilePath) -> Path:
+    """The file of a library: a path that ends in .toml as it is, or that of the bundled one of that name."""
     path = Path(name_or_path)
     # A bare word is a name: a folder that happens to be called so must not change what is read.
-    if path.suffix != ".toml" and len(path.parts) == 1:
-        folder = bundled("discretization")
-        known = sorted(file.stem for file in folder.glob("*.toml"))
-        if str(path) not in known:
-            raise FormatError(
-                f"no library {str(path)!r}; bundled are {', '.join(known) or 'none'}, a file of your own ends in .toml"
-            )
-        path = folder / f"{path}.toml"
+    if path.suffix == ".toml" or len(path.parts) != 1:
+        return path
+    folder = bundled("discretization")
+    known = sorted(file.stem for file in folder.glob("*.toml"))
+    if str(path) not in known:
+        raise FormatError(
+            f"no library {str(path)!r}; bundled are {', '.join(known) or 'none'}, a file of your own ends in .toml"
+        )
+    return folder / f"{path}.toml"
+
+
+def read_library(name_or_path: FilePath) -> Library:
+    """The library in a file, or the bundled one of that name ("human23")."""
+    path = library_path(name_or_path)
     try:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:

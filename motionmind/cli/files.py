@@ -1,0 +1,74 @@
+"""Files that the commands read and write."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.motion import Motion
+
+
+def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
+    """Movement from a file, as the options of `reading` say."""
+    from motionmind.formats import read_motion
+
+    return read_motion(path, unit=unit, asf=asf, fps=source_fps)
+
+
+def read_mapping(path: Path | None) -> dict[str, str] | None:
+    """Which joint is which, from a file; None without one."""
+    from motionmind.retarget import read_joint_mapping
+
+    return read_joint_mapping(path) if path else None
+
+
+def clip_names(files: Sequence[Path]) -> dict[Path, str]:
+    """What each file's clip is called: its stem, or as much more of its path as tells it from the others."""
+    if len(set(files)) < len(files):
+        twice = next(file for file, count in Counter(files).items() if count > 1)
+        raise MotionMindError(f"{twice}: given twice")
+    shorter = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
+    taken = [Counter(names.values()) for names in shorter]
+    unique = ([names[f] for names, count in zip(shorter, taken, strict=True) if count[names[f]] == 1] for f in files)
+    return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
+
+
+def check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence[Path]) -> list[Path]:
+    """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
+    paths = [path for path, _ in wanted]
+    places, sources = [path.resolve() for path in paths], [path.resolve() for path in read]
+    for path, suffixes in wanted:
+        folder = path.resolve().parent
+        if suffixes and path.suffix.lower() not in suffixes:
+            fault = f"the name must end in one of {', '.join(suffixes)}"
+        elif places.count(path.resolve()) > 1:
+            fault = "it is to be written twice"
+        elif path.resolve() in sources:
+            fault = "it is read from"
+        elif not folder.is_dir():
+            fault = f"there is no folder {folder}"
+        elif not os.access(path if path.exists() else folder, os.W_OK):
+            fault = "not permitted"
+        else:
+            continue
+        raise MotionMindError(f"{path}: cannot be written: {fault}")
+    return paths
+
+
+@contextmanager
+def all_or_none(files: Sequence[Path]) -> Iterator[None]:
+    """Of files that are written one after another, leave none that is new behind if one cannot be."""
+    new = [file for file in files if not file.exists()]
+    try:
+        yield
+    except MotionMindError:
+        for file in new:
+            file.unlink(missing_ok=True)
+        raise

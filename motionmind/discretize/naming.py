@@ -1,0 +1,99 @@
+"""Libraries of joint states made from scores: what their writers called each orientation is the state's name.
+
+A start for an expert, who edits the file from there.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.discretize.library import Library
+from motionmind.discretize.protocol import per_joint_values
+from motionmind.notation.anatomy import Body, Joint
+from motionmind.notation.compose import played
+from motionmind.notation.score import Score
+
+Array = NDArray[np.float64]
+_Named = list[tuple[str, Array]]  # what orientations were called, most frequent first
+
+
+def name_states(
+    scores: Iterable[Score], tolerance: float, per_joint: Mapping[str, float] | None = None, *, stage: bool = False
+) -> Library:
+    """The states of all joints that the scores' clips move, so that every posture is near a state with a name.
+
+    In the order of how often they occur, an orientation becomes a state unless one lies within the tolerance already
+    (leader clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). Orientations are kept in whole degrees, so
+    that a posture may be a degree further off than the tolerance.
+
+    Args:
+        scores: all on the same body.
+        tolerance: degrees.
+        per_joint: degrees for single joints, or pairs of joints.
+        stage: whether the pelvis' states tell where the body faces, as in a corpus whose facing is `stage`.
+    """
+    scores = list(scores)
+    body = scores[0].body
+    found: dict[str, Counter[tuple[str, bytes]]] = {joint: Counter() for joint in body.joints}
+    for score in scores:
+        for joint, name, turned in _orientations(score, stage):
+            found[joint][name, turned.tobytes()] += 1
+    stems = list(body.joints)
+    widths = np.radians(per_joint_values(stems, tolerance, per_joint or {}))
+    tables = {}
+    for joint, width in zip(stems, widths, strict=True):
+        named = [(name, np.frombuffer(turned)) for (name, turned), _ in found[joint].most_common()]
+        tables[joint] = _table(body, joint, _leaders(named, float(width)))
+    return Library(tables, title=scores[0].title, skeleton=body.skeleton.name)
+
+
+def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Array]]:
+    """Joint, name and rotation of every joint in every posture; a right one's as in the mirror."""
+    body = score.body
+    layers = {joint: index for index, joints in enumerate(body.layers.values()) for joint in joints}
+    for rows, motion in played(score):
+        turned = np.round(motion.rotations, 6)
+        if not stage:
+            upright = rot.about_vertical(rot.heading(motion.rotations[:, 0]))
+            turned[:, 0] = np.round(rot.inv_mul(upright, motion.rotations[:, 0]), 6)
+        for index, name in enumerate(body.skeleton.names):
+            joint, _ = body.anatomy(name)
+            right = name.startswith("right_") and body.paired(joint)
+            seen = rot.mirror(turned[:, index]) if right else turned[:, index]
+            for t, row in enumerate(rows):
+                words = row.words[layers[joint]][int(right)]
+                facing = f", facing {row.face % 360:g}" if stage and index == 0 and row.face % 360 else ""
+                yield joint, words + facing, seen[t]
+
+
+def _leaders(named: _Named, width: float) -> _Named:
+    """Orientations of which no two lie within `width` radians, and of which each that is named is that near to one."""
+    chosen: _Named = []
+    for name, turned in named:
+        if not chosen or rot.angle(np.stack([kept for _, kept in chosen]), turned).min() > width:
+            chosen.append((name, turned))
+    return chosen
+
+
+def _table(body: Body, joint: str, named: _Named) -> dict[str, str]:
+    """States as a library has them: turns by name, those of one name numbered."""
+    times, out = Counter[str](), dict[str, str]()
+    for name, turned in named:
+        turns = _turns(body.joints[joint], turned)
+        if turns in out.values():
+            continue
+        times[name] += 1
+        out[f"{name} ({times[name]})" if times[name] > 1 else name] = turns
+    return out
+
+
+def _turns(joint: Joint, turned: Array) -> str:
+    """A rotation [4] in whole degrees about the axes, the bone's own length last, or first where it is outermost."""
+    order = "yxz" if joint.outer else "xzy" if joint.long == "y" and not joint.rest else "yzx"
+    degrees = np.round(np.degrees(rot.to_euler(order, turned)))
+    return ", ".join(f"{axis} {angle:g}" for axis, angle in zip(order, degrees, strict=True) if angle)

@@ -1,0 +1,288 @@
+"""From scores to movement: angles to rotations, feet to the floor, and the body over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.errors import FormatError
+from motionmind.formats.files import FilePath
+from motionmind.formats.text import listed, meant
+from motionmind.motion import Motion, Posture
+from motionmind.notation import rows as phrases
+from motionmind.notation.anatomy import SIDES, Body
+from motionmind.notation.read import read_score
+from motionmind.notation.rows import Row
+from motionmind.notation.score import Clip, Score, Setting
+from motionmind.notation.stance import Feet, place
+
+Array = NDArray[np.float64]
+
+LENIENT = 0.5  # degrees past a limit that rounding explains
+SUNK = 0.01  # metres under the floor that no eye sees
+SHORT = 0.001  # metres by which a leg may fail to reach the floor
+
+
+def compose(path: FilePath, clip: str | None = None) -> Motion:
+    """The movement of a score's clip; of its only one, where none is named.
+
+    Raises:
+        FormatError: the score makes no sense, or asks of a body what it cannot do; names file, line and word.
+    """
+    score = read_score(path)
+    names = [found.name for found in score.clips]
+    if clip is None and len(names) != 1:
+        raise FormatError(
+            f"holds {len(names) or 'no'} clips" + f"; choose one: {listed(names, 60)}" * bool(names), path=path
+        )
+    if clip is not None and clip not in names:
+        raise FormatError(f"no clip {clip!r}{meant(clip, names)}; there are {listed(names, 60)}", path=path)
+    return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
+
+
+def motions(score: Score, clips: Sequence[Clip] | None = None) -> list[Motion]:
+    """The movement of a score's clips, all of them or those that are given."""
+    return [motion for _, motion in played(score, clips)]
+
+
+def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list[Row], Motion]]:
+    """The clips' rows, which tell what everything was called, and their movement."""
+    for phrase in score.phrases.values():
+        if phrase.score is score:
+            phrases.check(phrase)
+    clips = score.clips if clips is None else clips
+    parts = [phrases.play(clip) for clip in clips]
+    posed = _pose(score.body, [row for part in parts for row in part])
+    ends = np.cumsum([len(part) for part in parts])
+    return [
+        (part, _travel(score.body, clip.name, part, posed.part(end - len(part), end)))
+        for clip, part, end in zip(clips, parts, ends, strict=True)
+    ]
+
+
+def posture(score: Score, name: str) -> Posture:
+    """A posture that a score names."""
+    if name not in score.postures:
+        known = listed(score.postures, 60) or "none"
+        raise FormatError(f"no posture {name!r}{meant(name, score.postures)}; there are {known}", path=score.path)
+    row = phrases.posture(score, score.postures[name])
+    return _travel(score.body, name, [row], _pose(score.body, [row])).posture(0)
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """Postures where they stand, in the frame that each faces in.
+
+    Attributes:
+        rotations: local [T, J, 4]; root: [T, 3], metres.
+        weight: the share of it that each foot bears [T, F]; rests: which feet are on the floor [T, F].
+        balls, tips: where feet are [T, F, 3].
+        back: from the ball of a foot towards its heel [T, F, 3], of length 1.
+        pivot: how far that way it is to the place about which the foot turns [T, F, 1], metres.
+    """
+
+    rotations: Array
+    root: Array
+    weight: Array
+    rests: NDArray[np.bool_]
+    balls: Array
+    tips: Array
+    back: Array
+    pivot: Array
+
+    def part(self, start: int, stop: int) -> _Posed:
+        """Those from `start` up to `stop`."""
+        return _Posed(*(getattr(self, name)[start:stop] for name in self.__dataclass_fields__))
+
+
+def _pose(body: Body, rows: list[Row]) -> _Posed:
+    """Postures as rows describe them, each on the floor or above it as it should be."""
+    settings = _settings(body, rows)
+    degrees = _degrees(body, settings, len(rows))
+    rotations = body.rotations(degrees)
+    root = np.zeros((len(rows), 3))
+    stands = np.zeros(len(rows), dtype=np.bool_)
+    if body.leg is None:
+        toes, rests = _planted(body, settings, len(rows))
+        tips = toes
+        weight, pivot = rests.astype(np.float64), np.zeros((len(rows), len(toes)))
+    else:
+        feet = _feet(body, settings, len(rows))
+        toes, tips = np.array([np.take(body.foot(body.leg.toes, side), [0, -1]) for side in SIDES]).T
+        rests, weight = feet.stands | feet.touches, np.where(feet.stands, feet.weight, 0.0)
+        pivot = feet.pivot
+        stance = place(body, body.leg, rotations, feet)
+        rotations, root, stands = stance.rotations, stance.root, feet.stands[:, 0] | feet.stands[:, 1]
+        _check_reach(rows, feet, stance.short)
+        found = body.degrees(rotations)
+        for side in (0, 1):  # what was found for legs on the floor, in place of what was said
+            for joint in body.leg_joints(body.leg, SIDES[side]):
+                name = body.skeleton.names[joint]
+                degrees[name] = np.where(rests[:, side, None], found[:, joint], degrees[name])
+    _check_limits(body, rows, degrees)
+    root[:, 1] += _lifted(body, rows, rotations, root, stands)
+    points = body.skeleton.positions_and_tips(rotations, root)
+    on_floor = np.array([row.up is None for row in rows])[:, None]
+    above = body.skeleton.global_rotations(rotations)[:, [body.skeleton.parents[joint] for joint in toes]]
+    return _Posed(
+        rotations,
+        root,
+        weight * on_floor,
+        rests & on_floor,
+        points[:, toes],
+        points[:, len(body.skeleton) + tips],
+        rot.mul_vec(above, np.array([0.0, 0.0, -1.0])),
+        pivot[..., None],
+    )
+
+
+def _settings(body: Body, rows: list[Row]) -> dict[tuple[str, str], list[Setting]]:
+    """What each limb does in each row, by layer and side; a trunk has no side."""
+    out = {}
+    for index, (layer, joints) in enumerate(body.layers.items()):
+        for number, side in enumerate(SIDES if body.paired(joints[0]) else ("",)):
+            out[layer, side] = [row.limbs[index][number] for row in rows]
+    return out
+
+
+def _degrees(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Array]:
+    """Angles [T, 3] of each joint, by its name."""
+    out = {name: np.zeros((count, 3)) for name in body.skeleton.names}
+    for (_, side), limbs in settings.items():
+        for t, setting in enumerate(limbs):
+            for key, value in setting.items():
+                if isinstance(key, tuple):
+                    joint, axis = key
+                    out[f"{side}_{joint}" if side else joint][t, axis] = value
+    return out
+
+
+def _feet(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> Feet:
+    """What the rows say of legs on the floor, in metres and radians."""
+    assert body.leg is not None
+    layer = next(layer for layer, joints in body.layers.items() if body.leg.hip in joints)
+    legs = [settings[layer, side] for side in SIDES]
+
+    def read(key: str, otherwise: float) -> Array:
+        return np.array([[limb[t].get(key, otherwise) for limb in legs] for t in range(count)])
+
+    stands = read("stand", 0.0) > 0.0
+    turn, knee, weight = read("turn", 0.0), read("knee", np.nan), read("weight", np.nan)
+    others = np.where(stands[:, ::-1] & ~np.isnan(weight[:, ::-1]), 100.0 - weight[:, ::-1], 50.0)
+    lean = np.stack([_either(legs, "lean left", count), _either(legs, "lean ahead", count)], axis=-1)
+    return Feet(
+        stands=stands,
+        touches=read("touch", 0.0) > 0.0,
+        out=read("out", 0.0) / 100.0,
+        ahead=read("ahead", 0.0) / 100.0,
+        turn=np.radians(turn),
+        knee=np.radians(np.where(np.isnan(knee), turn, knee)),
+        heel=np.radians(read("heel", 0.0)),
+        bend=np.radians(read("bend", 0.0)),
+        pivot=read("pivot", 0.0) / 100.0,
+        towards=np.radians(read("towards", 0.0)),
+        weight=np.where(np.isnan(weight), np.maximum(others, 0.0), weight),
+        lean=lean / 100.0,
+    )
+
+
+def _either(legs: list[list[Setting]], key: str, count: int) -> Array:
+    """A value [T] of the whole body that either leg may speak of; their mean where both do."""
+    said = [[leg[t][key] for leg in legs if key in leg[t]] for t in range(count)]
+    return np.array([sum(values) / max(len(values), 1) for values in said])
+
+
+def _planted(
+    body: Body, settings: dict[tuple[str, str], list[Setting]], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """The last joint of each limb [F], and whether it is planted [T, F]."""
+    limbs = [(layer, side) for layer, side in settings if side]
+    ends = np.array([body.named(body.layers[layer][-1], side) for layer, side in limbs], dtype=np.int64)
+    planted = np.array([["planted" in settings[limb][t] for limb in limbs] for t in range(count)], dtype=bool)
+    return ends, planted.reshape(count, len(limbs))
+
+
+def _lifted(body: Body, rows: list[Row], rotations: Array, root: Array, stands: NDArray[np.bool_]) -> Array:
+    """How far to lift each posture [T], metres: its lowest point on the floor, or as high as its row says.
+
+    Where a leg stands the height is right already, and nothing may be under the floor.
+    """
+    points = body.skeleton.positions_and_tips(rotations, root)[..., 1]
+    lowest = points.min(axis=1)
+    for t in np.flatnonzero(stands):
+        row = rows[t]
+        if row.up is not None:
+            raise row.where.error(f"up {row.up:g}, but a leg stands; give the legs a position in the air")
+        if lowest[t] < -SUNK:
+            joint = body.skeleton.names[int(points[t].argmin()) % len(body.skeleton)].replace("_", " ")
+            raise row.where.error(f"the {joint} would be {-100.0 * lowest[t]:.0f} cm under the floor")
+    up = np.array([(row.up or 0.0) / 100.0 for row in rows])
+    return np.where(stands, 0.0, up - lowest)
+
+
+def _check_reach(rows: list[Row], feet: Feet, short: Array) -> None:
+    for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
+        raise rows[t].where.error("a leg touches the floor, but none stands on it")
+    for t, side in np.argwhere(short > SHORT):
+        far = f"{100.0 * short[t, side]:.0f} cm"
+        if feet.touches[t, side]:
+            raise rows[t].where.error(f"the {SIDES[side]} foot should touch the floor, and stays {far} above it")
+        raise rows[t].where.error(f"the {SIDES[side]} foot is {far} further from the hip than the leg is long")
+
+
+def _check_limits(body: Body, rows: list[Row], degrees: dict[str, Array]) -> None:
+    """Refuse what no body can do: FormatError names line, joint, angle and limit."""
+    for name in body.skeleton.names:
+        _, joint = body.anatomy(name)
+        swing = np.delete(degrees[name], "xyz".index(joint.long), axis=1)
+        for t in np.flatnonzero(np.linalg.norm(swing, axis=1) > 180.0 + LENIENT)[:1]:
+            called = " and ".join(word for word, angle in joint.angles.items() if "xyz"[angle.axis] != joint.long)
+            raise rows[t].where.error(f"{name.replace('_', ' ')}: {called} together are more than half a turn")
+        for word, angle in joint.angles.items():
+            values = angle.sign * degrees[name][:, angle.axis]
+            low, high = angle.range
+            for t in np.flatnonzero((values < low - LENIENT) | (values > high + LENIENT))[:1]:
+                over = values[t] > high
+                called = word if over or not angle.opposite else angle.opposite
+                value, limit = (values[t], high) if over else (values[t], low)
+                if called != word:
+                    value, limit = -value, -limit
+                raise rows[t].where.error(
+                    f"{name.replace('_', ' ')}: {called} {value:.0f} is past its limit of {limit:g} degrees"
+                )
+
+
+def _travel(body: Body, name: str, rows: list[Row], posed: _Posed) -> Motion:
+    """The movement of rows: turned to where they face, and moved so that feet which bear weight stay where they are."""
+    turn = rot.about_vertical(np.radians([row.face for row in rows]))
+    rotations = posed.rotations.copy()
+    rotations[:, 0] = rot.mul(turn, rotations[:, 0])
+    root = rot.mul_vec(turn, posed.root)
+    balls, tips, back = (rot.mul_vec(turn[:, None], feet) for feet in (posed.balls, posed.tips, posed.back))
+    weighed = body.centre_of_mass(rotations, root)
+    go = rot.mul_vec(turn, np.array([[row.go[0], 0.0, row.go[1]] for row in rows]) / 100.0)
+    moved = np.zeros((len(rows), 3))
+    for t in range(1, len(rows)):
+        held = np.minimum(posed.weight[t - 1], posed.weight[t])
+        if not held.any():
+            held = (posed.rests[t - 1] & posed.rests[t]).astype(np.float64)
+        if held.any():
+            both = np.minimum(posed.weight[t - 1], posed.weight[t]) > 0.0  # else a foot rolls, and its tip stays
+            before, after = (np.where(both[:, None], balls[i] + posed.pivot[t] * back[i], tips[i]) for i in (t - 1, t))
+            step = (held[:, None] * (before - after)).sum(axis=0) / held.sum()
+        else:
+            step = weighed[t - 1] - weighed[t] + go[t]
+        moved[t] = moved[t - 1] + step * [1.0, 0.0, 1.0]
+    # Rounded, so that a score is the same bytes on every machine.
+    times = np.cumsum([0.0, *(row.seconds or 0.0 for row in rows[1:])])
+    return Motion(
+        body.skeleton,
+        np.round(rot.canonical(rotations), 8) + 0.0,
+        np.round(root + moved, 5) + 0.0,
+        np.round(times, 4),
+        name,
+    )

@@ -1,0 +1,303 @@
+"""Reading scores: from a file's lines to positions and phrases. docs/notation.md explains the notation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from motionmind.errors import FormatError
+from motionmind.formats.files import FilePath
+from motionmind.formats.text import listed, meant, read_lines
+from motionmind.notation.anatomy import Body, body, read_body
+from motionmind.notation.score import (
+    KINDS,
+    NOTHING,
+    NUMBER,
+    SIDES,
+    Clip,
+    Line,
+    Phrase,
+    Position,
+    Score,
+    Setting,
+    Where,
+    mirrored,
+    number,
+    tempo,
+)
+
+NAME = re.compile(r"[^\W_][\w-]*")
+
+# Words of a leg that stands, with the least and greatest number that may come after; `lean` has a direction between.
+STANDING = {
+    "out": (-200.0, 200.0),
+    "ahead": (-200.0, 200.0),
+    "turn": (-180.0, 180.0),
+    "bend": (0.0, 170.0),
+    "heel": (0.0, 90.0),
+    "weight": (0.0, 100.0),
+    "knee": (-180.0, 180.0),
+    "pivot": (-50.0, 50.0),
+}
+LEAN = {
+    "ahead": ("lean ahead", 1.0),
+    "back": ("lean ahead", -1.0),
+    "left": ("lean left", 1.0),
+    "right": ("lean left", -1.0),
+}
+HEADINGS = ("title", "body", "include", "tempo", "facings", "phrase", "clip", "posture")
+
+
+def read_score(path: FilePath) -> Score:
+    """The score in a file.
+
+    Raises:
+        FormatError: names file, line and word of what cannot be understood.
+    """
+    return _read(Path(path), ())
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> Score:
+    lines = [Line(Where(str(path), number), text) for number, text in enumerate(read_lines(path), start=1)]
+    blocks = list(_blocks(lines))
+    includes = [_included(path, head, (*above, path.resolve())) for head, _ in blocks if _word(head) == "include"]
+    score = Score(str(path), _body(path, [head for head, _ in blocks], [other for _, _, other in includes]))
+    for where, name, other in includes:
+        _include(score, where, name, other)
+    for head, inner in blocks:
+        _heading(score, head, inner)
+    return score
+
+
+def _word(head: Line) -> str:
+    return head.text.split(maxsplit=1)[0]
+
+
+def _included(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Where, str, Score]:
+    """A score that another includes, where and as what."""
+    file, _, name = (part.strip() for part in head.text.removeprefix("include").partition(" as "))
+    try:
+        included = path.parent / file
+        if not included.is_file():
+            raise head.where.error(f"there is no file {included}")
+        if included.resolve() in above:
+            raise head.where.error(f"{file} includes itself")
+    except (OSError, ValueError):
+        raise head.where.error(f"{file:.60} cannot be a file") from None
+    return head.where, name, _read(included, above)
+
+
+def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
+    """Each heading with the indented lines below it, without comments and empty lines."""
+    head: Line | None = None
+    inner: list[Line] = []
+    for line in lines:
+        text = line.text.partition("#")[0].rstrip()
+        if not text.strip():
+            continue
+        if text[0].isspace():
+            if head is None:
+                raise line.where.error("an indented line before any heading")
+            if inner and inner[-1].text.endswith(","):
+                inner[-1] = Line(inner[-1].where, f"{inner[-1].text} {text.strip()}")
+            else:
+                inner.append(Line(line.where, text.strip()))
+            continue
+        if head:
+            yield head, inner
+        head, inner = Line(line.where, text), []
+    if head:
+        yield head, inner
+
+
+def _body(path: Path, heads: list[Line], included: list[Score]) -> Body:
+    """The body that a score names, one that comes with MotionMind or a file beside the score; else its includes'."""
+    for head in heads:
+        rest = head.text.removeprefix("body").strip()
+        if _word(head) == "body":
+            try:
+                return read_body(path.parent / rest) if rest.endswith(".toml") else body(rest)
+            except FormatError as error:
+                raise head.where.error(str(error)) from None
+    return included[0].body if included else body("human23")
+
+
+def _heading(score: Score, head: Line, inner: list[Line]) -> None:
+    word, _, rest = head.text.partition(" ")
+    rest, where = rest.strip(), head.where
+    if word in score.body.layers or word == "facings":
+        if rest:
+            raise where.error(f"{rest!r} after the heading {word}: positions go on lines of their own, indented")
+        for line in inner:
+            _entry(score, word, line)
+        return
+    if word not in HEADINGS:
+        layers = tuple(score.body.layers)
+        known = HEADINGS + layers
+        raise where.error(f"{word!r} is no heading{meant(word, known)}; there are {listed(known, 20)}")
+    if inner and word not in ("phrase", "clip"):
+        raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
+    if word == "title":
+        score.title = rest
+    elif word == "tempo":
+        score.tempo = tempo(rest, where)
+    elif word == "posture":
+        name, equals, text = (part.strip() for part in rest.partition("="))
+        if not equals:
+            raise where.error("posture NAME = legs | arms | ...")
+        score.postures[_new(name, score.postures, where)] = Line(where, text)
+    elif word in ("phrase", "clip"):
+        _phrase(score, word, rest, inner, where)
+
+
+def _phrase(score: Score, word: str, rest: str, inner: list[Line], where: Where) -> None:
+    about = ""
+    if word == "clip":
+        rest, _, about = (part.strip() for part in rest.partition(":"))
+    name, bracket, open_ = rest.partition("(")
+    if bracket and (word == "clip" or not open_.endswith(")")):
+        raise where.error(f"{rest!r}: write phrase NAME, or phrase NAME (WORD, WORD)")
+    words = tuple(part.strip() for part in open_.removesuffix(")").split(",")) if bracket else ()
+    for number_, word_ in enumerate(words):
+        _new(word_, words[:number_], where)
+    name = _new(name.strip(), {n: p for n, p in score.phrases.items() if p.score is score}, where)
+    if name in ("start", "tempo") or name[0].isdigit():
+        raise where.error(f"{name!r} cannot be a phrase's name: a line that begins so is something else")
+    if not inner:
+        raise where.error(f"{word} {name} has no lines")
+    kind = Clip if word == "clip" else Phrase
+    score.phrases[name] = kind(name, score, tuple(inner), where, words, about)
+
+
+def _include(score: Score, where: Where, name: str, other: Score) -> None:
+    """Take in another score's vocabulary and phrases, or all of it under a name."""
+    if other.body.path != score.body.path:
+        raise where.error(f"{other.path} is for {other.body.skeleton.name}, this score for {score.body.skeleton.name}")
+    if name:
+        score.included[_new(name, score.included, where)] = other
+        return
+    for layer, positions in other.positions.items():
+        score.positions.setdefault(layer, {}).update(positions)
+    score.facings.update(other.facings)
+    score.phrases.update(other.phrases)
+    score.included.update(other.included)
+
+
+def _new(name: str, taken: Container[str], where: Where) -> str:
+    if not NAME.fullmatch(name) or name in SIDES:
+        raise where.error(f"{name!r} cannot be a name: use letters, digits and hyphens")
+    if name in taken:
+        raise where.error(f"{name!r} is there already")
+    return name
+
+
+def _entry(score: Score, layer: str, line: Line) -> None:
+    """A line of a vocabulary."""
+    name, equals, text = (part.strip() for part in line.text.partition("="))
+    if not equals:
+        raise line.where.error(f"{line.text!r}: write NAME = what it is")
+    if layer == "facings":
+        if not NUMBER.fullmatch(text):
+            raise line.where.error(f"{text!r}: a facing is degrees to the left of the audience")
+        score.facings[_new(name, {}, line.where)] = number(text, name, line.where)
+        return
+    positions = score.positions.setdefault(layer, {})
+    own = {known: position for known, position in positions.items() if position.path == score.path}
+    positions[_new(name, own, line.where)] = replace(_definition(score, layer, text, line.where), path=score.path)
+
+
+def _definition(score: Score, layer: str, text: str, where: Where) -> Position:
+    parts = text.split("/")
+    if len(parts) > 1 and not score.paired(layer):
+        raise where.error(f"{text!r}: a / is for two limbs, and the {layer} is none")
+    if len(parts) > 2:
+        raise where.error(f"{text!r}: one / too many")
+    read = [_terms(score, layer, part, where) for part in parts]
+    if len(read) == 1:
+        return read[0]
+    for part, position in zip(parts, read, strict=True):
+        if position.sided:
+            raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
+    return Position(read[0].lead, read[1].lead, True)
+
+
+def _terms(score: Score, layer: str, text: str, where: Where) -> Position:
+    position = NOTHING
+    for term in text.split(","):
+        words = term.split()
+        if not words:
+            raise where.error(f"{text.strip()!r}: nothing between commas" if text.strip() else "nothing is said")
+        setting = _setting(score, layer, words, where)
+        if setting is not None:
+            sided = bool(setting.get("lean left")) if score.paired(layer) else setting != mirrored(setting)
+            position = Position(setting, setting, sided).over(position)
+            continue
+        for word in words:
+            position = score.position(layer, word, where).over(position)
+    return position
+
+
+def _setting(score: Score, layer: str, words: list[str], where: Where) -> Setting | None:
+    """What a term says of angles or feet; None where its words are other positions."""
+    first, numbered = words[0], len(words) > 1 and bool(NUMBER.fullmatch(words[1]))
+    if words == ["neutral"]:
+        return {}
+    leg = score.body.leg
+    stands = leg is not None and leg.hip in score.body.layers[layer]
+    if first in (KINDS[:2] if stands else KINDS[2:] if leg is None else ()):
+        if first != "touch":
+            return {first: 1.0} | _standing(words[1:], where)
+        if len(words) != 3 or words[1] != "towards":
+            raise where.error("touch towards DEGREES: 0 to the front, 90 to the side, 180 to the back")
+        return {"touch": 1.0, "towards": number(words[2], "touch towards", where)}
+    if stands and (first == "lean" or (first in STANDING and numbered)):
+        return _standing(words, where)
+    joints = score.body.layers[layer]
+    ends = [joint for joint in joints if joint.endswith(f"_{first}")]  # coxa, where there is but fore_coxa
+    parts = score.body.groups.get(first, {ends[0] if len(ends) == 1 else first: {}})
+    if not set(parts) <= set(joints):
+        if NUMBER.fullmatch(words[-1]):
+            known = [*joints, *score.body.groups, *KINDS, *STANDING]
+            raise where.error(f"{first!r} is no joint of the {layer}{meant(first, known)}")
+        return None
+    setting: dict[object, float] = {}
+    for name, value in _pairs(words[1:], where):
+        for joint, shares in parts.items():
+            angles = score.body.joints[joint].angles
+            names = {key: (key, 1.0) for key in angles}
+            names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
+            if name not in names:
+                raise where.error(f"{name!r} is no angle of the {first}{meant(name, names)}; it has {', '.join(names)}")
+            key, sign = names[name]
+            setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
+    if not setting:
+        raise where.error(f"{first}: say which angle, and how many degrees")
+    return setting
+
+
+def _standing(words: list[str], where: Where) -> dict[object, float]:
+    """The words of a leg that stands: name and number, or `lean`, direction and number."""
+    setting: dict[object, float] = {}
+    rest = iter(words)
+    for word in rest:
+        direction = next(rest, "") if word == "lean" else ""
+        if word == "lean" and direction not in LEAN:
+            raise where.error(f"lean {direction}: lean ahead, back, left or right, and how many centimetres")
+        known = (*STANDING, "lean")
+        if word not in known:
+            hint = meant(word, known) or f"; there are {', '.join(known)}"
+            raise where.error(f"{word!r} means nothing of a leg that stands{hint}")
+        value = number(next(rest, ""), f"{word} {direction}".strip(), where)
+        least, most = STANDING.get(word, (-200.0, 200.0))
+        if not least <= value <= most:
+            raise where.error(f"{word} {value:g}: from {least:g} to {most:g}")
+        key, sign = LEAN[direction] if direction else (word, 1.0)
+        setting[key] = sign * value
+    return setting
+
+
+def _pairs(words: list[str], where: Where) -> Iterator[tuple[str, float]]:
+    for name, value in zip(words[::2], [*words[1::2], ""], strict=False):
+        yield name, number(value, name, where)

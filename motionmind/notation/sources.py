@@ -1,0 +1,19 @@
+"""Which files a score is made of, found without reading what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from motionmind.formats.text import read_lines
+
+
+def sources(path: Path) -> list[Path]:
+    """The score's file, those that it includes, and those of bodies beside them."""
+    found = [path]
+    for score in found:  # it grows as it is read
+        for line in read_lines(score):
+            word, _, rest = line.partition("#")[0].partition(" ")
+            file = score.parent / rest.split(" as ")[0].strip()
+            if (word == "include" or (word == "body" and file.suffix == ".toml")) and file not in found:
+                found.append(file)
+    return found
