@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
+from motionmind.notation.anatomy import body
 from motionmind.render.solids import Cones, Ellipsoids
 from motionmind.skeleton import Skeleton, human23
 
@@ -24,9 +25,10 @@ MIDDLE, LEFT, RIGHT, FACE, HAIR, MARK = "middle", "left", "right", "face", "hair
 
 # Radii in metres of a person's limbs at the joints.
 _RADII = {"hip": 0.080, "knee": 0.051, "ankle": 0.032, "shoulder": 0.046, "elbow": 0.036, "wrist": 0.025}
-# Shares of a person's mass: Winter, "Biomechanics and Motor Control of Human Movement" (2009), table 4.1.
-_MASS = {"head": 0.081, "trunk": 0.497, "upper_arm": 0.028, "forearm": 0.016, "hand": 0.006}
-_MASS |= {"thigh": 0.100, "shank": 0.0465, "foot": 0.0145}  # like arms, each of two
+# The joints of human23 whose segments a part is.
+_SEGMENTS = {"head": ("atlantal",), "trunk": ("pelvis", "lumbar", "thorax")}
+_SEGMENTS |= {"upper_arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist",)}
+_SEGMENTS |= {"thigh": ("hip",), "shank": ("knee",), "foot": ("ankle",)}
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _SIDES = {"left": LEFT, "l": LEFT, "right": RIGHT, "r": RIGHT}
 
@@ -212,7 +214,11 @@ class _Person:
         solids += self._others()
         cones = tuple(solid for solid in solids if isinstance(solid, Cone))
         balls = tuple(solid for solid in solids if isinstance(solid, Ball))
-        masses = {part: _MASS.get(re.sub("^(left|right)_", "", part), 0.0) for part in (solid.part for solid in solids)}
+        known = body("human23").joints
+        masses = {
+            part: sum(known[joint].mass for joint in _SEGMENTS.get(re.sub("^(left|right)_", "", part), ()))
+            for part in (solid.part for solid in solids)
+        }
         return Body(self.skeleton, tuple(self.frames), cones, balls, self.size, masses)
 
     def _trunk(self) -> Iterator[Cone | Ball]:
