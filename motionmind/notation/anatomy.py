@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 FORMAT, VERSION = "motionmind-body", 1
 SIDES = ("left", "right")
+# What a score can say besides its layers.
+HEADINGS = ("title", "body", "include", "tempo", "facings", "phrase", "clip", "posture")
 _BODIES = Path(__file__).parent / "bodies"
 
 
@@ -352,6 +354,9 @@ def _check(read: Body, path: FilePath) -> None:
                 raise FormatError(
                     f"[joints.{joint}] {name}: about must be an axis such as -x, not {angle.about!r}", path=path
                 )
+    for layer in read.layers:
+        if layer in HEADINGS:
+            raise FormatError(f"{layer!r} cannot be a layer: it is a heading of scores", path=path)
     for joint in stems:
         if joint not in read.joints:
             raise FormatError(f"there is no [joints.{joint}]", path=path)

@@ -55,6 +55,8 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
         if phrase.score is score:
             phrases.check(phrase)
     clips = score.clips if clips is None else clips
+    if not clips:
+        return []
     parts = [phrases.play(clip) for clip in clips]
     posed = _pose(score.body, [row for part in parts for row in part])
     ends = np.cumsum([len(part) for part in parts])
@@ -133,7 +135,7 @@ def _pose(body: Body, rows: list[Row]) -> _Posed:
         root,
         weight * on_floor,
         rests & on_floor,
-        points[:, toes],
+        points[:, toes if body.leg else len(body.skeleton) + tips],  # a limb that is no leg stands on its tip
         points[:, len(body.skeleton) + tips],
         rot.mul_vec(above, np.array([0.0, 0.0, -1.0])),
         pivot[..., None],
@@ -227,6 +229,9 @@ def _lifted(body: Body, rows: list[Row], rotations: Array, root: Array, stands: 
 def _check_reach(rows: list[Row], feet: Feet, short: Array) -> None:
     for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
         raise rows[t].where.error("a leg touches the floor, but none stands on it")
+    weightless = feet.stands.any(axis=1) & ~(feet.stands & (feet.weight > 0.0)).any(axis=1)
+    for t in np.flatnonzero(weightless)[:1]:
+        raise rows[t].where.error("no foot bears weight")
     for t, side in np.argwhere(short > SHORT):
         far = f"{100.0 * short[t, side]:.0f} cm"
         if feet.touches[t, side]:

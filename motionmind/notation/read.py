@@ -10,7 +10,7 @@ from pathlib import Path
 from motionmind.errors import FormatError
 from motionmind.formats.files import FilePath
 from motionmind.formats.text import listed, meant, read_lines
-from motionmind.notation.anatomy import Body, body, read_body
+from motionmind.notation.anatomy import HEADINGS, Body, body, read_body
 from motionmind.notation.score import (
     KINDS,
     NOTHING,
@@ -47,7 +47,6 @@ LEAN = {
     "left": ("lean left", 1.0),
     "right": ("lean left", -1.0),
 }
-HEADINGS = ("title", "body", "include", "tempo", "facings", "phrase", "clip", "posture")
 
 
 def read_score(path: FilePath) -> Score:
@@ -218,7 +217,7 @@ def _definition(score: Score, layer: str, text: str, where: Where) -> Position:
     if len(read) == 1:
         return read[0]
     for part, position in zip(parts, read, strict=True):
-        if position.sided:
+        if position.lead != position.other:
             raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
     return Position(read[0].lead, read[1].lead, True)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import cos, radians, sin
 
 from motionmind.notation.score import NUMBER, SIDES, Clip, Line, Phrase, Score, Setting, Where, number, tempo
 
@@ -89,13 +90,19 @@ def _play(phrase: Phrase, words: dict[str, str], counts: float, depth: int) -> _
                 rows += _following([_row(phrase.score, line, standing, 60.0 / pace)], rows, line.where)
             else:
                 rows += _following(_call(phrase, line, pace, depth)(standing), rows, line.where)
-            if len(rows) > MOST:
-                raise line.where.error(f"more than {MOST} postures")
+            _few(rows, line.where)
         if not rows:
             raise phrase.where.error(f"{phrase.name} has no postures")
         return rows
 
     return run
+
+
+def _few(rows: list[Row], where: Where) -> list[Row]:
+    """The rows, if they are not too many."""
+    if len(rows) > MOST:
+        raise where.error(f"more than {MOST} postures")
+    return rows
 
 
 def _filled(line: Line, words: dict[str, str]) -> Line:
@@ -166,7 +173,7 @@ def _modified(run: _Play, how: str, phrase: Phrase, line: Line, counts: float, d
     if how == "backwards":
         return lambda before: _backwards(run(before))
     if how == "there and back":
-        return lambda before: _there_and_back(run(before), before)
+        return lambda before: _few(_there_and_back(run(before), before), line.where)
     if len(words) == 2 and words[1] in ("times", "time") and words[0].isdecimal() and 0 < int(words[0]) <= 1000:
         return lambda before: _times(run, int(words[0]), before, line.where)
     if len(words) > 3 and words[0] == "with" and words[-2] == "of":
@@ -174,7 +181,7 @@ def _modified(run: _Play, how: str, phrase: Phrase, line: Line, counts: float, d
         for layer in taken:
             if layer not in layers:
                 raise line.where.error(f"{layer!r} is no layer; there are {', '.join(layers)}")
-        other = _play(phrase.score.phrase(words[-1], line.where), {}, counts, depth + 1)
+        other = _call(phrase, replace(line, text=words[-1]), counts, depth)
         chosen = [layers.index(layer) for layer in taken]
         return lambda before: _layered(run(before), other(before), chosen)
     raise line.where.error(
@@ -193,10 +200,17 @@ def _mirror(row: Row, score: Score) -> Row:
 def _backwards(rows: list[Row]) -> list[Row]:
     """The way back through the postures; it begins with the last one."""
     back = [
-        replace(row, seconds=after.seconds, go=(-after.go[0], -after.go[1]))
+        replace(row, seconds=after.seconds, go=_back(after, row))
         for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True)
     ]
     return [replace(rows[-1], seconds=None, go=(0.0, 0.0)), *back]
+
+
+def _back(there: Row, row: Row) -> tuple[float, float]:
+    """The way back of the move that led `there` from `row`, as the body sees it when it is at `row` again."""
+    turned = radians(there.face - row.face)
+    left, ahead = there.go
+    return -(left * cos(turned) + ahead * sin(turned)), -(ahead * cos(turned) - left * sin(turned))
 
 
 def _there_and_back(rows: list[Row], before: Row | None) -> list[Row]:
@@ -208,6 +222,7 @@ def _times(run: _Play, times: int, before: Row | None, where: Where) -> list[Row
     rows: list[Row] = []
     for _ in range(times):
         rows += _following(run(rows[-1] if rows else before), rows, where)
+        _few(rows, where)
     return rows
 
 
@@ -293,7 +308,10 @@ def _how(
         elif word == "turn":
             if len(rest) < 2 or rest[1] not in SIDES:
                 raise where.error("turn DEGREES left, or right")
-            face += (-1.0 if rest[1] == "right" else 1.0) * number(rest[0], word, where)
+            degrees = number(rest[0], word, where)
+            if not 0.0 <= degrees < 180.0:
+                raise where.error(f"turn {degrees:g}: a move turns less than half round; write more of them")
+            face += -degrees if rest[1] == "right" else degrees
             at += 1
         elif word == "go":
             at -= 1

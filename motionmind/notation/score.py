@@ -133,7 +133,7 @@ class Score:
         settings = []
         for part in parts:
             position = self._words(layer, part, where)
-            if position.sided:
+            if position.lead != position.other:
                 raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
             settings.append(position.lead)
         return settings[0], settings[1]
