@@ -17,6 +17,7 @@ from typing import Any
 import click
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 
 from motionmind import rotations as rot
 from motionmind.cli import app, main
@@ -76,7 +77,7 @@ def start(*arguments: object, cwd: Path, stdout: int = subprocess.PIPE) -> subpr
 
 def clip(name: str = "jump", fps: float = 30.0) -> Motion:
     """A clip of the bundled corpus, with even frames."""
-    return read_motion(BALLET / "clips" / f"{name}.json").resample(fps)
+    return ballet_clip(name).resample(fps)
 
 
 def flipped(frame: int) -> Motion:
@@ -445,7 +446,7 @@ BAD = [
     (f"{BUILD} --tolerance -3", r"tolerance in degrees must be a number from"),
     (f"{BUILD} --tolerance nan", r"tolerance in degrees must be a number from"),
     (f"{BUILD} --tolerance left_hop=5", r"no joint 'left_hop'.*; did you mean left_hip\?"),
-    (f"{BUILD} --discretize nobody", r"no library 'nobody'; bundled are human23"),
+    (f"{BUILD} --discretize nobody", r"no library 'nobody'; bundled are ballet, human23"),
     (f"{BUILD} --discretize broken.toml", r"broken\.toml: not TOML"),
     (f"{BUILD} --joints broken.toml", r"broken\.toml: no mapping of joints"),
     (f"{BUILD} --unit parsec", r"unit 'parsec' is unknown; give one of cm, m"),

@@ -24,7 +24,7 @@ from motionmind.formats import read_motion, read_posture, write_motion, write_po
 from motionmind.formats.papers import read_papers, write_papers
 from motionmind.learned import own_skeleton
 from motionmind.motion import Motion, Posture
-from motionmind.notation.anatomy import body, read_body
+from motionmind.notation.body_file import body, read_body
 from motionmind.notation.compose import compose
 from motionmind.realise.root import lowest
 from motionmind.retarget import to_human23

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from bundled_clips import ballet_clip
 
 from motionmind import read_motion, write_motion
 
@@ -42,8 +43,7 @@ def test_the_first_command_runs(elsewhere: dict[str, str], tmp_path: Path) -> No
 
 def test_the_commands_for_ones_own_movement_run(elsewhere: dict[str, str], tmp_path: Path) -> None:
     for name in ("plies", "adagio"):
-        clip = read_motion(ROOT / "corpora" / "ballet" / "clips" / f"{name}.json")
-        write_motion(tmp_path / f"{name}.bvh", clip.resample(30.0))
+        write_motion(tmp_path / f"{name}.bvh", ballet_clip(name).resample(30.0))
     shutil.copy(tmp_path / "adagio.bvh", tmp_path / "clip.bvh")
     commands = [command for command in COMMANDS[2:] if command.startswith("motionmind ")]
     assert len(commands) == 4

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -588,16 +589,36 @@ def opened(path: str) -> NDArray[np.uint8]:
         return np.asarray(picture)
 
 
-PLIES = BALLET / "clips" / "plies.json"
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of clips of the bundled corpus."""
+    folder = tmp_path_factory.mktemp("clips")
+    for name in ("plies", "jump"):
+        write_motion(folder / f"{name}.json", ballet_clip(name))
+    return folder
 
 
-def test_the_command_draws_the_frames_that_are_asked_for(run: Run, words: list[tuple[float, float, str]]) -> None:
-    code, out, err = run("sheet", PLIES, "-o", "plies.png", "--from", 3, "--to", -40, "--every", 6, "--columns", 2)
+@pytest.fixture
+def plies(clips: Path) -> Path:
+    return clips / "plies.json"
+
+
+@pytest.fixture
+def jump(clips: Path) -> Path:
+    """Seven postures."""
+    return clips / "jump.json"
+
+
+def test_the_command_draws_the_frames_that_are_asked_for(
+    run: Run, plies: Path, words: list[tuple[float, float, str]]
+) -> None:
+    code, out, err = run("sheet", plies, "-o", "plies.png", "--from", 3, "--to", -40, "--every", 6, "--columns", 2)
     assert (code, err) == (0, "")
     with Image.open("plies.png") as picture:
         assert picture.format == "PNG"
-    frames = list(range(3, len(read_motion(PLIES)) - 39, 6))
-    assert out == f"plies.png: {len(frames)} postures of 66, {picture.width} x {picture.height} pixels\n"
+    frames = list(range(3, len(read_motion(plies)) - 39, 6))
+    drawn = f"{len(frames)} postures of {len(read_motion(plies))}"
+    assert out == f"plies.png: {drawn}, {picture.width} x {picture.height} pixels\n"
     assert [text for _, _, text in words if text.isdigit()] == [str(frame) for frame in frames]
 
 
@@ -613,17 +634,17 @@ def test_the_command_draws_the_frames_that_are_asked_for(run: Run, words: list[t
     ],
 )
 def test_some_of_the_frames(
-    options: tuple[object, ...], frames: list[int], run: Run, words: list[tuple[float, float, str]]
+    options: tuple[object, ...], frames: list[int], run: Run, jump: Path, words: list[tuple[float, float, str]]
 ) -> None:
-    assert run("sheet", BALLET / "clips" / "jump.json", "-o", "sheet.png", *options)[0] == 0
+    assert run("sheet", jump, "-o", "sheet.png", *options)[0] == 0
     drawn = [int(text) for _, _, text in words if text.isdigit()]
     assert len(drawn) == len(frames)
     assert np.abs(np.subtract(drawn, frames)).max() <= 1  # a half may be rounded either way
     assert (drawn[0], drawn[-1]) == (frames[0], frames[-1])
 
 
-def test_the_command_reads_every_format_and_one_posture(run: Run) -> None:
-    motion = read_motion(BALLET / "clips" / "jump.json")
+def test_the_command_reads_every_format_and_one_posture(run: Run, jump: Path) -> None:
+    motion = read_motion(jump)
     for name in ("jump.bvh", "jump.txt"):
         write_motion(name, motion.resample(5.0))
     for source in ("jump.bvh", "jump.txt", BALLET / "postures" / "fifth.json"):
@@ -644,16 +665,18 @@ def test_the_command_reads_every_format_and_one_posture(run: Run) -> None:
         ((), r"Missing option '-o' / '--output'"),
         (("-o", "sheet.png", "--every", 0), r"'--every': 0 is not in the range"),
         (("-o", "sheet.png", "--columns", 0), r"'--columns': 0 is not in the range"),
-        (("-o", "sheet.png", "--from", 66), r"plies\.json: frames are 0 to 65, there is no frame 66"),
-        (("-o", "sheet.png", "--to", -67), r"plies\.json: frames are 0 to 65, there is no frame -67"),
+        (("-o", "sheet.png", "--from", 999), r"plies\.json: frames are 0 to \d+, there is no frame 999"),
+        (("-o", "sheet.png", "--to", -999), r"plies\.json: frames are 0 to \d+, there is no frame -999"),
         (("-o", "sheet.png", "--from", 9, "--to", 8), r"plies\.json: --to 8 lies before --from 9"),
         (("-o", "sheet.png", "--every", 2, "--postures", 3), r"--every and --postures both say which frames to draw"),
         (("-o", "sheet.png", "--postures", 0), r"'--postures': 0 is not in the range"),
         (("-o", "sheet.png", "--side", "top"), r"'--side': 'top' is not one of 'right', 'left'"),
     ],
 )
-def test_bad_input_is_one_line(options: tuple[object, ...], message: str, run: Run, tmp_path: Path) -> None:
-    code, out, err = run("sheet", PLIES, *options)
+def test_bad_input_is_one_line(
+    options: tuple[object, ...], message: str, run: Run, plies: Path, tmp_path: Path
+) -> None:
+    code, out, err = run("sheet", plies, *options)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert err.startswith("error: ")
@@ -662,10 +685,10 @@ def test_bad_input_is_one_line(options: tuple[object, ...], message: str, run: R
 
 
 def test_a_long_clip_is_refused_before_it_is_drawn(run: Run, tmp_path: Path) -> None:
-    write_motion("long.bvh", read_motion(PLIES).resample(100.0))
+    write_motion("long.bvh", ballet_clip("plies").resample(100.0))
     code, _, err = run("sheet", "long.bvh", "-o", "sheet.png")
     assert code == 2
-    assert re.search(r"error: long: a sheet holds 400 postures, not 2\d\d\d; take fewer, as with --every 7\n$", err)
+    assert re.search(r"error: long: a sheet holds 400 postures, not 3\d\d\d; take fewer, as with --every [89]\n$", err)
     assert [path.name for path in tmp_path.iterdir()] == ["long.bvh"]
     assert run("sheet", "long.bvh", "-o", "sheet.png", "--every", 100)[0] == 0
 

@@ -16,7 +16,8 @@ import numpy as np
 from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
 from motionmind import rotations as rot
 from motionmind.corpus import store
-from motionmind.notation.anatomy import Body, body
+from motionmind.notation.anatomy import Body
+from motionmind.notation.body_file import body
 
 PAIRS = 200
 ANGLES = ("hip flexion", "hip abduction", "hip rotation", "knee flexion", "lumbar flexion", "thorax flexion")

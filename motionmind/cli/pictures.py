@@ -16,7 +16,7 @@ from motionmind.cli.printing import count
 from motionmind.errors import MotionMindError
 
 
-@app.command(epilog=example("motionmind sheet clip.bvh -o clip.png"))
+@app.command(epilog=example("motionmind sheet clip.bvh --postures 24 -o clip.png"))
 @click.argument("clip", type=FILE)
 @click.option("-o", "--output", type=FILE, required=True, help="Where the picture goes: .png.")
 @click.option("--every", type=COUNT, metavar="N", help="Draw every Nth frame  [default: all of them]")

@@ -6,11 +6,13 @@ import re
 from collections.abc import Container, Iterator
 from dataclasses import replace
 from pathlib import Path
+from unicodedata import normalize
 
 from motionmind.errors import FormatError
 from motionmind.formats.files import FilePath
 from motionmind.formats.text import listed, meant, read_lines
-from motionmind.notation.anatomy import HEADINGS, Body, body, read_body
+from motionmind.notation.anatomy import Body
+from motionmind.notation.body_file import HEADINGS, body, read_body
 from motionmind.notation.score import (
     KINDS,
     NOTHING,
@@ -93,7 +95,7 @@ def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
     head: Line | None = None
     inner: list[Line] = []
     for line in lines:
-        text = line.text.partition("#")[0].rstrip()
+        text = normalize("NFC", line.text).replace("\t", " ").partition("#")[0].rstrip()
         if not text.strip():
             continue
         if text[0].isspace():

@@ -171,7 +171,7 @@ def _modified(run: _Play, how: str, phrase: Phrase, line: Line, counts: float, d
     if how == "other side":
         return lambda before: [_mirror(row, phrase.score) for row in run(before and _mirror(before, phrase.score))]
     if how == "backwards":
-        return lambda before: _backwards(run(before))
+        return lambda before: _backwards(_ending(run, before))
     if how == "there and back":
         return lambda before: _few(_there_and_back(run(before), before), line.where)
     if len(words) == 2 and words[1] in ("times", "time") and words[0].isdecimal() and 0 < int(words[0]) <= 1000:
@@ -195,6 +195,13 @@ def _mirror(row: Row, score: Score) -> Row:
     limbs = tuple(score.mirrored(layer, limb) for layer, limb in zip(score.body.layers, row.limbs, strict=True))
     words = tuple(score.mirrored_words(layer, words) for layer, words in zip(score.body.layers, row.words, strict=True))
     return replace(row, limbs=limbs, words=words, face=-row.face, go=(-row.go[0], row.go[1]))
+
+
+def _ending(run: _Play, before: Row | None) -> list[Row]:
+    """The rows that end where `before` faces: begun so much earlier in the turn that they make."""
+    rows = run(before)
+    turned = rows[-1].face - before.face if before is not None else 0.0
+    return run(replace(before, face=before.face - turned)) if before is not None and turned else rows
 
 
 def _backwards(rows: list[Row]) -> list[Row]:

@@ -9,11 +9,11 @@ from motionmind.formats.text import read_lines
 
 def sources(path: Path) -> list[Path]:
     """The score's file, those that it includes, and those of bodies beside them."""
-    found = [path]
+    found = [path.resolve()]
     for score in found:  # it grows as it is read
         for line in read_lines(score):
             word, _, rest = line.partition("#")[0].partition(" ")
-            file = score.parent / rest.split(" as ")[0].strip()
+            file = (score.parent / rest.split(" as ")[0].strip()).resolve()
             if (word == "include" or (word == "body" and file.suffix == ".toml")) and file not in found:
                 found.append(file)
     return found

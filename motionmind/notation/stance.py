@@ -100,9 +100,10 @@ def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
         short += _touch(bones, out, rotations, root, hips, feet)
         wrong = body.centre_of_mass(out, root)[:, [0, 2]] - _support(bones, feet, shares)
         wrong = np.where((stands & (total[:, 0] > 0.0))[:, None], wrong - feet.lean, 0.0)
-        if np.abs(wrong).max(initial=0.0) < CLOSE:
+        far = np.abs(wrong).max(axis=1) > CLOSE
+        if not far.any():
             break
-        shift = shift - wrong
+        shift = shift - np.where(far[:, None], wrong, 0.0)  # who is there stays: no posture depends on the others
     return Stance(out, root, short)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.notation.anatomy import body
+from motionmind.notation.body_file import body
 from motionmind.render.solids import Cones, Ellipsoids
 from motionmind.skeleton import Skeleton, human23
 
