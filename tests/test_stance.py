@@ -73,6 +73,8 @@ def feet_of(count: int, **said: Any) -> Feet:
     return Feet(**out)
 
 
+HEEL = np.array([0.0, -0.066, -0.045])  # in the ankle's frame, metres: under it and behind
+
 # What legs may be: both stand; one does, and the other is in the air, or touches.
 WAYS = ((("stand", "stand"), 3), (("stand", "air"), 1), (("air", "stand"), 1), (("stand", "touch"), 1))
 WAYS += ((("touch", "stand"), 1),)
@@ -171,6 +173,14 @@ def points(stance: Stance) -> tuple[dict[str, Array], dict[str, Array]]:
     return joints, {name: found[:, len(BONES) + index] for index, name in enumerate(BONES.names)}
 
 
+def lowest_of(stance: Stance, side: str) -> Array:
+    """Height of the lowest of a foot's ball, tip and heel [T], metres."""
+    joints, tips = points(stance)
+    turned = BONES.global_rotations(stance.rotations)[:, BONES.index(f"{side}_ankle")]
+    heel = joints[f"{side}_ankle"] + rot.mul_vec(turned, HEEL)
+    return np.min([joints[f"{side}_toes"][:, 1], tips[f"{side}_toes"][:, 1], heel[:, 1]], axis=0)
+
+
 def direction(degrees: Array, side: int) -> Array:
     """Level, so many radians outward."""
     return np.stack([SIGN[side] * np.sin(degrees), np.zeros(len(degrees)), np.cos(degrees)], axis=-1)
@@ -255,13 +265,11 @@ def check_weight(case: Case, stance: Stance) -> None:
 
 def check_touch(case: Case, stance: Stance) -> None:
     """Of a leg that touches the lowest point of the foot is on the floor; it goes where it should, as it was."""
-    joints, tips = points(stance)
+    joints, _ = points(stance)
     before = case.rotations
     for side, name in enumerate(SIDES):
         touches = case.feet.touches[:, side]
-        ball, tip = joints[f"{name}_toes"], tips[f"{name}_toes"]
-        lowest = np.minimum(ball[:, 1], tip[:, 1])
-        np.testing.assert_allclose(lowest[touches], 0.0, atol=1e-6)
+        np.testing.assert_allclose(lowest_of(stance, name)[touches], 0.0, atol=1e-6)
         for joint in ("knee", "ankle", "toes"):
             index = BONES.index(f"{name}_{joint}")
             np.testing.assert_array_equal(stance.rotations[touches, index], before[touches, index])
@@ -351,8 +359,7 @@ def test_a_foot_that_stays_above_the_floor_says_by_how_much() -> None:
     """It cannot touch: the other leg stands on the ball of its foot, and this one's knee is bent."""
     feet = feet_of(1, stands=[[0.0, 1.0]], touches=[[1.0, 0.0]], weight=50.0, heel=48.0)
     stance = Case({"left_knee": np.array([[70.0, 0.0, 0.0]])}, feet).placed()
-    joints, tips = points(stance)
-    lowest = min(joints["left_toes"][0, 1], tips["left_toes"][0, 1])
+    lowest = lowest_of(stance, "left")[0]
     assert stance.short[0, 0] == pytest.approx(lowest, abs=1e-6)
     assert lowest > 0.05
 
@@ -457,8 +464,8 @@ class Oracle:
             return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix() @ twist)
 
         def height(angle: float) -> float:
-            places, _ = self._hanging(side, hip, thigh(angle))
-            return float(min(places[3][1], places[4][1]))
+            places, frames = self._hanging(side, hip, thigh(angle))
+            return float(min(places[3][1], places[4][1], (places[2] + frames[2] @ HEEL)[1]))
 
         angles = np.linspace(0.0, np.radians(120.0), 25)
         above = next(angle for angle in angles if height(angle) > 0.0)

@@ -72,12 +72,16 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Leg(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which joints make a leg that can be placed on the floor: two bones and a foot that bends at its ball."""
+    """Which joints make a leg that can be placed on the floor: two bones and a foot that bends at its ball.
+
+    `heel` is the heel's place in the left ankle's frame, metres: no joint, but on the floor all the same.
+    """
 
     hip: str
     knee: str
     ankle: str
     toes: str
+    heel: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +129,20 @@ class Body:
         while len(below := self.skeleton.children(foot[-1])) == 1:
             foot += below
         return foot
+
+    def lowest(self, rotations: Array, root: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Height [T] of a body's lowest point, metres, and the joint [T] that it belongs to."""
+        count = len(self.skeleton)
+        heights = self.skeleton.positions_and_tips(rotations, root)[..., 1]
+        owners = np.tile(np.arange(count), 2)
+        if self.leg is not None:
+            ankles = np.array([self.named(self.leg.ankle, side) for side in SIDES])
+            turned = self.skeleton.global_rotations(rotations)[..., ankles, :]
+            heels = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]) * self.leg.heel
+            heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
+            owners = np.concatenate([owners, ankles])
+        at = heights.argmin(axis=-1)
+        return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], owners[at]
 
     def rotations(self, degrees: Mapping[str, Array]) -> Array:
         """Local rotations [T, J, 4] from angles, by the skeleton's names of joints.

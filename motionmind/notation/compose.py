@@ -213,14 +213,13 @@ def _lifted(body: Body, rows: list[Row], rotations: Array, root: Array, stands: 
 
     Where a leg stands the height is right already, and nothing may be under the floor.
     """
-    points = body.skeleton.positions_and_tips(rotations, root)[..., 1]
-    lowest = points.min(axis=1)
+    lowest, joints = body.lowest(rotations, root)
     for t in np.flatnonzero(stands):
         row = rows[t]
         if row.up is not None:
             raise row.where.error(f"up {row.up:g}, but a leg stands; give the legs a position in the air")
         if lowest[t] < -SUNK:
-            joint = body.skeleton.names[int(points[t].argmin()) % len(body.skeleton)].replace("_", " ")
+            joint = body.skeleton.names[joints[t]].replace("_", " ")
             raise row.where.error(f"the {joint} would be {-100.0 * lowest[t]:.0f} cm under the floor")
     up = np.array([(row.up or 0.0) / 100.0 for row in rows])
     return np.where(stands, 0.0, up - lowest)

@@ -77,6 +77,7 @@ class _Bones:
         self.knee, self.ankle, self.toes = skeleton.offsets[knee], skeleton.offsets[ankle], skeleton.offsets[toes]
         # From the ankle to the ball, from there to the next row of knuckles, if there is one, and so on to the tip.
         self.foot = [*skeleton.offsets[chains[0][3:]], skeleton.tips[chains[0][-1]]]
+        self.heel = np.array(leg.heel)
 
 
 def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
@@ -222,7 +223,7 @@ def _lowest(bones: _Bones, thigh: Array, joints: Array) -> Array:
     """Height [T] over the hip of the lowest point of a foot whose leg hangs at `thigh`."""
     turned = rot.mul(thigh, joints[:, 1])
     place = rot.mul_vec(thigh, bones.knee) + rot.mul_vec(turned, bones.ankle)
-    lowest = np.full(len(place), np.inf)
+    lowest = place[:, 1] + rot.mul_vec(rot.mul(turned, joints[:, 2]), bones.heel)[:, 1]
     for joint, step in enumerate(bones.foot, start=2):
         turned = rot.mul(turned, joints[:, joint])
         place = place + rot.mul_vec(turned, step)
