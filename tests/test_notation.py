@@ -377,6 +377,11 @@ SLIPS = {
     "position of another layer": (C + "  1 | bas @", r"'bas' is no position of the legs; it is a position of the arms"),
     "cells moved by one": (C + "  1 | | upright @", r"'upright' is no position of the arms.*torso"),
     "no side": (C + "  1 | fifth @", r"'fifth': say which side: fifth left or fifth right"),
+    "no side of what is on top of a side": (C + "  1 | fifth plie @", r"'fifth plie': say which side"),
+    "no side of what is built on a side": (
+        "legs\n  odd = fifth, bend 9\n" + C + "  1 | odd @",
+        r"'odd': say which side",
+    ),
     "no side of a head": (C + "  1 | | | | turned @", r"'turned': say which side"),
     "two sides": (C + "  1 | fifth left right @", r"'fifth left right' names two sides"),
     "one side twice": (C + "  1 | fifth left left @", r"names two sides"),
@@ -943,6 +948,26 @@ def test_feet_are_where_a_score_says(folder: Path, text: str) -> None:
         assert found[f"{side}_toes"][0, 1] == pytest.approx(0.0, abs=2e-5)
         assert np.degrees(np.arctan2(sign * tip[0], tip[2])) == pytest.approx(float(foot["turn"]), abs=1e-3)
         assert tip[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_other_foot_bears_what_one_does_not(tmp_path: Path) -> None:
+    said = ("stand weight 70 / stand weight 30", "stand weight 70 / stand", "stand / stand weight 30")
+    found = [posed(tmp_path, "odd right", f"legs\n  odd = {text}\n") for text in said]
+    shared = posed(tmp_path, "odd right", "legs\n  odd = stand / stand\n")
+    for posture in found:
+        np.testing.assert_array_equal(posture.rotations, found[0].rotations)
+        np.testing.assert_array_equal(posture.root, found[0].root)
+    # The feet are as far apart as the hips: with 70 parts of 100 the weight is two fifths of the way out to the one.
+    aside = [HUMAN.centre_of_mass(posture.rotations, posture.root)[0] for posture in (found[0], shared)]
+    hips = HUMAN.skeleton.offsets[HUMAN.skeleton.index("left_hip")][0]
+    assert aside[1] == pytest.approx(0.0, abs=1e-5)
+    assert aside[0] == pytest.approx(-0.4 * hips, abs=1e-5)
+
+
+def test_an_included_clip_keeps_its_tempo_and_a_phrase_takes_that_of_its_caller(tmp_path: Path) -> None:
+    write(tmp_path, VOCABULARY + "phrase q\n  1 | first plie\n  1 | first\nclip d\n  q\n", "other.score")
+    found = moved(tmp_path, "include other.score as o\ntempo 60\nclip c\n  start | o.first\n  o.q\n  o.d\n", "")
+    np.testing.assert_allclose(np.diff(found.times), [1.0, 1.0, 0.5, 0.5])
 
 
 @given(stances(), st.integers(-180, 180))

@@ -151,7 +151,7 @@ def _check(body: Body, path: FilePath) -> None:
             raise FormatError(f"[layers] {layer}: {what} is no joint", path=path)
         if len({body.paired(joint) for joint in joints}) > 1:
             raise FormatError(f"[layers] {layer}: pairs and single joints move in layers of their own", path=path)
-    for joint in _stems(body.skeleton):
+    for joint in sorted(_stems(body.skeleton)):
         holders = [layer for layer, joints in body.layers.items() if joint in joints]
         if len(holders) != 1:
             raise FormatError(f"{joint} must be in one layer, not {' and '.join(holders) or 'none'}", path=path)

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 LENIENT = 0.5  # degrees past a limit that rounding explains
 SUNK = 0.01  # metres under the floor that no eye sees
-SHORT = 0.001  # metres by which a leg may fail to reach the floor
+SHORT = 0.001  # metres by which a leg may fail to reach the floor, or the weight its place
 
 
 def compose(path: FilePath, clip: str | None = None) -> Motion:
@@ -120,6 +120,8 @@ def _pose(body: Body, rows: list[Row]) -> _Posed:
         stance = place(body, body.leg, rotations, feet)
         rotations, root, stands = stance.rotations, stance.root, feet.stands[:, 0] | feet.stands[:, 1]
         _check_reach(rows, feet, stance.short)
+        for t in np.flatnonzero(stance.astray > SHORT)[:1]:
+            raise rows[t].where.error("the weight cannot be brought over the feet")
         found = body.degrees(rotations)
         for side in (0, 1):  # what was found for legs on the floor, in place of what was said
             for joint in body.leg_joints(body.leg, SIDES[side]):

@@ -12,8 +12,9 @@ def sources(path: Path) -> list[Path]:
     found = [path.resolve()]
     for score in found:  # it grows as it is read
         for line in read_lines(score):
-            word, _, rest = line.partition("#")[0].partition(" ")
-            file = (score.parent / rest.split(" as ")[0].strip()).resolve()
-            if (word == "include" or (word == "body" and file.suffix == ".toml")) and file not in found:
-                found.append(file)
+            word, _, rest = line.partition("#")[0].replace("\t", " ").partition(" ")
+            file = rest.split(" as ")[0].strip()
+            if word == "include" or (word == "body" and file.endswith(".toml")):
+                beside = (score.parent / file).resolve()
+                found += [] if beside in found else [beside]
     return found

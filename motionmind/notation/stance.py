@@ -58,11 +58,13 @@ class Stance:
         root: position of the root [T, 3], metres; its height is the body's over the floor, where a leg stands.
         short: how much a leg is too short to reach the floor [T, 2], metres, or, of one that touches, how far its foot
             stays above it; 0 where neither.
+        astray: how far the weight is off its place [T], metres: next to nothing, unless no place of the pelvis will do.
     """
 
     rotations: Array
     root: Array
     short: Array
+    astray: Array
 
 
 class _Bones:
@@ -105,7 +107,7 @@ def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
         if not far.any():
             break
         shift = shift - np.where(far[:, None], wrong, 0.0)  # who is there stays: no posture depends on the others
-    return Stance(out, root, short)
+    return Stance(out, root, short, np.abs(wrong).max(axis=1))
 
 
 def _ball(bones: _Bones, feet: Feet, side: int) -> Array:
