@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from motionmind.formats import read_motion, read_posture, write_motion, write_posture
     from motionmind.learned import own_skeleton
     from motionmind.motion import Motion, Posture
+    from motionmind.notation.compose import compose
+    from motionmind.render.sheet import contact_sheet
     from motionmind.retarget import to_human23
     from motionmind.skeleton import Skeleton, human23, human44
     from motionmind.tween import Bridge, Source, Tween, Wait
@@ -48,6 +50,8 @@ __all__ = [
     "Source",
     "Tween",
     "Wait",
+    "compose",
+    "contact_sheet",
     "human23",
     "human44",
     "make_discretization",
@@ -73,6 +77,8 @@ _HOMES = {
     "formats": ("read_motion", "read_posture", "write_motion", "write_posture"),
     "learned": ("own_skeleton",),
     "motion": ("Motion", "Posture"),
+    "notation.compose": ("compose",),
+    "render.sheet": ("contact_sheet",),
     "retarget": ("to_human23",),
     "skeleton": ("Skeleton", "human23", "human44"),
     "tween": ("Bridge", "Source", "Tween", "Wait"),
