@@ -365,6 +365,16 @@ def test_a_foot_that_stays_above_the_floor_says_by_how_much() -> None:
     assert lowest > 0.05
 
 
+def test_between_two_straight_legs_the_weight_is_found() -> None:
+    """A hair's breadth of the pelvis bends one knee or the other: nowhere is the balance less smooth."""
+    feet = feet_of(1, stands=1.0, weight=50.0, out=27.0, ahead=4.0, turn=72.0, knee=63.0)
+    for turn in (1.0, 5.0, 17.0, 40.0):
+        stance = Case(
+            {"cervical": np.array([[0.0, turn, 0.0]]), "atlantal": np.array([[3.0, turn, 2.0]])}, feet
+        ).placed()
+        assert stance.astray.max() < 1e-6
+
+
 def test_a_foot_without_weight_does_not_move_the_body() -> None:
     """Wherever it is put, as long as the other leg decides how high the hips are."""
     zeros = {"pelvis": np.zeros((3, 3))}
