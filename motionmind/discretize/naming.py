@@ -95,5 +95,9 @@ def _table(body: Body, joint: str, named: _Named) -> dict[str, str]:
 def _turns(joint: Joint, turned: Array) -> str:
     """A rotation [4] in whole degrees about the axes, the bone's own length last, or first where it is outermost."""
     order = "yxz" if joint.outer else "xzy" if joint.long == "y" and not joint.rest else "yzx"
-    degrees = np.round(np.degrees(rot.to_euler(order, turned)))
+    first, middle, last = np.round(np.degrees(rot.to_euler(order, turned)))
+    # The same rotation has another name beyond the right angle; the one that turns less is easier to read.
+    ways = np.array([[first, middle, last], [first + 180.0, 180.0 - middle, last + 180.0]])
+    ways = (ways + 179.0) % 360.0 - 179.0
+    degrees = min(ways, key=lambda way: np.abs(way).sum())
     return ", ".join(f"{axis} {angle:g}" for axis, angle in zip(order, degrees, strict=True) if angle)
