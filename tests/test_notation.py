@@ -1281,3 +1281,10 @@ def test_the_score_in_the_documentation_is_movement(tmp_path: Path) -> None:
     score = read_score(write(tmp_path, re.findall(r"```text\n(.*?)```", text, re.DOTALL)[0]))
     assert motions(score)
     assert [notation.posture(score, name) for name in score.postures]
+
+
+def test_layers_come_from_a_phrase_whose_open_words_are_filled(tmp_path: Path) -> None:
+    text = "phrase q (A, B)\n  1 | | A\n  1 | | B\nphrase w\n  1 | first\n  1 | first plie\n"
+    found = moved(tmp_path, f"{text}clip c\n  start | first | bas\n  w, with arms of q (second, bas), 2 times\n")
+    lines_ = "  1 | first | second\n  1 | first plie | bas\n" * 2
+    same(found, moved(tmp_path, f"  start | first | bas\n{lines_}"))

@@ -59,7 +59,7 @@ def app(context: click.Context) -> None:
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
 @click.option("--corpus", required=True, metavar="NAME", help="Corpus whose style it takes, by name or folder.")
-@click.option("-o", "--output", type=FILE, help="Where the motion goes: .json or .bvh.")
+@click.option("-o", "--output", type=FILE, help="Where the motion goes: .json, .bvh or .glb.")
 @click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
 @click.option("--moves", type=COUNT, metavar="N", help="Number of moves  [default: the search finds it]")
 @click.option("--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find.")
@@ -96,7 +96,7 @@ def tween(
     from motionmind.search.jit import is_compiled
 
     alone = report == Path("-")
-    wanted = ((output, (".json", ".bvh")), (None if alone else report, ()), (problem, (".cfn",)))
+    wanted = ((output, (".json", ".bvh", ".glb")), (None if alone else report, ()), (problem, (".cfn",)))
     written = check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
@@ -122,7 +122,7 @@ def tween(
 @click.option(
     "--frame", type=int, metavar="N", required=True, help="Number of the frame, from 0; negative from the end."
 )
-@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .txt.")
+@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh, .glb or .txt.")
 @reading
 def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
     """Take one posture out of a clip.
@@ -133,7 +133,7 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     from motionmind.formats import write_posture
     from motionmind.learned import own_skeleton
 
-    check_outputs([(output, (".json", ".bvh", ".txt"))], [clip])
+    check_outputs([(output, (".json", ".bvh", ".glb", ".txt"))], [clip])
     motion = own_skeleton(read(clip, **source), read_mapping(joints))
     write_posture(output, motion.posture(frame))
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
@@ -153,15 +153,16 @@ def convert(
 ) -> None:
     """Convert movement from one format to another.
 
-    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json or .txt,
-    which is on human23 (or human44, if IN is) and holds orientations alone.
+    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json,
+    .glb (a skinned body, for Blender and the like), or .txt, which is on human23 (or human44, if IN is) and holds
+    orientations alone.
     """
     from motionmind.formats import write_motion
     from motionmind.formats.papers import write_papers
     from motionmind.mapping import is_human44
     from motionmind.retarget import to_human23
 
-    check_outputs([(output, (".bvh", ".json", ".txt"))], [file])
+    check_outputs([(output, (".bvh", ".json", ".txt", ".glb"))], [file])
     motion = read(file, **source)
     papers = output.suffix.lower() == ".txt"
     if skeleton == "human23" or joints or (papers and not is_human44(motion.skeleton)):
@@ -279,7 +280,7 @@ def build(
 
     place = place_for(name, home)
     others = mixture(mix)
-    discretization = make(discretize, *tolerances(tolerance))
+    discretization = make(discretize, *tolerances(tolerance, 15.0))
     mapping = read_mapping(joints)
     names = clip_names(files)
 

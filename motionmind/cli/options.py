@@ -76,9 +76,9 @@ def example(line: str) -> str:
     return f"\b\nExample:\n  {line}"
 
 
-def tolerances(given: Sequence[str]) -> tuple[float, dict[str, float]]:
-    """The tolerance for all joints, and those of single ones, from words such as "15" and "left_hip=10"."""
-    default, per_joint = 15.0, {}
+def tolerances(given: Sequence[str], default: float) -> tuple[float, dict[str, float]]:
+    """The tolerance for all joints, `default` if none is given, and those of single ones: "15", "left_hip=10"."""
+    per_joint: dict[str, float] = {}
     for word in given:
         joint, equals, degrees = word.rpartition("=")
         try:

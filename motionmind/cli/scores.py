@@ -11,10 +11,12 @@ from motionmind.cli.files import check_outputs
 from motionmind.cli.options import FILE, RATE, example, tolerances
 from motionmind.cli.printing import count
 
+_TOLERANCE = 12.0  # degrees for joints of which --tolerance does not speak
+
 
 @app.command(epilog=example("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh"))
 @click.argument("score", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json or .bvh.")
+@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .glb.")
 @click.option("--clip", metavar="NAME", help="Which of its clips  [default: its only one]")
 @click.option("--posture", metavar="NAME", help="A posture that it names, instead of a clip.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: a frame a posture]")
@@ -29,7 +31,9 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
 
     if clip and posture:
         raise click.UsageError("--clip or --posture, not both")
-    check_outputs([(output, (".json", ".bvh"))], [score])
+    if fps and posture:
+        raise click.UsageError("--fps is for clips; a posture has no frames a second")
+    check_outputs([(output, (".json", ".bvh", ".glb"))], [score])
     if posture:
         found = notation.posture(read_score(score), posture)
         write_posture(output, found)
@@ -46,7 +50,10 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
 @click.argument("scores", type=FILE, nargs=-1, required=True)
 @click.option("-o", "--output", type=FILE, required=True, help="Where the library goes: .toml.")
 @click.option(
-    "--tolerance", multiple=True, metavar="DEGREES", default=("12",), help="As of corpus build; also JOINT=DEGREES."
+    "--tolerance",
+    multiple=True,
+    metavar="DEGREES",
+    help="How far apart orientations of one state may lie; also JOINT=DEGREES, as often as you like.  [default: 12]",
 )
 @click.option("--stage", is_flag=True, help="The pelvis' states tell where the body faces, as on a stage.")
 def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], stage: bool) -> None:
@@ -56,7 +63,7 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
     from motionmind.notation.read import read_score
 
     check_outputs([(output, (".toml",))], scores)
-    degrees, per_joint = tolerances(tolerance)
+    degrees, per_joint = tolerances(tolerance, _TOLERANCE)
     found = name_states([read_score(score) for score in scores], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(f"{output}: {sum(map(len, found.tables.values()))} states of {count(len(found.tables), 'joint')}")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.discretize.library import Library
-from motionmind.discretize.protocol import per_joint_values
+from motionmind.discretize.protocol import check_range, per_joint_values
+from motionmind.errors import MotionMindError
 from motionmind.notation.anatomy import Body, Joint
 from motionmind.notation.compose import played
 from motionmind.notation.score import Score
@@ -36,15 +37,28 @@ def name_states(
         tolerance: degrees.
         per_joint: degrees for single joints, or pairs of joints.
         stage: whether the pelvis' states tell where the body faces, as in a corpus whose facing is `stage`.
+
+    Raises:
+        MotionMindError: there is no clip to name states after, scores are on several bodies, or a tolerance is none.
     """
-    scores = list(scores)
+    scores, per_joint = list(scores), per_joint or {}
+    check_range("tolerance in degrees", {"": tolerance, **per_joint}, 0.01, 180.0)
+    if not any(score.clips for score in scores):
+        paths = ", ".join(score.path for score in scores)
+        raise MotionMindError(f"{paths or 'no score'}: no clip to name states after")
     body = scores[0].body
+    for score in scores:
+        if score.body.path != body.path:
+            raise MotionMindError(
+                f"{score.path} is for {score.body.skeleton.name}, {scores[0].path} for {body.skeleton.name}: "
+                "a library is for one body"
+            )
     found: dict[str, Counter[tuple[str, bytes]]] = {joint: Counter() for joint in body.joints}
     for score in scores:
         for joint, name, turned in _orientations(score, stage):
             found[joint][name, turned.tobytes()] += 1
     stems = list(body.joints)
-    widths = np.radians(per_joint_values(stems, tolerance, per_joint or {}))
+    widths = np.radians(per_joint_values(stems, tolerance, per_joint))
     tables = {}
     for joint, width in zip(stems, widths, strict=True):
         named = [(name, np.frombuffer(turned)) for (name, turned), _ in found[joint].most_common()]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import msgspec
 import numpy as np
@@ -185,7 +186,7 @@ class Body:
         masses, centres = self._segments
         return np.asarray(np.einsum("j,...jk->...k", masses, places + rot.mul_vec(turned, centres)))
 
-    @property
+    @cached_property
     def _segments(self) -> tuple[Array, Array]:
         """Shares of the body's mass [J] and centres in the joints' frames [J, 3]."""
         masses, centres = np.zeros(len(self.skeleton)), np.zeros((len(self.skeleton), 3))

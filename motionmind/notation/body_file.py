@@ -173,7 +173,7 @@ def _check_joint(body: Body, joint: str, anatomy: Joint, path: FilePath) -> None
         if angle.about.removeprefix("-") not in ("x", "y", "z"):
             raise FormatError(f"{where} {name}: about must be an axis such as -x, not {angle.about!r}", path=path)
         if not angle.range[0] <= 0.0 <= angle.range[1]:
-            raise FormatError(f"{where} {name}: the range must go from below 0 to above it", path=path)
+            raise FormatError(f"{where} {name}: the range must have 0 in it, not be {angle.range}", path=path)
     if len({angle.axis for angle in anatomy.angles.values()}) < len(anatomy.angles):
         raise FormatError(f"{where}: two angles about one axis", path=path)
     if anatomy.against:

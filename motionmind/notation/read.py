@@ -11,13 +11,12 @@ from unicodedata import normalize
 from motionmind.errors import FormatError
 from motionmind.formats.files import FilePath
 from motionmind.formats.text import listed, meant, read_lines
-from motionmind.notation.anatomy import Body
+from motionmind.notation.anatomy import SIDES, Body
 from motionmind.notation.body_file import HEADINGS, body, read_body
 from motionmind.notation.score import (
     KINDS,
     NOTHING,
     NUMBER,
-    SIDES,
     Clip,
     Line,
     Phrase,
@@ -147,7 +146,7 @@ def _heading(score: Score, head: Line, inner: list[Line]) -> None:
     elif word == "posture":
         name, equals, text = (part.strip() for part in rest.partition("="))
         if not equals:
-            raise where.error("posture NAME = legs | arms | ...")
+            raise where.error(f"{rest!r}: write posture NAME = {' | '.join(score.body.layers)}")
         score.postures[_new(name, score.postures, where)] = Line(where, text)
     elif word in ("phrase", "clip"):
         _phrase(score, word, rest, inner, where)
@@ -187,8 +186,10 @@ def _include(score: Score, where: Where, name: str, other: Score) -> None:
 
 
 def _new(name: str, taken: Container[str], where: Where) -> str:
-    if not NAME.fullmatch(name) or name in SIDES:
+    if not NAME.fullmatch(name):
         raise where.error(f"{name!r} cannot be a name: use letters, digits and hyphens")
+    if name in (*SIDES, "neutral"):
+        raise where.error(f"{name!r} cannot be a name: it means something already")
     if name in taken:
         raise where.error(f"{name!r} is there already")
     return name

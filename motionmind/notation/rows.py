@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import cos, radians, sin
 
-from motionmind.notation.score import NUMBER, SIDES, Clip, Line, Phrase, Score, Setting, Where, number, tempo
+from motionmind.notation.anatomy import SIDES
+from motionmind.notation.score import NUMBER, Clip, Line, Phrase, Score, Setting, Where, number, tempo
 
 DEEPEST = 50  # phrases within phrases: deeper, and they go round in a circle
 MOST = 100_000  # postures of a clip
@@ -160,7 +161,7 @@ def _call(phrase: Phrase, line: Line, counts: float, depth: int) -> _Play:
     own = called.score is not phrase.score
     pace = called.score.tempo if own and isinstance(called, Clip) else counts
     run = _play(called, dict(zip(called.open, given, strict=True)), pace, depth + 1)
-    for how in (part.strip() for part in (match[4] or "").split(",")[1:]):
+    for how in (part.strip() for part in re.split(r",(?![^(]*\))", match[4] or "")[1:]):  # not within brackets
         run = _modified(run, how, phrase, line, counts, depth)
     return run
 
@@ -176,12 +177,12 @@ def _modified(run: _Play, how: str, phrase: Phrase, line: Line, counts: float, d
         return lambda before: _few(_there_and_back(run(before), before), line.where)
     if len(words) == 2 and words[1] in ("times", "time") and words[0].isdecimal() and 0 < int(words[0]) <= 1000:
         return lambda before: _times(run, int(words[0]), before, line.where)
-    if len(words) > 3 and words[0] == "with" and words[-2] == "of":
-        taken = words[1:-2]
+    if "of" in words and words[0] == "with" and 1 < words.index("of") < len(words) - 1:
+        taken = words[1 : words.index("of")]
         for layer in taken:
             if layer not in layers:
                 raise line.where.error(f"{layer!r} is no layer; there are {', '.join(layers)}")
-        other = _call(phrase, replace(line, text=words[-1]), counts, depth)
+        other = _call(phrase, replace(line, text=" ".join(words[words.index("of") + 1 :])), counts, depth)
         chosen = [layers.index(layer) for layer in taken]
         return lambda before: _layered(run(before), other(before), chosen)
     raise line.where.error(
@@ -234,7 +235,7 @@ def _times(run: _Play, times: int, before: Row | None, where: Where) -> list[Row
 
 
 def _layered(rows: list[Row], others: list[Row], layers: Sequence[int]) -> list[Row]:
-    """Rows whose `layers` are those of others, move by move; the shorter one holds its end."""
+    """Rows whose `layers` are those of others, move by move: fewer others hold their end, more are left out."""
     start = [row for row in others if row.seconds is None][:1]
     moves = [row for row in others if row.seconds is not None]
     out, move = [], 0
@@ -263,7 +264,8 @@ def _is_hold(text: str) -> bool:
     return first == "start" or bool(re.fullmatch(r"[\d./]+", first))
 
 
-def _row(score: Score, line: Line, before: Row | None, count: float) -> Row:
+def _row(score: Score, line: Line, before: Row | None, beat: float) -> Row:
+    """The posture that a line describes after the one `before`; a count lasts `beat` seconds."""
     cells = [cell.strip() for cell in line.text.split("|")]
     names = list(score.body.layers)
     if len(cells) > 1 + len(names):
@@ -282,7 +284,7 @@ def _row(score: Score, line: Line, before: Row | None, count: float) -> Row:
         else:
             limbs.append(({}, {}))
             words.append(("neutral", "neutral"))
-    seconds = None if counts is None else counts * count
+    seconds = None if counts is None else counts * beat
     return Row(line.where, tuple(limbs), tuple(words), face, up, seconds, go)
 
 

@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 
 from motionmind.errors import FormatError
 from motionmind.formats.text import meant
-from motionmind.notation.anatomy import Body
+from motionmind.notation.anatomy import SIDES, Body
 
 Setting = Mapping[object, float]
 
 NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)")
-SIDES = ("left", "right")
 KINDS = ("stand", "touch", "planted")  # a limb that is none of these is in the air
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unicodedata import normalize
 
 from motionmind.formats.text import read_lines
 
@@ -12,7 +13,7 @@ def sources(path: Path) -> list[Path]:
     found = [path.resolve()]
     for score in found:  # it grows as it is read
         for line in read_lines(score):
-            word, _, rest = line.partition("#")[0].replace("\t", " ").partition(" ")
+            word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").partition(" ")
             file = rest.split(" as ")[0].strip()
             if word == "include" or (word == "body" and file.endswith(".toml")):
                 beside = (score.parent / file).resolve()

@@ -17,6 +17,7 @@ from motionmind.notation.anatomy import SIDES, Body, Leg
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+ON_BALL = 24.0  # degrees that the heel is lifted from which on the ball alone carries
 ROUNDS = 60  # of moving the pelvis until the weight is where it should be; each leaves about a fifth of the fault
 CLOSE = 1e-7  # metres
 
@@ -110,9 +111,8 @@ def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
         far = np.abs(wrong).max(axis=1) > CLOSE
         if not far.any():
             break
-        shift = shift - np.where(
-            far[:, None], step * wrong, 0.0
-        )  # who is there stays: no posture depends on the others
+        # Who is there stays, so that no posture depends on the others.
+        shift = shift - np.where(far[:, None], step * wrong, 0.0)
     return Stance(out, root, short, np.abs(wrong).max(axis=1))
 
 
@@ -124,11 +124,11 @@ def _ball(bones: _Bones, feet: Feet, side: int) -> Array:
 def _support(bones: _Bones, feet: Feet, shares: Array) -> Array:
     """The place [T, 2] on the floor, left and ahead, over which the centre of mass belongs.
 
-    Halfway between ankle and ball of a flat foot, over the ball of one whose heel is lifted by 24 degrees or more.
+    Halfway between ankle and ball of a flat foot, over the ball of one whose heel is lifted by `ON_BALL` or more.
     """
     out = np.zeros((len(shares), 2))
     for side, sign in enumerate((1.0, -1.0)):
-        back = 0.5 * bones.toes[2] * (1.0 - np.clip(np.degrees(feet.heel[:, side]) / 24.0, 0.0, 1.0))
+        back = 0.5 * bones.toes[2] * (1.0 - np.clip(np.degrees(feet.heel[:, side]) / ON_BALL, 0.0, 1.0))
         ball, turn = _ball(bones, feet, side), feet.turn[:, side]
         place = np.stack([sign * (ball[:, 0] - back * np.sin(turn)), ball[:, 2] - back * np.cos(turn)], axis=-1)
         out += shares[:, side, None] * np.where(feet.stands[:, side, None], place, 0.0)
