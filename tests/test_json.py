@@ -351,7 +351,7 @@ def test_an_unknown_suffix_names_the_known_ones(tmp_path: Path, name: str) -> No
     with pytest.raises(FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt$"):
         read_motion(tmp_path / name)
     for write, thing in ((write_motion, random_motion()), (write_posture, random_motion().posture(0))):
-        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt$"):
+        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt, \.glb$"):
             write(tmp_path / name, thing)  # type: ignore[operator]
 
 

@@ -6,6 +6,7 @@
 | `.bvh` | motion | motion, posture as one frame |
 | `.amc` | motion, with the `.asf` beside it | |
 | `.txt` | the notation of the papers | the notation of the papers |
+| `.glb` | | motion, posture without animation |
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from motionmind.skeleton import Skeleton
 __all__ = ["read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
 _READ = (".json", ".bvh", ".amc", ".txt")
-_WRITTEN = (".json", ".bvh", ".txt")
+_WRITTEN = (".json", ".bvh", ".txt", ".glb")
 
 
 def read_motion(
@@ -96,7 +97,10 @@ def read_posture(
 
 
 def write_motion(path: FilePath, motion: Motion) -> None:
-    """Write `motion` in the format of the suffix: `.json`, `.bvh` (centimetres), `.txt` (the papers' notation)."""
+    """Write `motion` in the format of the suffix.
+
+    That is `.json`, `.bvh` (centimetres), `.txt` (the papers' notation), or `.glb` (glTF, a skinned body).
+    """
     suffix = _suffix(path, _WRITTEN, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
@@ -106,6 +110,10 @@ def write_motion(path: FilePath, motion: Motion) -> None:
         from motionmind.formats.papers import write_papers
 
         write_papers(path, motion)
+    elif suffix == ".glb":
+        from motionmind.formats.glb import write_glb
+
+        write_glb(path, motion)
     else:
         from motionmind.formats.motion_json import write_motion_json
 

@@ -1,0 +1,184 @@
+"""A low-poly body for any skeleton: a tapered prism around each bone, with a ridge to its front.
+
+An armature without a mesh is taken for empty by some programs, and shows nobody which way a knee points. It is no
+portrait: `motionmind.render` draws better ones, which no file could carry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.mirror import other_side
+from motionmind.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+LEFT, RIGHT, MIDDLE, FRONT = "left", "right", "middle", "front"
+
+# sRGB, as the pictures have them: warm is left, cool is right.
+COLOURS: Mapping[str, tuple[int, int, int]] = {
+    LEFT: (222, 98, 66),
+    RIGHT: (62, 118, 190),
+    MIDDLE: (168, 164, 160),
+    FRONT: (255, 226, 120),
+}
+
+# The prism's section: corners about the bone from its front on, degrees. The two faces beside the first corner are the
+# ridge: narrow, so that a limb seen from the front still has its side's colour.
+_CORNERS = np.radians([0.0, 22.0, 80.0, 140.0, 220.0, 280.0, 338.0])
+_RINGS = np.array([0.0, 0.5, 1.0])  # where along the bone the sections are
+_RIDGE, _NOSE = 1.3, 1.8  # how far the first corner stands out, in radii; a head's at half its height
+_CAP = 0.5  # how far the prism's ends stand out beyond the bone's, in radii
+
+
+@dataclass(frozen=True, eq=False)
+class Bones:
+    """What is clad: from each joint to its children, and from each leaf to its tip.
+
+    Attributes:
+        joints: the joint that each bone turns with [B].
+        starts, ends: where its ends are at rest [B, 3], metres.
+        radii: how thick it is at its ends [B, 2], metres.
+        sides: LEFT, RIGHT or MIDDLE for each bone.
+        heads: whether it is a head: a leaf in the middle [B].
+    """
+
+    joints: NDArray[np.intp]
+    starts: Array
+    ends: Array
+    radii: Array
+    sides: tuple[str, ...]
+    heads: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles that share no vertex, so that each is flat, at rest with the root where `body_mesh` was told.
+
+    Attributes:
+        positions, normals: of the vertices [V, 3]; metres, and unit vectors.
+        joints: the one joint that each vertex moves with [V].
+        paints: which vertices have which of `COLOURS` [n]; three in a row are a triangle, counterclockwise from
+            outside. No paint is there without a vertex.
+    """
+
+    positions: Array
+    normals: Array
+    joints: NDArray[np.intp]
+    paints: Mapping[str, NDArray[np.intp]]
+
+
+def body_mesh(skeleton: Skeleton, root: Array) -> Mesh:
+    """The body at rest, its root at `root` [3]; its front is where +z is, on a bone that lies along z where +y is."""
+    bones = bones_of(skeleton, root)
+    corners = _corners(bones)  # [B, P, 3]
+    template, ridge = _template()
+    triangles = corners[:, template]  # [B, F, 3, 3]
+    normals = np.cross(triangles[:, :, 1] - triangles[:, :, 0], triangles[:, :, 2] - triangles[:, :, 0])
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    paint = np.array([[FRONT if front else side for front in ridge] for side in bones.sides])
+    painted = np.repeat(paint.ravel(), 3)
+    return Mesh(
+        triangles.reshape(-1, 3),
+        np.repeat(normals.reshape(-1, 3), 3, axis=0),
+        np.repeat(bones.joints, 3 * len(template)),
+        {name: np.flatnonzero(painted == name) for name in COLOURS if (painted == name).any()},
+    )
+
+
+def bones_of(skeleton: Skeleton, root: Array) -> Bones:
+    """The bones that have a length, on a body at rest with its root at `root` [3]; one upwards where none has."""
+    count, parents = len(skeleton), skeleton.parents
+    both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (count, 1)), root)
+    rest, tips = both[:count], both[count:]
+    span = float(np.ptp(both, axis=0).max()) or 1.0
+    sides = sides_of(skeleton)
+    radii = _radii(skeleton, sides, span)
+    rows: list[tuple[int, Array, float, float, str, bool]] = []
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            start = radii[parent] if sides[parent] == sides[joint] else radii[joint]
+            rows.append((parent, rest[joint], start, radii[joint], sides[joint], False))
+    for joint in sorted(set(range(count)) - set(parents)):
+        length = float(np.linalg.norm(skeleton.tips[joint]))
+        head = sides[joint] == MIDDLE and joint > 0
+        thick = min(max(0.35 * length, radii[joint]), 0.05 * span) if head else radii[joint]
+        rows.append((joint, tips[joint], thick, (0.9 if head else 0.6) * thick, sides[joint], head))
+    rows = [row for row in rows if np.linalg.norm(row[1] - rest[row[0]]) > 1e-4 * span]
+    if not rows:
+        rows = [(0, rest[0] + [0.0, 0.1 * span, 0.0], 0.02 * span, 0.02 * span, MIDDLE, False)]
+    joints = np.array([row[0] for row in rows])
+    return Bones(
+        joints,
+        rest[joints],
+        np.array([row[1] for row in rows]),
+        np.array([row[2:4] for row in rows]),
+        tuple(row[4] for row in rows),
+        np.array([row[5] for row in rows]),
+    )
+
+
+def sides_of(skeleton: Skeleton) -> list[str]:
+    """LEFT, RIGHT or MIDDLE for each joint: told by its name if another joint has the other side's, else its parent's.
+
+    Names are paired as a mirror pairs them, so lfemur and thigh.L are known as well as left_hip.
+    """
+    names, found = set(skeleton.names), list[str]()
+    for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
+        others = other_side(name) & names
+        if others:  # "l" and "left" stand before "r" and "right"
+            found.append(LEFT if name.lower() < min(others).lower() else RIGHT)
+        else:
+            found.append(found[parent] if parent >= 0 else MIDDLE)
+    return found
+
+
+def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Array:
+    """How thick a body is at its joints [J], metres: the thinner the nearer to a limb's end, along the bones."""
+    reach = np.linalg.norm(skeleton.tips, axis=-1)
+    for joint in range(len(skeleton) - 1, 0, -1):
+        parent = skeleton.parents[joint]
+        reach[parent] = max(reach[parent], reach[joint] + np.linalg.norm(skeleton.offsets[joint]))
+    trunk = np.array([side == MIDDLE for side in sides])
+    return np.asarray((0.008 * span + 0.04 * np.minimum(reach, 0.6 * span)) * np.where(trunk, 1.5, 1.0))
+
+
+def _corners(bones: Bones) -> Array:
+    """The prisms' corners [B, P, 3]: the rings' from the start on, then the two ends' points."""
+    along = bones.ends - bones.starts
+    axis = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    front = np.where(np.abs(axis[:, 2:]) > 0.8, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    front = front - np.sum(front * axis, axis=-1, keepdims=True) * axis
+    front /= np.linalg.norm(front, axis=-1, keepdims=True)
+    across = np.cross(axis, front)
+    around = front[:, None] * np.cos(_CORNERS)[:, None] + across[:, None] * np.sin(_CORNERS)[:, None]  # [B, C, 3]
+    thick = bones.radii[:, :1] + _RINGS * (bones.radii[:, 1:] - bones.radii[:, :1])  # [B, R]
+    stand_out = np.ones((len(axis), len(_RINGS), len(_CORNERS)))
+    stand_out[:, :, 0] = _RIDGE
+    stand_out[bones.heads, 1, 0] = _NOSE
+    middles = bones.starts[:, None] + _RINGS[:, None] * along[:, None]  # [B, R, 3]
+    rings = middles[:, :, None] + (thick[:, :, None] * stand_out)[..., None] * around[:, None]
+    ends = np.stack(
+        [bones.starts - _CAP * bones.radii[:, :1] * axis, bones.ends + _CAP * bones.radii[:, 1:] * axis], axis=1
+    )
+    return np.concatenate([rings.reshape(len(axis), -1, 3), ends], axis=1)
+
+
+def _template() -> tuple[NDArray[np.intp], list[bool]]:
+    """The prism's triangles [F, 3] as indices of its corners, and which of them are the ridge's [F]."""
+    count, rings = len(_CORNERS), len(_RINGS)
+    bottom, top, last = rings * count, rings * count + 1, (rings - 1) * count
+    triangles: list[tuple[int, int, int]] = []
+    ridge: list[bool] = []
+    for i in range(count):
+        j = (i + 1) % count
+        for k in range(0, last, count):
+            triangles += [(k + i, k + j, k + count + j), (k + i, k + count + j, k + count + i)]
+        triangles += [(bottom, j, i), (top, last + i, last + j)]
+        ridge += [0 in (i, j)] * (2 * rings - 2) + [False, False]
+    return np.array(triangles), ridge

@@ -1,0 +1,257 @@
+"""glTF 2.0 in one binary file (`.glb`): movement as a skinned, animated body, out only.
+
+Sections named here are those of "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021); ISO/IEC 12113:2022.
+glTF's world is ours (3.4): metres, y up, +z is to where a person faces; its quaternions are x, y, z, w.
+
+What is written is laid out so that programs take it for an armature:
+
+- One node a joint, of the joint's name, in the skeleton's tree; they and no others are the skin's joints. Leaves have
+  no end bones: a bone in glTF is a frame without a length, readers choose lengths themselves, and bones that the body
+  does not have come back from every program that the file goes through. Tips show in the mesh.
+- The skin's inverse bind matrices are the rest pose: identity rotations, the lowest point on the floor, x = z = 0.
+  Nodes stand there too, for programs that take the rest pose from them.
+- A mesh on that skin (`_glb_body`), since a skin that nothing uses is a fault, and an animation without a skin is no
+  armature.
+- One animation that turns all joints and moves the root. One frame is no movement: it has no animation, and its nodes
+  stand in the posture instead, where programs show it that play nothing. The skin knows the rest pose all the same.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind import rotations as rot
+from motionmind.errors import MotionMindError
+from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
+from motionmind.formats._json import rounded
+from motionmind.formats.files import FilePath, write_atomically
+from motionmind.motion import Motion
+from motionmind.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+# 3.6.2.2 and 5.11.5: the format's numbers.
+_UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
+_VERTICES, _INDICES = 34962, 34963  # what a view of the buffer is for
+_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_LONGEST = 1e6  # metres; single precision is off by centimetres there, and farther out by more
+
+
+def write_glb(path: FilePath, motion: Motion) -> None:
+    """Write `motion` as binary glTF.
+
+    Whoever interpolates (rotations by slerp, root linear) finds all joints where `motion` has them, to the seven digits
+    of single precision. The first time becomes 0. Neighbouring quaternions lie on the same side, so that readers
+    who blend their numbers find no turn the long way round. The same motion gives the same bytes.
+
+    Raises:
+        MotionMindError: the body or its path is longer than 1000 km, times are too close to one another for single
+            precision, or the file cannot be written.
+    """
+    skeleton = motion.skeleton
+    name = motion.name or skeleton.name
+    for what, lengths in (("root", motion.root), ("offsets", skeleton.offsets), ("tips", skeleton.tips)):
+        if np.abs(lengths).max() > _LONGEST:
+            raise MotionMindError(f"{name}: {what}: GLB has no place for {np.abs(lengths).max():.3g} metres")
+    rest = _at_rest(skeleton)
+    moving = len(motion) > 1
+    buffer = _Buffer()
+    mesh = body_mesh(skeleton, rest[0])
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "MotionMind"},
+        "scene": 0,
+        "scenes": [{"name": name, "nodes": [0, len(skeleton)]}],
+        "nodes": [
+            *(_joint_nodes(skeleton, rest[0]) if moving else _posed_nodes(motion)),
+            {"name": f"{skeleton.name} body", "mesh": 0, "skin": 0},  # 3.7.3: its own place would not count
+        ],
+        "meshes": [{"name": f"{skeleton.name} body", "primitives": _primitives(buffer, mesh)}],
+        "materials": [_material(paint) for paint in mesh.paints],
+        "skins": [
+            {
+                "name": skeleton.name,
+                "joints": list(range(len(skeleton))),
+                "skeleton": 0,
+                "inverseBindMatrices": buffer.add(_inverse_binds(rest)),
+            }
+        ],
+    }
+    if moving:
+        document["animations"] = [_animation(buffer, motion, name)]
+    document |= {
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.data)}],
+    }
+    write_atomically(path, _container(document, bytes(buffer.data), name))
+
+
+class _Buffer:
+    """The binary chunk as it grows, with the views and accessors that say what is where in it (3.6)."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(self, array: NDArray[Any], *, target: int | None = None, bounds: bool = False) -> int:
+        """Put in an array [n] or [n, components] in a view of its own; the index of its accessor."""
+        view = self.view(array, target)
+        return self.accessor(view, array, bounds=bounds)
+
+    def view(self, array: NDArray[Any], target: int | None = None) -> int:
+        """Put in an array whose rows are a multiple of 4 bytes, as all views must begin (3.6.2.4); its view's index."""
+        data = array.tobytes()
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
+        if target is not None:
+            self.views[-1]["target"] = target
+        self.data += data
+        return len(self.views) - 1
+
+    def accessor(self, view: int, array: NDArray[Any], *, offset: int = 0, bounds: bool = False) -> int:
+        """Say what is in a view from byte `offset` on: an array of this one's shape and type."""
+        rows = array.reshape(len(array), -1)
+        kinds = {"<u2": _UNSIGNED_SHORT, "<u4": _UNSIGNED_INT, "<f4": _FLOAT}
+        accessor = {
+            "bufferView": view,
+            "byteOffset": offset,
+            "componentType": kinds[array.dtype.str],
+            "count": len(rows),
+            "type": _TYPES[rows.shape[1]],
+        }
+        if bounds:
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+
+def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
+    """The file: a header, the JSON padded with spaces, the binary data (4.4)."""
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    whole = 12 + 8 + len(text) + 8 + len(data)
+    if whole >= 2**32:
+        raise MotionMindError(f"{name}: {whole} bytes are more than GLB holds, 4 GiB (resample the motion, or cut it)")
+    return b"".join(
+        [
+            struct.pack("<4sII", b"glTF", 2, whole),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(data), b"BIN\0"),
+            data,
+        ]
+    )
+
+
+# --- the armature ---------------------------------------------------------------------------------------------------
+
+
+def _at_rest(skeleton: Skeleton) -> Array:
+    """Where the joints are at rest [J, 3], metres: the root above the origin, the lowest point of the body at 0."""
+    both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+    both[:, 1] -= both[:, 1].min()
+    return both[: len(skeleton)]
+
+
+def _joint_nodes(skeleton: Skeleton, root: Array) -> list[dict[str, Any]]:
+    """The joints' nodes in their order, at rest: no rotation is the identity (3.5.3)."""
+    nodes: list[dict[str, Any]] = []
+    for joint, name in enumerate(skeleton.names):
+        place = skeleton.offsets[joint] if joint else root
+        nodes.append({"name": name, "translation": rounded(place).tolist()})
+        if children := skeleton.children(joint):
+            nodes[-1]["children"] = children
+    return nodes
+
+
+def _posed_nodes(motion: Motion) -> list[dict[str, Any]]:
+    """The joints' nodes in the first posture."""
+    nodes = _joint_nodes(motion.skeleton, motion.root[0])
+    for node, rotation in zip(nodes, rot.canonical(motion.rotations[0]), strict=True):
+        node["rotation"] = rounded(rotation).tolist()
+    return nodes
+
+
+def _inverse_binds(rest: Array) -> NDArray[np.float32]:
+    """What takes a vertex at rest into each joint's frame [J, 16]: a matrix in columns (3.7.3).
+
+    Frames at rest are turned as the world is, so the inverse is a step back.
+    """
+    matrices = np.tile(np.eye(4), (len(rest), 1, 1))
+    matrices[:, 3, :3] = 0.0 - rest
+    return matrices.reshape(-1, 16).astype("<f4")
+
+
+# --- what is seen ---------------------------------------------------------------------------------------------------
+
+
+def _primitives(buffer: _Buffer, mesh: Mesh) -> list[dict[str, Any]]:
+    """A primitive a paint, of the same vertices; each vertex has the weight 1 with one joint (3.7.3)."""
+    joints, weights = np.zeros((len(mesh.joints), 4), "<u2"), np.zeros((len(mesh.joints), 4), "<f4")
+    joints[:, 0], weights[:, 0] = mesh.joints, 1.0
+    attributes = {
+        "POSITION": buffer.add(mesh.positions.astype("<f4"), target=_VERTICES, bounds=True),
+        "NORMAL": buffer.add(mesh.normals.astype("<f4"), target=_VERTICES),
+        "JOINTS_0": buffer.add(joints, target=_VERTICES),
+        "WEIGHTS_0": buffer.add(weights, target=_VERTICES),
+    }
+    return [
+        {"attributes": attributes, "indices": buffer.add(chosen.astype("<u4"), target=_INDICES), "material": number}
+        for number, chosen in enumerate(mesh.paints.values())
+    ]
+
+
+def _material(paint: str) -> dict[str, Any]:
+    """A dull colour. Materials, not colours of vertices, which not every program shows."""
+    srgb = np.array(COLOURS[paint]) / 255.0
+    # 3.9.2: factors are linear. IEC 61966-2-1; none of the colours is as dark as its straight piece.
+    linear = ((srgb + 0.055) / 1.055) ** 2.4
+    colour = [*np.round(linear, 4).tolist(), 1.0]
+    return {
+        "name": paint,
+        "pbrMetallicRoughness": {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.8},
+    }
+
+
+# --- the movement ---------------------------------------------------------------------------------------------------
+
+
+def _animation(buffer: _Buffer, motion: Motion, name: str) -> dict[str, Any]:
+    """A sampler and a channel a joint for its rotations, and one for the root's places (3.11)."""
+    times = (motion.times - motion.times[0]).astype("<f4")
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(late):
+        frame = int(late[0]) + 1
+        gap = motion.times[frame] - motion.times[frame - 1]
+        raise MotionMindError(
+            f"{name}: frame {frame} is {gap:.3g} s after the one before it, at {times[frame]:.6g} s: too close for GLB "
+            "(resample the motion, or cut it)"
+        )
+    clock = buffer.add(times, bounds=True)
+    outputs = [buffer.add(motion.root.astype("<f4"))]
+    rotations = _continuous(motion.rotations).swapaxes(0, 1).astype("<f4")  # [J, T, 4]
+    view = buffer.view(rotations)
+    outputs += [buffer.accessor(view, turns, offset=joint * turns.nbytes) for joint, turns in enumerate(rotations)]
+    targets = [(0, "translation"), *((joint, "rotation") for joint in range(len(motion.skeleton)))]
+    return {
+        "name": name,
+        "samplers": [{"input": clock, "interpolation": "LINEAR", "output": output} for output in outputs],
+        "channels": [
+            {"sampler": sampler, "target": {"node": node, "path": moved}}
+            for sampler, (node, moved) in enumerate(targets)
+        ],
+    }
+
+
+def _continuous(rotations: Array) -> Array:
+    """The same rotations [T, J, 4], each quaternion on the side of the one before it."""
+    flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
+    signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
+    first = rot.canonical(rotations[:1])
+    signs *= np.where(np.sum(first * rotations[:1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
+    return np.concatenate([first, rotations[1:] * signs])
