@@ -2,23 +2,46 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from motionmind.cli.commands import app
-from motionmind.cli.files import check_outputs, read, read_mapping
-from motionmind.cli.options import COUNT, FILE, example, reading
+from motionmind.cli.files import all_or_none, check_outputs, read, read_mapping
+from motionmind.cli.options import COUNT, HOME, example, reading
 from motionmind.cli.printing import count
 from motionmind.errors import MotionMindError
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
-@app.command(epilog=example("motionmind sheet clip.bvh --postures 24 -o clip.png"))
-@click.argument("clip", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Where the picture goes: .png.")
+    from motionmind.motion import Motion
+
+_ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
+
+
+@app.command(epilog=example("motionmind sheet corpora/ballet/centre.score --clip adagio -o adagio.png"))
+@click.argument("source", type=_ANY)
+@click.option(
+    "-o",
+    "--output",
+    type=_ANY,
+    required=True,
+    help="Where the picture goes: .png; or a folder for a picture of each clip.",
+)
+@click.option(
+    "--clip",
+    "names",
+    multiple=True,
+    metavar="NAME",
+    help="Which clips of a score or a corpus, as often as you like  [default: all of them]",
+)
 @click.option("--every", type=COUNT, metavar="N", help="Draw every Nth frame  [default: all of them]")
 @click.option(
     "--postures", type=COUNT, metavar="N", help="Draw N frames, evenly spread, the first and the last among them."
@@ -33,41 +56,120 @@ from motionmind.errors import MotionMindError
     help="Side of the stage, as the performer has it, from which the side view is taken.",
 )
 @reading
+@HOME
 def sheet(
-    clip: Path,
+    source: Path,
     output: Path,
+    names: tuple[str, ...],
     every: int | None,
     postures: int | None,
     start: int,
     end: int,
     columns: int | None,
     side: Any,
-    joints: Path | None,
-    **source: Any,
+    home: Path | None,
+    **as_given: Any,
 ) -> None:
-    """Draw the postures of a clip from the front, from the side, and their feet from above.
+    """Draw the postures of clips from the front, from the side, and their feet from above.
 
-    Each has its frame's number, which posture --frame takes, and its time.
+    Each has its frame's number, which posture --frame takes, and its time. SOURCE is a file of movement, a score, or a
+    corpus by its name or folder; scores and corpora hold clips, of which --clip takes some.
     """
+    from motionmind.formats import write_atomically
+    from motionmind.render.sheet import check_frames, contact_sheet
+
+    many = _holds_clips(source, home)
+    folder = output if many and (output.is_dir() or not output.suffix) else None
+    if not folder:
+        check_outputs([(output, (".png",))], [source])
+    if names and not many:
+        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
+    motions = _clips(source, names, home) if many else [_movement(source, **as_given)]
+    if not folder and len(motions) != 1:
+        raise MotionMindError(f"{output}: {source} holds {len(motions)} clips; choose one by --clip, or give a folder")
+    frames = [
+        _spread(_range(motion.name if folder else source, len(motion), start, end), every, postures)
+        for motion in motions
+    ]
+    for motion, drawn in zip(motions, frames, strict=True):
+        check_frames(motion, drawn)
+    paths = _files_in(folder, motions, source) if folder else [output]
+    with all_or_none(paths):
+        for path, motion, drawn in zip(paths, motions, frames, strict=True):
+            picture = contact_sheet(motion, drawn, columns=columns, side=side)
+            write_atomically(path, _png(picture))
+            words = count(len(drawn), "posture")
+            click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
+
+
+def _holds_clips(source: Path, home: Path | None) -> bool:
+    """Whether it is a score, or a corpus's name or folder; not a file of one movement, whose name says its format."""
+    from motionmind.corpus.store import known
+
+    return source.suffix.lower() in (".score", "") or source.is_dir() or str(source) in known(home)
+
+
+def _movement(path: Path, joints: Path | None, **source: Any) -> Motion:
+    from motionmind.learned import own_skeleton
+
+    return own_skeleton(read(path, **source), read_mapping(joints))
+
+
+def _clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motion]:
+    """The clips of a score or of a corpus, those that are wanted or all of them."""
+    if source.suffix.lower() == ".score":
+        from motionmind.notation.compose import motions
+        from motionmind.notation.read import read_score
+
+        score = read_score(source)
+        written = {clip.name: clip for clip in score.clips}
+        return motions(score, [written[name] for name in _chosen(source, list(written), wanted)])
+    from motionmind.learned import Learned
+
+    corpus = Learned.load(str(source), home).corpus
+    clips = {clip.label: clip for clip in corpus.clips}
+    return [replace(corpus.motion(clips[name]), name=name) for name in _chosen(source, list(clips), wanted)]
+
+
+def _chosen(source: Path, names: Sequence[str], wanted: Sequence[str]) -> Sequence[str]:
+    from motionmind.formats.text import listed, meant
+
+    if not names:
+        raise MotionMindError(f"{source}: holds no clips")
+    for name in wanted:
+        if name not in names:
+            raise MotionMindError(f"{source}: no clip {name!r}{meant(name, names)}; there are {listed(names, 60)}")
+    return list(dict.fromkeys(wanted)) or names
+
+
+def _files_in(folder: Path, motions: Sequence[Motion], source: Path) -> list[Path]:
+    """A file for each of the motions, named after it, in a folder that is made if there is none."""
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MotionMindError(f"{folder}: cannot be made: {error.strerror or error}") from error
+    names = (re.sub(r"[^\w.()-]+", "-", motion.name) for motion in motions)
+    try:
+        return check_outputs([(folder / f"{name}.png", (".png",)) for name in names], [source])
+    except MotionMindError:
+        with suppress(OSError):
+            if made:
+                folder.rmdir()
+        raise
+
+
+def _png(picture: Image) -> bytes:
+    """The bytes of a file."""
     from PIL.Image import Dither, Quantize
 
-    from motionmind.formats import write_atomically
-    from motionmind.learned import own_skeleton
-    from motionmind.render.sheet import contact_sheet
-
-    check_outputs([(output, (".png",))], [clip])
-    motion = own_skeleton(read(clip, **source), read_mapping(joints))
-    frames = _spread(_range(clip, len(motion), start, end), every, postures)
-    picture = contact_sheet(motion, frames, columns=columns, side=side)
     data = BytesIO()
     # A third of the bytes, and to the eye the same: this method keeps colours that are rare.
     picture.quantize(256, Quantize.MAXCOVERAGE, dither=Dither.NONE).save(data, "PNG")
-    write_atomically(output, data.getvalue())
-    drawn = count(len(frames), "posture")
-    click.echo(f"{output}: {drawn} of {len(motion)}, {picture.width} x {picture.height} pixels")
+    return data.getvalue()
 
 
-def _range(clip: Path, length: int, start: int, end: int) -> range:
+def _range(clip: Path | str, length: int, start: int, end: int) -> range:
     """The frames from `start` to `end`, both among them, of a clip of `length` frames; negative from the end."""
     first, last = (frame + length if frame < 0 else frame for frame in (start, end))
     for frame, given in ((first, start), (last, end)):

@@ -88,7 +88,7 @@ class Body:
     size: float
     masses: Mapping[str, float] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def height(self) -> float:
         """How tall a person of this size is, in metres."""
         return self.size * human23().height

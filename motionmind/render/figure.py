@@ -72,14 +72,14 @@ def draw(canvas: Canvas, cones: Cones, balls: Ellipsoids, only: frozenset[int] |
 
     The solids' numbers are those of `Body.parts`.
     """
-    count = len(cones.a_radius)
-    for solid in range(count):
-        if only is None or solid in only:
-            ends = cones.a[solid], cones.b[solid]
-            canvas.cone(solid, *ends, float(cones.a_radius[solid]), float(cones.b_radius[solid]))
-    for ball in range(len(balls.centre)):
-        if only is None or count + ball in only:
-            canvas.ellipsoid(count + ball, balls.centre[ball], balls.axes[ball])
+    numbers = np.arange(len(cones.a) + len(balls.centre), dtype=np.int16)
+    if only is not None:
+        numbers = numbers[np.isin(numbers, list(only))]
+        balls_from = len(cones.a)
+        few, others = numbers[numbers < balls_from], numbers[numbers >= balls_from] - balls_from
+        cones = Cones(cones.a[few], cones.b[few], cones.a_radius[few], cones.b_radius[few])
+        balls = Ellipsoids(balls.centre[others], balls.axes[others])
+    canvas.draw(cones, balls, numbers)
 
 
 def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2) -> Pixels:
@@ -89,35 +89,33 @@ def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2) -> Pix
     each part where it stands before another, and is drawn on that other, so that the nearer part keeps its shape.
     """
     picture = background.copy()
-    box = _filled(canvas, line)
-    solid, depth, shade = canvas.solid[box], canvas.depth[box], canvas.shade[box]
-    filled = solid != EMPTY
+    solid, depth = canvas.solid.reshape(-1), canvas.depth.reshape(-1)
+    filled = np.flatnonzero(solid != EMPTY)
+    far = _HAZE * np.clip(0.5 - depth[filled] / np.float32(0.9 * body.size), 0.0, 1.0)
+    lit, haze, of = (1.0 - far) * canvas.shade.reshape(-1)[filled], 255.0 * far, solid[filled]
     paints = np.array([COLOURS[paint] for paint in body.paints], dtype=np.float32)
-    far = np.clip(0.5 - depth[filled] / (0.9 * body.size), 0.0, 1.0)[:, None] * _HAZE
-    flesh = paints[solid[filled]] * shade[filled][:, None]
-    picture[box][filled] = (flesh + (255.0 - flesh) * far).astype(np.uint8)
-    picture[box][_edges(solid, depth, body, line)] = INK
+    samples = picture.reshape(-1, 3)
+    for channel in range(3):  # one by one: numpy is slow on rows of three
+        samples[:, channel][filled] = paints[:, channel][of] * lit + haze
+    if len(filled):
+        width = canvas.solid.shape[1]
+        rows = slice(max(filled[0] // width - line, 0), filled[-1] // width + line + 1)
+        picture[rows].reshape(-1, 3)[_edges(canvas.solid[rows], canvas.depth[rows], body, line)] = INK
     return picture
 
 
-def _filled(canvas: Canvas, margin: int) -> tuple[slice, slice]:
-    """Rows and columns of the smallest box round what a canvas shows, with a margin in pixels."""
-    box = []
-    for axis in (1, 0):
-        found = np.flatnonzero((canvas.solid != EMPTY).any(axis=axis))
-        box.append(slice(max(found[0] - margin, 0), found[-1] + margin + 1) if len(found) else slice(0, 0))
-    return box[0], box[1]
-
-
-def _edges(solid: Indices, depth: Depths, body: Body, line: int) -> NDArray[np.bool_]:
-    """Pixels [H, W] within `line` of one of another part that is nearer by a step."""
+def _edges(solid: Indices, depth: Depths, body: Body, line: int) -> NDArray[np.intp]:
+    """Pixels of [H, W], counted row by row, within `line` of one of another part that is nearer by a step."""
     names = {name: number for number, name in enumerate(dict.fromkeys(body.parts))}
-    parts = np.array([*(names[part] for part in body.parts), -1], dtype=np.int16)[solid]  # EMPTY takes the last
-    near = depth - np.float32(_STEP * body.size)
-    out = np.zeros(parts.shape, dtype=bool)
+    parts = np.array([names[part] for part in body.parts] + [-1])  # EMPTY takes the last
+    step, width = np.float32(_STEP * body.size), solid.shape[1]
+    solids, depths = solid.reshape(-1), depth.reshape(-1)
+    found = []
     for by in range(1, line + 1):
-        for before, after in ((np.s_[by:, :], np.s_[:-by, :]), (np.s_[:, by:], np.s_[:, :-by])):
-            differ = parts[before] != parts[after]
-            out[before] |= differ & (near[after] > depth[before])
-            out[after] |= differ & (near[before] > depth[after])
-    return out
+        below = np.flatnonzero(solid[by:] != solid[:-by])
+        beside = np.flatnonzero(solid[:, by:] != solid[:, :-by])
+        for first, other in ((below, by * width), (beside + beside // (width - by) * by, by)):
+            before = first[parts[solids[first]] != parts[solids[first + other]]]
+            ahead = depths[before + other] - depths[before]
+            found += [before[ahead > step], before[ahead < -step] + other]
+    return np.concatenate(found)

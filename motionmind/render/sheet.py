@@ -56,12 +56,13 @@ def contact_sheet(
         MotionMindError: there are more than 400 frames to draw, or none, or one that the motion has not.
     """
     chosen = list(range(len(motion))) if frames is None else list(frames)
-    _check(motion, chosen)
+    check_frames(motion, chosen)
     sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT)
     return sheet.picture(columns)
 
 
-def _check(motion: Motion, frames: Sequence[int]) -> None:
+def check_frames(motion: Motion, frames: Sequence[int]) -> None:
+    """MotionMindError where a contact sheet cannot show these frames of a motion: too many, none, or not there."""
     name = motion.name or "the motion"
     if not frames:
         raise MotionMindError(f"{name}: no frame to draw")
@@ -89,6 +90,11 @@ class _Window:
     width: int
     height: int
     scale: float
+
+    @property
+    def floor(self) -> int:
+        """The first row of samples under the floor, or the nearest to it that the window has."""
+        return min(max(round(self.pixel(0.0, 0.0)[1]), 0), _SMOOTH * self.height)
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the view, metres, is in its picture, in samples."""
@@ -129,6 +135,7 @@ class _Sheet:
             sqrt(_PIXELS / len(frames) / (2.0 * sum(halves) * (high - low + far - near))),
         )
         self.windows = [_window(view, half, low, high, scale) for view, half in zip((FRONT, side), halves, strict=True)]
+        self.easels: dict[_Window, tuple[Canvas, Pixels]] = {}
         self.plan = _window(ABOVE, halves[0], near, far, scale) if far > near else None
 
     def picture(self, columns: int | None) -> Image.Image:
@@ -168,14 +175,10 @@ class _Sheet:
 
     def _view(self, at: int, window: _Window) -> Image.Image:
         """One posture from the front or from the side, on the floor."""
-        background = _blank(window)
-        rows = len(background)
-        floor = min(max(round(window.pixel(0.0, 0.0)[1]), 0), rows)
-        background[floor:] = _GROUND
-        background[floor : floor + _SMOOTH] = _FLOOR
-        canvas = _canvas(window)
+        canvas, background = self._easel(window)
         draw(canvas, *self._solids(at, window.view))
         picture = colour(canvas, self.body, background)
+        floor = window.floor
         sunk = floor + ceil(_SINKS * self.body.height * window.scale * _SMOOTH)
         picture[sunk:][canvas.solid[sunk:] != EMPTY] = _SUNK
         image = Image.fromarray(picture)
@@ -184,10 +187,8 @@ class _Sheet:
 
     def _above(self, at: int, window: _Window) -> Image.Image:
         """The feet of one posture that are on the floor, and the centre of mass, from above."""
-        canvas = _canvas(window)
+        canvas, background = self._easel(window)
         draw(canvas, *self._solids(at, ABOVE), self.standing[at])
-        background = _blank(window)
-        background[:] = _GROUND
         image = Image.fromarray(colour(canvas, self.body, background))
         pen = ImageDraw.Draw(image)
         x, y = window.pixel(*self._middle(at, ABOVE))
@@ -195,6 +196,14 @@ class _Sheet:
         pen.line((x - arm, y, x + arm, y), _PLUMB, _SMOOTH)
         pen.line((x, y - arm, x, y + arm), _PLUMB, _SMOOTH)
         return image.reduce(_SMOOTH)
+
+    def _easel(self, window: _Window) -> tuple[Canvas, Pixels]:
+        """A canvas with nothing on it, the same one for all postures, and what is behind it."""
+        if window not in self.easels:
+            self.easels[window] = _canvas(window), _background(window)
+        canvas, background = self.easels[window]
+        canvas.clear()
+        return canvas, background
 
     def _plumb(self, pen: ImageDraw.ImageDraw, at: int, window: _Window, floor: int) -> None:
         x, y = window.pixel(*self._middle(at, window.view))
@@ -260,8 +269,13 @@ def _canvas(window: _Window) -> Canvas:
     return Canvas(-window.half, window.top, columns, rows, _SMOOTH * window.scale)
 
 
-def _blank(window: _Window) -> Pixels:
-    return np.full((_SMOOTH * window.height, _SMOOTH * window.width, 3), _PAPER, dtype=np.uint8)
+def _background(window: _Window) -> Pixels:
+    """Paper above the floor, and the ground under it; from above, the ground alone."""
+    picture = np.full((_SMOOTH * window.height, _SMOOTH * window.width, 3), _GROUND, dtype=np.uint8)
+    if window.view is not ABOVE:
+        picture[: window.floor] = _PAPER
+        picture[window.floor : window.floor + _SMOOTH] = _FLOOR
+    return picture
 
 
 @cache
