@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 # Bodies are measured, and nobody is quite symmetric: in a dancer's recordings bones differ by up to 1.2 cm from left to
 # right, in other people's by 2.5 cm.
+LEFT, RIGHT, MIDDLE = "left", "right", "middle"
 TOLERANCE = 0.05  # of the distance from the root to the farthest joint
 _X, _Y, _Z = 0, 1, 2
 
@@ -123,7 +124,7 @@ def _pair(skeleton: Skeleton) -> NDArray[np.intp]:
             raise _lonely(skeleton, name, f"both {names[found[0]]} and {names[found[1]]} could be it")
         if found:
             partners[joint] = found[0]
-        elif across == parent and not _says_a_side(name):
+        elif across == parent and not _said(name):
             partners[joint] = joint
         else:
             elsewhere = [other for other in names if other in others]
@@ -147,6 +148,22 @@ def other_side(name: str) -> set[str]:
     return out - {name}
 
 
+def sides_of(skeleton: Skeleton) -> list[str]:
+    """LEFT, RIGHT or MIDDLE for each joint: told by its name if another joint has the other side's, or if a word of it
+    says so, else its parent's.
+
+    Names are paired as a mirror pairs them, so lfemur and thigh.L are known as well as left_hip.
+    """
+    names, found = set(skeleton.names), list[str]()
+    for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
+        others = other_side(name) & names
+        if others:  # "l" and "left" stand before "r" and "right"
+            found.append(LEFT if name.lower() < min(others).lower() else RIGHT)
+        else:
+            found.append(_said(name) or (found[parent] if parent >= 0 else MIDDLE))
+    return found
+
+
 _SIGNS = (
     re.compile(r"left|right", re.IGNORECASE),
     re.compile(r"(?<![A-Za-z])[lr](?![A-Za-z])", re.IGNORECASE),  # thigh.L, l_hip
@@ -163,10 +180,10 @@ def _exchanged(found: re.Match[str]) -> str:
     return other.upper() if word.isupper() else other.title() if word[0].isupper() else other
 
 
-def _says_a_side(name: str) -> bool:
-    """Whether left or right is a word of the name by itself, so that the joint cannot be in the middle."""
-    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    return any(word.lower() in _OPPOSITE for word in words)
+def _said(name: str) -> str:
+    """LEFT or RIGHT where that is a word of the name by itself, so that the joint cannot be in the middle; else ""."""
+    words = (word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name))
+    return next((LEFT if word in ("left", "l") else RIGHT for word in words if word in _OPPOSITE), "")
 
 
 # --- by where they stand ----------------------------------------------------------------------------------------------

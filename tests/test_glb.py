@@ -25,8 +25,9 @@ from motionmind import rotations as rot
 from motionmind.cli import main
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import read_motion, write_motion, write_posture
-from motionmind.formats._glb_body import FRONT, LEFT, MIDDLE, RIGHT, sides_of
+from motionmind.formats._glb_body import FRONT
 from motionmind.formats.glb import write_glb
+from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.motion import Motion
 from motionmind.skeleton import Skeleton, human23, human44
 

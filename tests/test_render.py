@@ -21,9 +21,10 @@ from motionmind import rotations as rot
 from motionmind.cli import main
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion
+from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.motion import Motion, Posture
 from motionmind.render import sheet as sheets
-from motionmind.render.anatomy import FACE, LEFT, MIDDLE, RIGHT, Body, body_of, sides
+from motionmind.render.anatomy import FACE, Body, body_of
 from motionmind.render.figure import (
     ABOVE,
     COLOURS,
@@ -257,7 +258,7 @@ def test_sides_are_told_by_the_words_of_the_names() -> None:
     names = ("Hips", "LeftUpLeg", "RightUpLeg", "l_hand", "lShldr", "rThigh", "left_mid_leg", "belly", "thumb", "clef")
     skeleton = Skeleton("some", names, (-1, 0, 0, 0, 0, 0, 0, 0, 3, 0), np.zeros((10, 3)))
     expected = [MIDDLE, LEFT, RIGHT, LEFT, LEFT, RIGHT, LEFT, MIDDLE, LEFT, MIDDLE]
-    assert sides(skeleton) == expected
+    assert sides_of(skeleton) == expected
 
 
 def with_joints_between(skeleton: Skeleton) -> Skeleton:

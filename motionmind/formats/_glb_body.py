@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.mirror import other_side
+from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 
-LEFT, RIGHT, MIDDLE, FRONT = "left", "right", "middle", "front"
+FRONT = "front"
 
 # sRGB, as the pictures have them: warm is left, cool is right.
 COLOURS: Mapping[str, tuple[int, int, int]] = {
@@ -121,21 +121,6 @@ def bones_of(skeleton: Skeleton, root: Array) -> Bones:
         tuple(row[4] for row in rows),
         np.array([row[5] for row in rows]),
     )
-
-
-def sides_of(skeleton: Skeleton) -> list[str]:
-    """LEFT, RIGHT or MIDDLE for each joint: told by its name if another joint has the other side's, else its parent's.
-
-    Names are paired as a mirror pairs them, so lfemur and thigh.L are known as well as left_hip.
-    """
-    names, found = set(skeleton.names), list[str]()
-    for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
-        others = other_side(name) & names
-        if others:  # "l" and "left" stand before "r" and "right"
-            found.append(LEFT if name.lower() < min(others).lower() else RIGHT)
-        else:
-            found.append(found[parent] if parent >= 0 else MIDDLE)
-    return found
 
 
 def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
+from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.notation.body_file import body
 from motionmind.render.solids import Cones, Ellipsoids
 from motionmind.skeleton import Skeleton, human23
@@ -21,7 +22,7 @@ from motionmind.skeleton import Skeleton, human23
 Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 
-MIDDLE, LEFT, RIGHT, FACE, HAIR, MARK = "middle", "left", "right", "face", "hair", "mark"  # paints
+FACE, HAIR, MARK = "face", "hair", "mark"  # paints, beside the sides
 
 # Radii in metres of a person's limbs at the joints.
 _RADII = {"hip": 0.080, "knee": 0.051, "ankle": 0.032, "shoulder": 0.046, "elbow": 0.036, "wrist": 0.025}
@@ -29,8 +30,6 @@ _RADII = {"hip": 0.080, "knee": 0.051, "ankle": 0.032, "shoulder": 0.046, "elbow
 _SEGMENTS = {"head": ("atlantal",), "trunk": ("pelvis", "lumbar", "thorax")}
 _SEGMENTS |= {"upper_arm": ("shoulder",), "forearm": ("elbow",), "hand": ("wrist",)}
 _SEGMENTS |= {"thigh": ("hip",), "shank": ("knee",), "foot": ("ankle",)}
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
-_SIDES = {"left": LEFT, "l": LEFT, "right": RIGHT, "r": RIGHT}
 
 
 @dataclass(frozen=True)
@@ -161,16 +160,6 @@ def _is_person(skeleton: Skeleton) -> bool:
     return set(human.names) <= set(skeleton.names)
 
 
-def sides(skeleton: Skeleton) -> list[str]:
-    """LEFT, RIGHT or MIDDLE for each joint, by words in its name; a name without such a word takes its parent's."""
-    found: list[str] = []
-    for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
-        words = (word.lower() for word in _WORD.findall(name))
-        own = next((_SIDES[word] for word in words if word in _SIDES), None)
-        found.append(own or (found[parent] if parent >= 0 else MIDDLE))
-    return found
-
-
 def _creature(skeleton: Skeleton) -> Body:
     """A tapered limb from each joint to its children and to its tip, the thinner the nearer to the limb's end."""
     span = _span(skeleton)
@@ -178,7 +167,7 @@ def _creature(skeleton: Skeleton) -> Body:
     for joint in range(len(skeleton) - 1, 0, -1):
         parent = skeleton.parents[joint]
         levels[parent] = max(levels[parent], levels[joint] + 1)
-    paints, still = sides(skeleton), (0.0, 0.0, 0.0)
+    paints, still = sides_of(skeleton), (0.0, 0.0, 0.0)
     radii = span * (0.008 + 0.006 * np.minimum(levels, 4))
     radii[[paint == MIDDLE for paint in paints]] *= 1.5  # a body is thicker than its legs
     cones = [
@@ -339,7 +328,7 @@ class _Person:
         for joint in range(len(self.skeleton) - 1, -1, -1):
             if joint in inner or self.skeleton.names[joint] in known:
                 inner |= {joint, self.skeleton.parents[joint]}
-        paints, still = sides(self.skeleton), (0.0, 0.0, 0.0)
+        paints, still = sides_of(self.skeleton), (0.0, 0.0, 0.0)
         for joint in sorted(set(range(len(self.skeleton))) - inner):
             part, parent = self.skeleton.names[joint], self.skeleton.parents[joint]
             tip = _place(self.skeleton.tips[joint] / self.size)

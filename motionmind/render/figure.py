@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.render.anatomy import FACE, HAIR, LEFT, MARK, MIDDLE, RIGHT, Body
+from motionmind.mirror import LEFT, MIDDLE, RIGHT
+from motionmind.render.anatomy import FACE, HAIR, MARK, Body
 from motionmind.render.solids import EMPTY, Canvas, Cones, Depths, Ellipsoids, Indices
 
 Array = NDArray[np.float64]
