@@ -651,6 +651,18 @@ def test_the_command_draws_the_frames_that_are_asked_for(
     assert [text for _, _, text in words if text.isdigit()] == [str(frame) for frame in frames]
 
 
+def test_the_file_has_the_colours_that_were_drawn(run: Run, jump: Path) -> None:
+    assert run("sheet", jump, "-o", "jump.png")[0] == 0
+    drawn = np.asarray(contact_sheet(read_motion(jump))).astype(int)
+    with Image.open("jump.png") as picture:
+        written = np.asarray(picture.convert("RGB")).astype(int)
+    off = np.abs(written - drawn).max(axis=-1)
+    grounds, counts = np.unique(drawn.reshape(-1, 3), axis=0, return_counts=True)
+    for ground in grounds[np.argsort(counts)[-2:]]:  # the paper and the floor
+        assert off[(drawn == ground).all(axis=-1)].max() <= 2
+    assert np.quantile(off, 0.999) <= 16
+
+
 @pytest.mark.parametrize(
     ("options", "frames"),
     [
