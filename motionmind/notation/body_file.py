@@ -49,7 +49,7 @@ def body(name: str) -> Body:
 def _bundled(name: object, path: FilePath | None = None) -> Path:
     known = sorted(file.stem for file in _BODIES.glob("*.toml"))
     if name not in known:
-        hint = f"{meant(str(name), known)}; there are {', '.join(known)}, or a .toml file"
+        hint = meant(str(name), known) or f"; there are {', '.join(known)}, or a .toml file"
         raise FormatError(f"no body {name!r}{hint}", path=path)
     return _BODIES / f"{name}.toml"
 

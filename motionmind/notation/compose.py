@@ -40,7 +40,8 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
             f"holds {len(names) or 'no'} clips" + f"; choose one: {listed(names, 60)}" * bool(names), path=path
         )
     if clip is not None and clip not in names:
-        raise FormatError(f"no clip {clip!r}{meant(clip, names)}; there are {listed(names, 60)}", path=path)
+        hint = meant(clip, names) or f"; there are {listed(names, 60)}"
+        raise FormatError(f"no clip {clip!r}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
 
@@ -69,8 +70,8 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
 def posture(score: Score, name: str) -> Posture:
     """A posture that a score names."""
     if name not in score.postures:
-        known = listed(score.postures, 60) or "none"
-        raise FormatError(f"no posture {name!r}{meant(name, score.postures)}; there are {known}", path=score.path)
+        hint = meant(name, score.postures) or f"; there are {listed(score.postures, 60) or 'none'}"
+        raise FormatError(f"no posture {name!r}{hint}", path=score.path)
     row = phrases.posture(score, score.postures[name])
     return _travel(score.body, name, [row], _pose(score.body, [row])).posture(0)
 

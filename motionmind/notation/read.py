@@ -136,7 +136,7 @@ def _heading(score: Score, head: Line, inner: list[Line]) -> None:
     if word not in HEADINGS:
         layers = tuple(score.body.layers)
         known = HEADINGS + layers
-        raise where.error(f"{word!r} is no heading{meant(word, known)}; there are {listed(known, 20)}")
+        raise where.error(f"{word!r} is no heading{meant(word, known) or f'; there are {listed(known, 20)}'}")
     if inner and word not in ("phrase", "clip"):
         raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
     if word == "title":
@@ -271,7 +271,8 @@ def _setting(score: Score, layer: str, words: list[str], where: Where) -> Settin
             names = {key: (key, 1.0) for key in angles}
             names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
             if name not in names:
-                raise where.error(f"{name!r} is no angle of the {first}{meant(name, names)}; it has {', '.join(names)}")
+                hint = meant(name, names) or f"; it has {', '.join(names)}"
+                raise where.error(f"{name!r} is no angle of the {first}{hint}")
             key, sign = names[name]
             setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
     if not setting:
