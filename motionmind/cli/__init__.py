@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import click
 
+import motionmind.cli.corpora
 import motionmind.cli.pictures
 import motionmind.cli.scores  # noqa: F401 (each adds its commands)
 from motionmind.cli.commands import app
