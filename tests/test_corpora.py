@@ -167,7 +167,7 @@ def _feet(score: Score, motion: Motion) -> np.ndarray:
 
 
 def _distance(point: np.ndarray, hull: np.ndarray) -> float:
-    """Metres [] from a point to the convex hull of points in the plane; 0 within it."""
+    """Metres from a point to the convex hull of feet's points, widened by 2 cm for their breadth; 0 within it."""
     spread = np.concatenate([hull + offset for offset in 0.02 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])])
     return float(max(0.0, (ConvexHull(spread).equations @ [*point, 1.0]).max()))
 
