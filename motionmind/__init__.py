@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from motionmind.formats import read_motion, read_posture, write_motion, write_posture
     from motionmind.learned import own_skeleton
-    from motionmind.motion import Motion, Posture
+    from motionmind.motion import Insertion, Motion, Posture
     from motionmind.notation.compose import compose
     from motionmind.render.sheet import contact_sheet
     from motionmind.retarget import to_human23
@@ -40,6 +40,7 @@ __all__ = [
     "CorpusError",
     "Engine",
     "FormatError",
+    "Insertion",
     "Motion",
     "MotionMindError",
     "MotionMindWarning",
@@ -76,7 +77,7 @@ _HOMES = {
     ),
     "formats": ("read_motion", "read_posture", "write_motion", "write_posture"),
     "learned": ("own_skeleton",),
-    "motion": ("Motion", "Posture"),
+    "motion": ("Insertion", "Motion", "Posture"),
     "notation.compose": ("compose",),
     "render.sheet": ("contact_sheet",),
     "retarget": ("to_human23",),

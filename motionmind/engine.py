@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from motionmind import rotations as rot
 from motionmind import survey
+from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
 from motionmind.grammar.coordination import fit_network
 from motionmind.grammar.transitions import Weights
@@ -105,8 +106,12 @@ class Engine(Learned):
         began = perf_counter()
         motion = realise(certificate.path, a, b, self.corpus, self.states, self.grammar, self.carriage, fps)
         spent = certificate.seconds
+        (insertion,) = motion.insertions
+        # A facing that is bridged shows at the root, which turns with it.
+        named = ((a.skeleton.names[0] if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
+        bridged = tuple(dict.fromkeys(named))
         return Tween(
-            motion=motion,
+            motion=replace(motion, insertions=(replace(insertion, bridged=bridged),)),
             joints=self.corpus.lanes,
             path=certificate.path,
             status=certificate.status,

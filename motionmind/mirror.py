@@ -62,11 +62,14 @@ def mirrored(motion: Motion) -> Motion:
         turn = np.zeros(4)
         turn[3 - sides.axis - sides.world] = 1.0
         rotations[:, 0] = rot.mul(rot.mirror(motion.rotations[:, 0], sides.world), turn)
+    joints = motion.skeleton.names
+    names = {name: joints[partner] for name, partner in zip(joints, sides.partners, strict=True)}
     return replace(
         motion,
         skeleton=_mirrored_body(motion.skeleton, sides),
         rotations=rotations,
         root=motion.root * _reflection(sides.world),
+        insertions=tuple(one.renamed(names) for one in motion.insertions),
     )
 
 

@@ -1,8 +1,13 @@
-"""Posture and Motion: arrays on a skeleton. A motion is a sequence of postures with their times."""
+"""Posture and Motion: arrays on a skeleton. A motion is a sequence of postures with their times.
+
+A motion knows which of its movement the engine made: that is an `Insertion` each.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +19,7 @@ from motionmind.skeleton import Skeleton
 Array = NDArray[np.float64]
 
 FASTEST = 10_000.0  # frames a second; more is a slip of the keyboard, not a camera
+_MOMENT = 1e-6  # seconds: times that are no further apart are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +45,33 @@ class Posture:
 
 
 @dataclass(frozen=True, eq=False)
+class Insertion:
+    """Movement that the engine put between two postures, A and B.
+
+    Attributes:
+        times: when the postures are that its M moves lead from and to [M + 1], seconds; the first is A, the last B.
+        bridged: joints' moves that no corpus attests: the joint's name, and the number of the move from 0.
+    """
+
+    times: Array
+    bridged: tuple[tuple[str, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        times = np.array(self.times, dtype=np.float64)
+        if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+            raise MotionMindError("an insertion's times must be finite and increasing, one at least")
+        for joint, move in self.bridged:
+            if not 0 <= move < len(times) - 1:
+                raise MotionMindError(f"an insertion of {len(times) - 1} moves has no move {move}, bridged by {joint}")
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
+
+    def renamed(self, joints: Mapping[str, str]) -> Insertion:
+        """The same on a body where `joints` are called something else; those that it does not name are left out."""
+        return replace(self, bridged=tuple((joints[joint], move) for joint, move in self.bridged if joint in joints))
+
+
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A sequence of postures.
 
@@ -48,8 +81,7 @@ class Motion:
         root: positions of the root joint [T, 3], metres.
         times: seconds, strictly increasing [T].
         name: what the clip is called.
-        moves: times [M + 1] of the postures between which the moves of a tween were planned, seconds; empty for
-            movement that no plan stands behind.
+        insertions: what of it the engine made, from the earliest to the latest; empty for movement that is all given.
     """
 
     skeleton: Skeleton
@@ -57,7 +89,7 @@ class Motion:
     root: Array
     times: Array
     name: str = ""
-    moves: Array = field(default_factory=lambda: np.zeros(0))
+    insertions: tuple[Insertion, ...] = ()
 
     def __post_init__(self) -> None:
         times = np.array(self.times, dtype=np.float64)
@@ -66,12 +98,14 @@ class Motion:
         if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError(f"{self.name or 'motion'}: times must be finite and increasing")
         _settle(self, (len(times), len(self.skeleton), 4), (len(times), 3))
-        moves = np.array(self.moves, dtype=np.float64)
-        if moves.ndim != 1 or not np.isfinite(moves).all() or np.any(np.diff(moves) <= 0.0):
-            raise MotionMindError(f"{self.name or 'motion'}: the moves' times must be finite and increasing")
-        for name, array in (("times", times), ("moves", moves)):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
+        for before, after in pairwise(self.insertions):
+            if after.times[0] < before.times[-1] - _MOMENT:
+                raise MotionMindError(f"{self.name or 'motion'}: insertions must follow one another")
+        for joint, _ in (bridge for insertion in self.insertions for bridge in insertion.bridged):
+            if joint not in self.skeleton.names:
+                raise MotionMindError(f"{self.name or 'motion'}: {self.skeleton.name} has no joint {joint!r} to bridge")
 
     def __len__(self) -> int:
         return len(self.times)
@@ -85,13 +119,32 @@ class Motion:
 
     def slice(self, start: int, stop: int) -> Motion:
         """The frames from `start` up to, not including, `stop`; times are kept as they are."""
-        return replace(
+        part = replace(
             self,
             rotations=self.rotations[start:stop],
             root=self.root[start:stop],
             times=self.times[start:stop],
-            moves=np.zeros(0),
+            insertions=(),
         )
+        first, last = part.times[0], part.times[-1]
+        kept = (one for one in self.insertions if one.times[-1] >= first and one.times[0] <= last)
+        return replace(part, insertions=tuple(kept))
+
+    def inserted(self) -> NDArray[np.bool_]:
+        """Whether the engine made each frame [T]: those between the A and the B of an insertion."""
+        found = np.zeros(len(self), dtype=bool)
+        for one in self.insertions:
+            found |= (self.times > one.times[0] + _MOMENT) & (self.times < one.times[-1] - _MOMENT)
+        return found
+
+    def bridged(self) -> NDArray[np.bool_]:
+        """Whether each joint is, in each frame, amid a move that no corpus attests [T, J]."""
+        found = np.zeros((len(self), len(self.skeleton)), dtype=bool)
+        for one in self.insertions:
+            for joint, move in one.bridged:
+                start, end = one.times[move : move + 2]
+                found[:, self.skeleton.index(joint)] |= (self.times > start - _MOMENT) & (self.times < end + _MOMENT)
+        return found & self.inserted()[:, None]
 
     @property
     def fps(self) -> float:
@@ -122,7 +175,6 @@ class Motion:
             rotations=rot.normalise(rot.slerp(self.rotations[before], self.rotations[after], share[:, None])),
             root=self.root[before] + share[:, None] * (self.root[after] - self.root[before]),
             times=times,
-            moves=np.zeros(0),
         )
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +76,16 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     if joints is None and up != "z" and human23().difference(movement.skeleton) is None:
         return movement
     fit = _fit(movement.skeleton, joints)
+    named: dict[str, Any] = {}
+    if isinstance(movement, Motion) and movement.insertions:
+        mapping = joint_mapping(movement.skeleton, joints) or {}
+        named["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
     upright = _Z_UP if (up or _vertical(fit, movement)) == "z" else rot.IDENTITY
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns, :]
     turned = rot.mul(rot.mul(upright, turned), fit.alignment)
     rotations = rot.normalise(fit.skeleton.local_rotations(turned))
     root = movement.skeleton.positions(movement.rotations, movement.root)[..., fit.pelvis, :]
-    return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=rot.mul_vec(upright, root))
+    return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=rot.mul_vec(upright, root), **named)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,7 +72,7 @@ class Tween:
     """A tween from posture A to posture B, with its certificate and provenance.
 
     Attributes:
-        motion: the movement; its first and last frames are A and B, its `moves` the times of the path's postures.
+        motion: the movement; its first and last frames are A and B, and its one insertion leads from one to the other.
         joints: the lanes [L]: the skeleton's joints, then "facing" where that is a lane of its own.
         path: states of the lanes [moves + 1, L].
         status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded".

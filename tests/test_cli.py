@@ -196,7 +196,7 @@ def test_the_printed_report_is_alone_on_standard_output(run: Run, tmp_path: Path
     assert set(json.loads(out)) == REPORT
     assert out.count("\n") == 1
     assert re.fullmatch(r"note: A\.json: the rotation of left_hip has length 2, not 1; made 1\n", err)
-    assert len(read_motion("tween.json").moves) > 2
+    assert len(read_motion("tween.json").insertions[0].times) > 2
 
 
 def test_options_reach_the_search(run: Run) -> None:

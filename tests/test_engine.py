@@ -96,7 +96,11 @@ def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
     np.testing.assert_array_equal(motion.root[[0, -1]], [a.root, b.root])
     np.testing.assert_allclose(np.linalg.norm(motion.rotations, axis=-1), 1.0, atol=1e-9)
     assert np.isfinite(motion.root).all()
-    assert len(motion.moves) == tween.moves + 1
+    (insertion,) = motion.insertions
+    assert len(insertion.times) == tween.moves + 1
+    assert (insertion.times[0], insertion.times[-1]) == (motion.times[0], motion.times[-1])
+    root = motion.skeleton.names[0]
+    assert set(insertion.bridged) == {(root if b.joint == "facing" else b.joint, b.move) for b in tween.bridges}
     assert tween.path.shape == (tween.moves + 1, len(tween.joints))
     assert tween.lower_bound <= tween.cost
     assert (tween.status == "optimal") == (tween.cost - tween.lower_bound <= 1e-6)
@@ -134,7 +138,7 @@ def test_a_equal_to_b_is_no_move_at_no_cost(six_legs: Engine) -> None:
     assert (tween.moves, tween.cost, tween.lower_bound, tween.gap, tween.status) == (0, 0.0, 0.0, 0.0, "optimal")
     assert len(tween.motion) == 1
     np.testing.assert_array_equal(tween.motion.rotations[0], a.rotations)
-    assert tween.motion.moves.tolist() == [0.0]
+    assert tween.motion.insertions[0].times.tolist() == [0.0]
     assert (tween.bridges, tween.waits, tween.sources, tween.attested) == ((), (), (), 1.0)
     assert json.loads(json.dumps(tween.report()))["path"] == tween.path.tolist()
 

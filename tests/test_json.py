@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from motionmind import rotations as rot
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, read_posture, write_atomically, write_motion, write_posture
-from motionmind.motion import Motion, Posture
+from motionmind.motion import Insertion, Motion, Posture
 from motionmind.skeleton import Skeleton, human23
 
 Mutate = Callable[[str, random.Random], bytes]
@@ -86,18 +86,23 @@ def test_a_posture_reads_back(tmp_path: Path, body: Skeleton) -> None:
 
 
 @pytest.mark.parametrize("body", [human23(), tall()])
-@pytest.mark.parametrize("moves", [[], [0.0, 0.5, 1.0]])
-def test_a_motion_reads_back(tmp_path: Path, body: Skeleton, moves: list[float]) -> None:
+@pytest.mark.parametrize("plan", [[], [[0.0, 0.5, 1.0]], [[0.0], [0.25, 0.5]]])
+def test_a_motion_reads_back(tmp_path: Path, body: Skeleton, plan: list[list[float]]) -> None:
     plain = random_motion(50, skeleton=body)
-    there = Motion(body, plain.rotations, plain.root, plain.times, plain.name, np.array(moves))
+    bridged = [tuple((body.names[move], move) for move in range(len(times) - 1)) for times in plan]
+    insertions = tuple(Insertion(np.array(times), joints) for times, joints in zip(plan, bridged, strict=True))
+    there = Motion(body, plain.rotations, plain.root, plain.times, plain.name, insertions)
     write_motion(tmp_path / "a.json", there)
     back = read_motion(tmp_path / "a.json")
     assert back.skeleton == body
     assert back.name == there.name
-    for field in ("rotations", "root", "times", "moves"):
+    for one, other in zip(back.insertions, insertions, strict=True):
+        np.testing.assert_allclose(one.times, other.times, rtol=0, atol=1e-9)
+        assert one.bridged == other.bridged
+    for field in ("rotations", "root", "times"):
         np.testing.assert_allclose(getattr(back, field), getattr(there, field), rtol=0, atol=1e-9)
     first = (tmp_path / "a.json").read_bytes()
-    assert (b'"moves"' in first) == bool(moves)
+    assert (b'"insertions"' in first) == bool(plan)
     write_motion(tmp_path / "a.json", back)
     assert (tmp_path / "a.json").read_bytes() == first
 
@@ -266,11 +271,23 @@ def test_faults_of_a_skeleton(posture: Path, joints: list[tuple[str, str | None]
         (swap("rotations", [[]] * 4), ": rotations: frame 0 has 0 quaternions, human23 has 23 joints"),
         (swap("rotations", []), ": rotations has 0 frames, times has 4"),
         (swap("root", [[0, 0]] * 4), ": root[0]: expected list of length 3"),
-        (swap("moves", ["a"]), ": moves[0]: expected float, got str"),
+        (swap("insertions", [{"times": ["a"]}]), ": insertions[0].times[0]: expected float, got str"),
+        (swap("insertions", [{"times": []}]), ": an insertion's times must be finite and increasing, one at least"),
+        (
+            swap("insertions", [{"times": [0, 1], "bridged": [["tail", 0]]}]),
+            ": übung 1: human23 has no joint 'tail' to bridge",
+        ),
     ],
 )
 def test_faults_of_a_motion(motion: Path, change: Callable[[dict], dict], message: str) -> None:
     assert message in fails(motion, change(json.loads(motion.read_text())))
+
+
+def test_a_plan_as_it_was_written_before_is_an_insertion(motion: Path) -> None:
+    content = json.loads(motion.read_text()) | {"moves": [0.0, 0.5]}
+    motion.write_text(json.dumps(content))
+    (insertion,) = read_motion(motion).insertions
+    assert (insertion.times.tolist(), insertion.bridged) == ([0.0, 0.5], ())
 
 
 def test_a_zero_quaternion_is_named_with_its_frame(motion: Path) -> None:

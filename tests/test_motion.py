@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind import rotations as rot
 from motionmind.errors import MotionMindError
-from motionmind.motion import Motion, Posture
+from motionmind.motion import Insertion, Motion, Posture
 from motionmind.skeleton import Skeleton
 
 ARM = Skeleton("arm", ("shoulder", "elbow"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]))
@@ -121,10 +121,38 @@ def test_a_motion_that_is_none_is_refused_and_the_fault_named(
         Motion(ARM, rotations, root, times, "wave")
 
 
-@pytest.mark.parametrize("moves", [[np.nan], [0.0, 0.0], [1.0, 0.5], [[0.0]]])
-def test_moves_need_increasing_times(moves: list[float]) -> None:
-    with pytest.raises(MotionMindError, match="the moves' times must be finite and increasing"):
-        Motion(ARM, Q, ROOT, TIMES, moves=np.array(moves))
+@pytest.mark.parametrize("times", [[], [np.nan], [0.0, 0.0], [1.0, 0.5], [[0.0]]])
+def test_insertions_need_increasing_times(times: list[float]) -> None:
+    with pytest.raises(MotionMindError, match="an insertion's times must be finite and increasing, one at least"):
+        Insertion(np.array(times))
+
+
+def test_insertions_are_of_this_body_and_in_order() -> None:
+    with pytest.raises(MotionMindError, match="an insertion of 1 moves has no move 1, bridged by elbow"):
+        Insertion(np.array([0.0, 0.1]), (("elbow", 1),))
+    early, late = Insertion(np.array([0.0, 0.1]), (("knee", 0),)), Insertion(np.array([0.1, 0.2]))
+    with pytest.raises(MotionMindError, match="wave: arm has no joint 'knee' to bridge"):
+        Motion(ARM, Q, ROOT, TIMES, "wave", (early, late))
+    with pytest.raises(MotionMindError, match="wave: insertions must follow one another"):
+        Motion(ARM, Q, ROOT, TIMES, "wave", (late, early))
+
+
+def test_what_the_engine_made_lies_between_its_ends() -> None:
+    still = some_motion(1)
+    rotations, root = np.repeat(still.rotations, 11, axis=0), np.repeat(still.root, 11, axis=0)
+    elbow = ARM.names[1]
+    plan = (Insertion(np.array([0.1, 0.3, 0.5]), ((elbow, 1),)), Insertion(np.array([0.5, 0.8]), ((elbow, 0),)))
+    motion = Motion(ARM, rotations, root, np.arange(11) / 10.0, "wave", plan)
+    for whole in (motion, motion.resample(10.0), motion.resample(20.0)):
+        tenths = np.round(20.0 * whole.times).astype(int)
+        inside = ((tenths > 2) & (tenths < 10)) | ((tenths > 10) & (tenths < 16))
+        np.testing.assert_array_equal(whole.inserted(), inside)
+        np.testing.assert_array_equal(whole.bridged()[:, 1], inside & (tenths >= 6))
+        assert not whole.bridged()[:, 0].any()
+    part = motion.slice(6, 11)
+    np.testing.assert_array_equal(part.inserted(), motion.inserted()[6:])
+    np.testing.assert_array_equal(part.bridged(), motion.bridged()[6:])
+    assert len(motion.slice(9, 11).insertions) == 0
 
 
 def test_a_posture_that_is_none_is_refused_and_the_fault_named() -> None:
@@ -141,7 +169,7 @@ def test_arrays_are_copied_and_frozen() -> None:
     motion = Motion(ARM, Q, root, TIMES)
     root[:] = 7.0
     np.testing.assert_array_equal(motion.root, 0.0)
-    for array in (motion.rotations, motion.root, motion.times, motion.moves):
+    for array in (motion.rotations, motion.root, motion.times, motion.slice(0, 1).times):
         assert not array.flags.writeable
 
 
@@ -154,12 +182,9 @@ def test_postures_are_counted_from_either_end() -> None:
             motion.posture(frame)
 
 
-def test_a_slice_keeps_its_times_and_drops_the_plan() -> None:
+def test_a_slice_keeps_its_times() -> None:
     motion = some_motion(5)
-    planned = Motion(ARM, motion.rotations, motion.root, motion.times, "waving", np.array([0.0, 0.1]))
-    part = planned.slice(1, 4)
-    np.testing.assert_array_equal(part.times, motion.times[1:4])
-    assert len(part.moves) == 0
+    np.testing.assert_array_equal(motion.slice(1, 4).times, motion.times[1:4])
     with pytest.raises(MotionMindError, match="waving: no frames"):
         motion.slice(3, 3)
 

@@ -261,8 +261,9 @@ def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, r
     np.testing.assert_array_equal(found.root[[0, -1]], [a.root, b.root])
     np.testing.assert_allclose(np.diff(found.times), 1.0 / fps, rtol=1e-9)
     assert found.times[0] == 0.0
-    assert len(found.moves) == len(rows)
-    assert (found.moves[0], found.moves[-1]) == (0.0, found.times[-1])
+    (planned,) = found.insertions
+    assert len(planned.times) == len(rows)
+    assert (planned.times[0], planned.times[-1]) == (0.0, found.times[-1])
     assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
 
 
@@ -333,7 +334,7 @@ def test_the_motion_is_on_the_body_of_a_even_where_b_was_on_shorter_legs() -> No
 def test_no_moves_are_one_frame(walking: Learned) -> None:
     a = walk().posture(3)
     found = realised(walking, [3], a, a)
-    assert (len(found), found.name, found.moves.tolist()) == (1, "tween", [0.0])
+    assert (len(found), found.name, found.insertions[0].times.tolist()) == (1, "tween", [0.0])
     np.testing.assert_array_equal(found.rotations[0], a.rotations)
 
 

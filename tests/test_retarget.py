@@ -16,7 +16,7 @@ from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats.asf_amc import read_amc
 from motionmind.formats.bvh import read_bvh
 from motionmind.mapping import known_rig
-from motionmind.motion import Motion
+from motionmind.motion import Insertion, Motion
 from motionmind.retarget import filled_joints, joint_mapping, read_joint_mapping, to_human23
 from motionmind.rigs import RIGS, plain_names, spine_shares
 from motionmind.skeleton import Skeleton, human23
@@ -65,13 +65,16 @@ def about(axis: str, degrees: float) -> Array:
     return rot.from_axis_angle(np.eye(3)["xyz".index(axis)], np.radians(degrees))
 
 
+PLAN = (Insertion(np.array([0.0, 0.2, 0.3]), (("left_hip", 1), ("pelvis", 0))),)
+
+
 @cache
 def dance(frames: int = 12) -> Motion:
     """Some movement on human23: every joint turns, none by very much."""
     rng = np.random.default_rng(23)
     steps = rot.exp(0.5 * rng.standard_normal((frames, len(BODY), 3)))
     root = np.cumsum(0.05 * rng.standard_normal((frames, 3)), axis=0) + np.array([0.0, 0.9, 0.0])
-    return Motion(BODY, steps, root, np.arange(frames) / 30.0, name="dance", moves=np.array([0.0, 0.3]))
+    return Motion(BODY, steps, root, np.arange(frames) / 30.0, name="dance", insertions=PLAN)
 
 
 def spread(legs: float = 20.0, arms: float = 70.0, **more: Array) -> dict[str, Array]:
@@ -107,7 +110,8 @@ def disguise(
         np.array([rot.mul_vec(alignment[i], body.tips[i]) for i in kept]),
     )
     rotations = skeleton.local_rotations(turned[:, kept])
-    return Motion(skeleton, rotations, rot.mul_vec(world, motion.root), motion.times, name="x", moves=motion.moves)
+    plan = tuple(insertion.renamed(names) for insertion in motion.insertions)
+    return Motion(skeleton, rotations, rot.mul_vec(world, motion.root), motion.times, "x", plan)
 
 
 def same_movement(found: Motion, wanted: Motion, without: tuple[str, ...] = ()) -> None:
@@ -131,7 +135,9 @@ def test_a_zero_pose_that_stands_is_seen_through(rig: str, legs: float, arms: fl
     same_movement(found, dance(), without)
     np.testing.assert_allclose(found.skeleton.offsets, BODY.offsets, atol=1e-12)
     np.testing.assert_allclose(found.skeleton.tips, BODY.tips, atol=1e-12)
-    assert np.array_equal(found.moves, source.moves)
+    (planned,) = found.insertions
+    np.testing.assert_array_equal(planned.times, PLAN[0].times)
+    assert planned.bridged == PLAN[0].bridged
     assert found.name == source.name
 
 

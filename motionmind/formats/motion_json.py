@@ -17,8 +17,11 @@
     }
 
 `times` in seconds, increasing; `root` the root's places in metres; `rotations` quaternions x, y, z, w, each joint's
-against its parent, in the skeleton's order. `moves`, the times between which a tween's moves were planned, is there
-only if there are any. `skeleton` is "human23", "human44" or a description, as in a posture's JSON.
+against its parent, in the skeleton's order. `skeleton` is "human23", "human44" or a description, as in a posture's
+JSON. What the engine put in, if it did, is listed by the times of the postures that its moves lead from and to, with
+the joints' moves that no corpus attests:
+
+    "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
 """
 
 from __future__ import annotations
@@ -28,10 +31,17 @@ from itertools import chain
 import msgspec
 import numpy as np
 
-from motionmind.errors import FormatError
+from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import _json
 from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Motion
+from motionmind.motion import Insertion, Motion
+
+
+class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
+    """What the engine put in."""
+
+    times: list[float]
+    bridged: list[tuple[str, int]] = []  # msgspec gives each object its own
 
 
 class MotionSchema(msgspec.Struct, forbid_unknown_fields=True):
@@ -44,7 +54,8 @@ class MotionSchema(msgspec.Struct, forbid_unknown_fields=True):
     root: list[_json.Vector]
     rotations: list[list[_json.Quaternion]]
     name: str = ""
-    moves: list[float] = []  # msgspec gives each object its own
+    insertions: list[InsertionSchema] = []
+    moves: list[float] = []  # one insertion's times, as tweens were written before they had bridges
 
 
 def motion_from_json(data: bytes, path: FilePath) -> Motion:
@@ -78,15 +89,27 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
     numbers = chain.from_iterable(chain.from_iterable(schema.rotations))
     rotations = np.fromiter(numbers, dtype=np.float64, count=frames * joints * 4).reshape(frames, joints, 4)
     root = np.array(schema.root, dtype=np.float64)
-    times, moves = np.array(schema.times, dtype=np.float64), np.array(schema.moves, dtype=np.float64)
-    for what, array in (("root", root), ("times", times), ("moves", moves)):
+    times = np.array(schema.times, dtype=np.float64)
+    if schema.moves:
+        schema.insertions.append(InsertionSchema(schema.moves))
+    for what, array in (
+        ("root", root),
+        ("times", times),
+        *(("insertions", np.array(one.times, dtype=np.float64)) for one in schema.insertions),
+    ):
         _json.check_lengths(array, what, path)
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
         frame = late[0] + 1
         raise FormatError(f"times: {times[frame]:g} of frame {frame} is not after {times[frame - 1]:g}", path=path)
     rotations = _json.unit_rotations(rotations, skeleton.names, path)
-    return Motion(skeleton, rotations, root, times, schema.name, moves)
+    try:
+        insertions = tuple(Insertion(np.array(one.times), tuple(one.bridged)) for one in schema.insertions)
+        return Motion(skeleton, rotations, root, times, schema.name, insertions)
+    except FormatError:
+        raise
+    except MotionMindError as error:
+        raise FormatError(str(error), path=path) from error
 
 
 def write_motion_json(path: FilePath, motion: Motion) -> None:
@@ -101,8 +124,9 @@ def write_motion_json(path: FilePath, motion: Motion) -> None:
         f'"skeleton": {_json.skeleton_text(motion.skeleton, "")}',
         f'"times": {_compact(times.tolist())}',
     ]
-    if len(motion.moves):
-        fields.append(f'"moves": {_compact(_json.rounded(motion.moves).tolist())}')
+    if motion.insertions:
+        listed = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
+        fields.append(f'"insertions": {msgspec.json.encode(listed).decode()}')
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
         rows = ",\n".join(_compact(row) for row in _json.rounded(array).tolist())
         fields.append(f'"{what}": [\n{rows}\n]')

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
-from motionmind.motion import Motion, Posture
+from motionmind.motion import Insertion, Motion, Posture
 from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.samples import choose_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
@@ -46,7 +46,7 @@ def realise(
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
     """
     if len(path) == 1:
-        return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", np.zeros(1))
+        return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
     seconds = durations(path, grammar.transitions)
     frames = max(1, round(float(seconds.sum()) * fps))
     seconds *= frames / fps / seconds.sum()
@@ -78,7 +78,7 @@ def realise(
     heights = np.array([low_a, *(floor + np.median(carriage.clearance[chosen], axis=1)), low_b])
     root = stand(a.skeleton, rotations, natural_spline(keys, places, times), _eased(keys, heights, times))
     root[0], root[-1] = a.root, b.root
-    return Motion(a.skeleton, rotations, root, times, "tween", keys)
+    return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
 
 
 def _headings(path: NDArray[np.int32], grammar: Grammar, seconds: Floats, a: Floats, b: Floats) -> Floats:
