@@ -35,8 +35,8 @@ def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -
     Args:
         skeleton: a file's own skeleton.
         joints: the user's mapping, from `read_joint_mapping`. Names of the file's joints may lack their namespace and
-            differ in case. None to know the rig by its names: CMU (BVH and ASF), Mixamo, Biovision, Bandai-Namco, or
-            human44.
+            differ in case. None to know the rig by its names: CMU (BVH and ASF), Mixamo, Biovision, Bandai-Namco, SMPL,
+            or human44.
 
     Returns:
         The mapping in the skeleton's order; None where `joints` is None and no rig has these names.

@@ -6,7 +6,7 @@ last does.
 
 Sources of the names: the CMU Motion Capture Database's ASF files and their conversion to BVH by B. Hahne
 (cgspeed.com); Mixamo's and Autodesk HumanIK's rigs (the same but for the namespace); Biovision's own names, in use
-since the format's first files; Bandai-Namco-Research-Motiondataset.
+since the format's first files; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its kin.
 """
 
 from __future__ import annotations
@@ -197,6 +197,30 @@ _BANDAI_FRAMES = (
 # back by 22 degrees, and forward by as much in all movement; that of 135 is straight.
 _CMU_TWISTS = {f"{side}_{joint}": np.radians(-30.0) for side in ("left", "right") for joint in ("shoulder", "elbow")}
 
+# At rest SMPL stands as human23 does, all axes the world's. spine2 is as high above the pelvis as human23's thorax, and
+# of four fingers the middle one is taken.
+_SMPL = {
+    "pelvis": "pelvis",
+    "spine1": "lumbar",
+    "spine2": "thorax",
+    "spine3": "thorax",
+    "neck": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{side}hip": "hip",
+        "{side}knee": "knee",
+        "{side}ankle": "ankle",
+        "{side}foot": "toes",
+        "{side}collar": "clavicle",
+        "{side}shoulder": "shoulder",
+        "{side}elbow": "elbow",
+        "{side}wrist": "wrist",
+        "{side}middle1": "fingers",
+        "{side}hand": "fingers",
+    }
+)
+
 _OWN = {name.replace("_", ""): name for name in human23().names}
 _OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
 
@@ -219,4 +243,5 @@ RIGS: tuple[Rig, ...] = (
     Rig("Mixamo", _HUMANIK, _HUMANIK_SPINE),
     Rig("Biovision", _BIOVISION, ("lowerback", "ab", "abdomen", "chest", "chest2", "chest3", "chest4")),
     Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
+    Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
 )

@@ -365,10 +365,10 @@ def test_postures_in_every_format_that_is_written(tmp_path: Path, suffix: str) -
 
 @pytest.mark.parametrize("name", ["a.fbx", "a", "a.json.gz"])
 def test_an_unknown_suffix_names_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt$"):
+    with pytest.raises(FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt, \.npz$"):
         read_motion(tmp_path / name)
     for write, thing in ((write_motion, random_motion()), (write_posture, random_motion().posture(0))):
-        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt, \.glb$"):
+        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt, \.glb, \.npz$"):
             write(tmp_path / name, thing)  # type: ignore[operator]
 
 
@@ -377,7 +377,7 @@ def test_amc_is_not_written(tmp_path: Path) -> None:
         write_motion(tmp_path / "a.amc", random_motion())
 
 
-@pytest.mark.parametrize("suffix", [".json", ".bvh", ".amc", ".txt"])
+@pytest.mark.parametrize("suffix", [".json", ".bvh", ".amc", ".txt", ".npz"])
 def test_files_that_cannot_be_read(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(FormatError, match="cannot be read: there is no such file or folder"):
         read_motion(tmp_path / f"none{suffix}")

@@ -22,6 +22,7 @@ from motionmind.cli.options import (
     reading,
 )
 from motionmind.cli.printing import count, note, print_tween, progress
+from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.formats.papers import Form
@@ -134,36 +135,47 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
 @click.argument("output", type=FILE, metavar="OUT")
 @click.option("--skeleton", type=click.Choice(["own", "human23"]), default="own", help="The file's joints, or human23.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: as they are]")
+@click.option("--out-unit", metavar="UNIT", help="OUT's unit of length, for .bvh, as for --unit  [default: cm]")
 @click.option(
     "--form", type=click.Choice(["braces", "lines"]), default="braces", help="Which of the papers' two, for .txt."
 )
 @reading
 def convert(
-    file: Path, output: Path, skeleton: str, fps: float | None, form: Form, joints: Path | None, **source: Any
+    file: Path,
+    output: Path,
+    skeleton: str,
+    fps: float | None,
+    out_unit: str | None,
+    form: Form,
+    joints: Path | None,
+    **source: Any,
 ) -> None:
     """Convert movement from one format to another.
 
-    IN can be .bvh, .amc with its .asf, .json, or .txt in the notation of the papers; OUT can be .bvh, .json,
-    .glb (a skinned body, for Blender and the like), or .txt, which is on human23 (or human44, if IN is) and holds
-    orientations alone.
+    IN can be .bvh, .amc with its .asf, .json, .npz as AMASS keeps movement, or .txt in the notation of the papers. OUT
+    can be .bvh, .json, .glb (a skinned body, for Blender and the like), .npz (on SMPL's joints), or .txt, which is on
+    human23 (or human44, if IN is) and holds orientations alone. What OUT has no place for is said.
     """
-    from motionmind.formats import write_motion
+    from motionmind.formats import lost, write_motion
     from motionmind.formats.papers import write_papers
     from motionmind.mapping import is_human44
     from motionmind.retarget import to_human23
 
-    check_outputs([(output, (".bvh", ".json", ".txt", ".glb"))], [file])
+    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz"))], [file])
+    suffix = output.suffix.lower()
+    if out_unit and suffix != ".bvh":
+        raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is none")
     motion = read(file, **source)
-    papers = output.suffix.lower() == ".txt"
-    if skeleton == "human23" or joints or (papers and not is_human44(motion.skeleton)):
+    if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints))
     if fps is not None:
         motion = motion.resample(fps)
-    if papers:
+    if suffix == ".txt":
         write_papers(output, motion, form=form)
-        note(f"{output}: the notation has no place for times and for where the body is")
     else:
-        write_motion(output, motion)
+        write_motion(output, motion, unit=out_unit or "cm")
+    if missing := lost(motion, output):
+        note(f"{output}: no place for {'; '.join(missing)}")
     click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 
 

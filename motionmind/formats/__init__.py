@@ -5,8 +5,11 @@
 | `.json` | posture or motion | posture or motion |
 | `.bvh` | motion | motion, posture as one frame |
 | `.amc` | motion, with the `.asf` beside it | |
+| `.npz` | motion on SMPL's joints, as AMASS keeps it | motion of people, posture as one frame |
 | `.txt` | the notation of the papers | the notation of the papers |
 | `.glb` | | motion, posture without animation |
+
+What a format has no place for, `lost` says.
 """
 
 from __future__ import annotations
@@ -15,13 +18,14 @@ from pathlib import Path
 
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats.files import FilePath, write_atomically
+from motionmind.formats.lost import lost
 from motionmind.motion import Motion, Posture
 from motionmind.skeleton import Skeleton
 
-__all__ = ["read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
+__all__ = ["lost", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
-_READ = (".json", ".bvh", ".amc", ".txt")
-_WRITTEN = (".json", ".bvh", ".txt", ".glb")
+_READ = (".json", ".bvh", ".amc", ".txt", ".npz")
+_WRITTEN = (".json", ".bvh", ".txt", ".glb", ".npz")
 
 
 def read_motion(
@@ -38,7 +42,8 @@ def read_motion(
         path: the file; its suffix tells the format.
         unit: BVH's unit of length (`read_bvh`); None tells it from the skeleton. Other formats know their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
-        fps: frames a second of formats that do not say: AMC (default 120), the papers' notation (default 1).
+        fps: frames a second of formats that do not say: AMC (default 120), the papers' notation (default 1), `.npz`
+            that lacks them (no default).
         skeleton: the body of the papers' notation, which names joints only; None tells it from their names.
 
     Raises:
@@ -58,6 +63,10 @@ def read_motion(
         from motionmind.formats.papers import read_papers
 
         return read_papers(path, skeleton=skeleton) if fps is None else read_papers(path, skeleton=skeleton, rate=fps)
+    if suffix == ".npz":
+        from motionmind.formats.npz import read_npz
+
+        return read_npz(path, fps=fps)
     from motionmind.formats import _json
     from motionmind.formats.files import read_bytes
 
@@ -96,16 +105,17 @@ def read_posture(
     return motion.posture(frame or 0)
 
 
-def write_motion(path: FilePath, motion: Motion) -> None:
+def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") -> None:
     """Write `motion` in the format of the suffix.
 
-    That is `.json`, `.bvh` (centimetres), `.txt` (the papers' notation), or `.glb` (glTF, a skinned body).
+    That is `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body), or `.npz` (AMASS). `unit` is
+    BVH's unit of length (`write_bvh`); other formats have their own.
     """
     suffix = _suffix(path, _WRITTEN, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
 
-        write_bvh(path, motion)
+        write_bvh(path, motion, unit)
     elif suffix == ".txt":
         from motionmind.formats.papers import write_papers
 
@@ -114,6 +124,10 @@ def write_motion(path: FilePath, motion: Motion) -> None:
         from motionmind.formats.glb import write_glb
 
         write_glb(path, motion)
+    elif suffix == ".npz":
+        from motionmind.formats.npz import write_npz
+
+        write_npz(path, motion)
     else:
         from motionmind.formats.motion_json import write_motion_json
 

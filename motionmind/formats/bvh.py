@@ -21,6 +21,7 @@ from motionmind import rotations as rot
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats._bvh_hierarchy import Joint, is_comment, read_hierarchy
 from motionmind.formats._bvh_places import Body, Placed, settle
+from motionmind.formats._clock import even_step
 from motionmind.formats.files import FilePath, write_atomically
 from motionmind.formats.text import LARGEST, read_lines, shown, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
@@ -214,7 +215,7 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     scale = 1.0 / metres_per_unit(unit)
     skeleton = motion.skeleton
     _check_names(skeleton)
-    step = _even_step(motion)
+    step = even_step(motion, "BVH")
     order = _depth_first(skeleton)
     # Lengths to 1e-8 m: rounding errors add up along a chain of bones.
     digits = max(0, int(np.ceil(8.0 - np.log10(scale))))
@@ -227,21 +228,6 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
     lines += [row % tuple(frame) for frame in values.tolist()]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
-
-
-def _even_step(motion: Motion) -> float:
-    """Seconds from frame to frame; a thirtieth where there is only one."""
-    if len(motion) == 1:
-        return 1.0 / 30.0
-    step = float(motion.times[-1] - motion.times[0]) / (len(motion) - 1)
-    late = np.abs(motion.times - motion.times[0] - step * np.arange(len(motion)))
-    if np.max(late) > 1e-3 * step:
-        frame = int(np.argmax(late))
-        raise MotionMindError(
-            f"{motion.name or 'motion'}: BVH needs frames that are even in time; frame {frame} is "
-            f"{late[frame]:.3g} s off a step of {step:.6g} s (resample the motion first)"
-        )
-    return step
 
 
 def _check_names(skeleton: Skeleton) -> None:

@@ -1,0 +1,26 @@
+"""The clock of formats that know one step from frame to frame and no times."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind.errors import MotionMindError
+from motionmind.motion import Motion
+
+
+def even_step(motion: Motion, form: str) -> float:
+    """Seconds from frame to frame; a thirtieth where there is only one frame.
+
+    MotionMindError where the times are off an even step by more than a thousandth of it; `form` is the format's name.
+    """
+    if len(motion) == 1:
+        return 1.0 / 30.0
+    step = float(motion.times[-1] - motion.times[0]) / (len(motion) - 1)
+    late = np.abs(motion.times - motion.times[0] - step * np.arange(len(motion)))
+    if np.max(late) > 1e-3 * step:
+        frame = int(np.argmax(late))
+        raise MotionMindError(
+            f"{motion.name or 'motion'}: {form} needs frames that are even in time; frame {frame} is "
+            f"{late[frame]:.3g} s off a step of {step:.6g} s (resample the motion first, as convert --fps does)"
+        )
+    return step
