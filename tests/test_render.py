@@ -1,4 +1,4 @@
-"""Laws of the pictures: what is where, what hides what, and that all of it is there. No picture is compared whole."""
+"""Laws of the pictures: what is where, what hides what, and that all of it is there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from motionmind.cli import main
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
-from motionmind.motion import Motion, Posture
+from motionmind.motion import Insertion, Motion, Posture
 from motionmind.render import sheet as sheets
 from motionmind.render.anatomy import FACE, Body, body_of
 from motionmind.render.figure import (
@@ -30,11 +30,16 @@ from motionmind.render.figure import (
     COLOURS,
     FRONT,
     INK,
+    INSERTED,
     STAGE_LEFT,
     STAGE_RIGHT,
     View,
+    bridge_balls,
     colour,
     draw,
+    halved,
+    inserted,
+    plain,
     seen,
 )
 from motionmind.render.sheet import MOST, contact_sheet
@@ -191,6 +196,19 @@ def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None
     assert np.isclose(together.shade, alone.shade, atol=0.01).mean() > 0.999  # two that touch are as near
     alone.clear()
     assert (alone.solid == EMPTY).all()
+
+
+def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
+    posture = random_posture(9)
+    _, whole = drawn(posture, FRONT)
+    solids = seen(*body_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
+    rows, columns = slice(135, 165), slice(130, 170)  # the trunk and what is about it, cut on all sides
+    part = Canvas(columns.start / SCALE - HALF, HALF - rows.start / SCALE, 40, 30, SCALE)
+    draw(part, *solids)
+    assert all((whole.solid[rows, columns][edge] != EMPTY).any() for edge in np.s_[0, -1, (..., 0), (..., -1)])
+    assert (part.solid != whole.solid[rows, columns]).mean() < 0.002
+    same = part.solid == whole.solid[rows, columns]
+    assert np.allclose(part.depth[same], whole.depth[rows, columns][same], atol=1e-4)
 
 
 def test_what_goes_through_something_is_seen_on_both_sides_of_it() -> None:
@@ -435,6 +453,25 @@ def test_a_limb_before_another_has_a_line_round_it_and_one_that_goes_on_has_none
     assert not ink[row + 8 : row + 14, column - 1 : column + 2].any()  # thigh and shank are one leg
 
 
+def lines(canvas: Canvas, parts: Array, step: float, width: int) -> NDArray[np.bool_]:
+    """Pixels with one of another part that is nearer by a step within `width` above, below or beside them."""
+    part = np.where(canvas.solid == EMPTY, -1, parts[canvas.solid])
+    here, found = np.s_[width:-width, width:-width], np.zeros(part.shape, dtype=bool)
+    for by in range(1, width + 1):
+        for shift, axis in ((by, 0), (-by, 0), (by, 1), (-by, 1)):
+            other, depth = (np.roll(array, shift, axis) for array in (part, canvas.depth))
+            found[here] |= ((part != other) & (depth > canvas.depth + step))[here]
+    return found
+
+
+@pytest.mark.parametrize("width", [1, 2, 5])
+def test_lines_are_where_a_nearer_part_is_near(width: int) -> None:
+    body, canvas = drawn(random_posture(12), STAGE_RIGHT)
+    parts = np.unique(body.parts, return_inverse=True)[1].astype(float)
+    picture = colour(canvas, body, np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8), width)
+    assert np.array_equal((picture == INK).all(axis=-1), lines(canvas, parts, 0.016 * body.size, width))
+
+
 def test_what_is_farther_is_paler() -> None:
     posture, aside = standing(), np.array([0.8, 0.0, 0.0])
     _, behind = drawn(posture, STAGE_LEFT, aside)  # the middle of the view is between the viewer and the body
@@ -591,6 +628,83 @@ def test_a_sheet_has_bounds() -> None:
     leaps = replace(clip(2), root=np.array([[0.0, 1.0, 0.0], [0.0, 1e6, 0.0]]))
     picture = contact_sheet(leaps)
     assert max(picture.size) < 2000
+
+
+def test_half_a_picture_is_the_means_of_its_pixels() -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (48, 34, 3), dtype=np.uint8)
+    assert np.array_equal(halved(picture), np.asarray(Image.fromarray(picture).reduce(2)))
+
+
+# --- what the engine made -------------------------------------------------------------------------------------------
+
+
+def tween(*bridged: tuple[str, int]) -> Motion:
+    """Three postures, of which the engine made the second."""
+    return replace(clip(3), insertions=(Insertion(np.array([0.0, 0.2]), bridged),))
+
+
+@pytest.mark.parametrize("joint", NAMES)
+def test_the_ball_of_a_bridged_joint_is_around_it_and_seen_from_somewhere(joint: str) -> None:
+    posture = standing()
+    body, which = body_of(human23()), np.arange(len(NAMES)) == NAMES.index(joint)
+    joints = human23().positions(posture.rotations, posture.root)
+    cones, balls = body.solids(posture.rotations, posture.root)
+    ball = bridge_balls(body, joints, which)
+    assert np.allclose(ball.centre, joints[NAMES.index(joint)])
+    assert bridge_balls(body, joints, ~which).centre.shape == (len(NAMES) - 1, 3)
+    green = 0
+    for view in VIEWS:
+        canvas = Canvas(-HALF, HALF, 300, 300, SCALE)
+        draw(canvas, *seen(cones, balls.joined(ball), view, posture.root))
+        assert canvas.solid.max() <= len(body.parts)
+        picture = colour(canvas, body, np.full((300, 300, 3), 255, dtype=np.uint8)).astype(int)
+        ball_itself = picture[(canvas.solid == len(body.parts)) & (picture != INK).any(axis=-1)]
+        assert (ball_itself[:, 1] > ball_itself[:, [0, 2]].max(axis=-1)).all()
+        green += len(ball_itself)
+    assert green > 60
+
+
+def test_what_the_engine_made_has_other_colours_and_its_marks_keep_theirs() -> None:
+    body, canvas = drawn(standing(), FRONT)
+    white = np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8)
+    recorded, made = colour(canvas, body, white), colour(canvas, body, white, paints=inserted(body))
+    assert np.array_equal(colour(canvas, body, white, paints=plain(body)), recorded)
+    for paint in COLOURS:
+        there = shown(body, canvas, paint=paint) & (recorded != INK).any(axis=-1)
+        assert (made[there] != recorded[there]).any() == (COLOURS[paint] != INSERTED[paint])
+    left, right = (made[shown(body, canvas, paint=side)].astype(int) for side in (LEFT, RIGHT))
+    assert np.median(left[:, 0] - left[:, 2]) > 20 > -20 > np.median(right[:, 0] - right[:, 2])
+
+
+def test_a_sheet_tells_what_the_engine_made(words: list[tuple[float, float, str]]) -> None:
+    def coloured(motion: Motion) -> Array:
+        """How many pixels of the three postures are violet, and how many green: [3, 2]."""
+        sheet = sheets._Sheet(motion, [0, 1, 2], STAGE_RIGHT)
+        pictures = [np.asarray(sheet._view(at, sheet.windows[0])).astype(int) for at in range(3)]
+        channels = [np.moveaxis(picture, -1, 0) for picture in pictures]
+        return np.array([[((r > g + 15) & (b > g + 50)).sum(), (g > b + 35).sum()] for r, g, b in channels])
+
+    recorded, made, bridged = replace(tween(), insertions=()), tween(), tween(("left_hip", 0), ("right_wrist", 0))
+    counts = coloured(made) - coloured(recorded)
+    assert (counts[:, 0] > 300).tolist() == [False, True, False]
+    assert (counts[:, 1] > 100).tolist() == [False, False, False]
+    counts = coloured(bridged) - coloured(made)
+    assert (counts[:, 1] > 100).tolist() == [False, True, False]
+    for motion, legend in ((recorded, set()), (made, {"violet"}), (bridged, {"violet", "ball"})):
+        words.clear()
+        contact_sheet(motion)
+        assert {text.split(":")[0] for _, _, text in words} & {"violet", "ball"} == legend
+
+
+def test_the_balls_of_bridges_have_room() -> None:
+    motion = tween(("right_fingers", 0), ("left_toes", 0), ("atlantal", 0))
+    sheet = sheets._Sheet(motion, [1], STAGE_RIGHT)
+    for window in sheet.windows:
+        canvas, _ = sheet._easel(window)
+        draw(canvas, *sheet._solids(0, window.view))
+        assert (canvas.solid >= len(sheet.body.parts)).any()
+        for edge in np.s_[0, -1, (..., 0), (..., -1)]:
+            assert (canvas.solid[edge] == EMPTY).all()
 
 
 # --- the command ----------------------------------------------------------------------------------------------------

@@ -84,14 +84,14 @@ def tween(
     _load_numba()
     from motionmind.engine import Engine
     from motionmind.formats import read_posture, write_atomically, write_motion
-    from motionmind.search.jit import is_compiled
+    from motionmind.jit import is_compiled
 
     alone = report == Path("-")
     wanted = ((output, (".json", ".bvh", ".glb")), (None if alone else report, ()), (problem, (".cfn",)))
     written = check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
-    if not is_compiled():
+    if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
     result = engine.tween(*ends, **options)
     text = json.dumps(result.report())

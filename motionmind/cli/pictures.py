@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +18,6 @@ from motionmind.cli.printing import count
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
-
     from motionmind.motion import Motion
 
 _ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
@@ -76,7 +73,7 @@ def sheet(
     corpus by its name or folder; scores and corpora hold clips, of which --clip takes some.
     """
     from motionmind.formats import write_atomically
-    from motionmind.render.sheet import check_frames, contact_sheet
+    from motionmind.render.sheet import check_frames, contact_sheet, png
 
     many = _holds_clips(source, home)
     folder = output if many and (output.is_dir() or not output.suffix) else None
@@ -97,7 +94,7 @@ def sheet(
     with all_or_none(paths):
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
             picture = contact_sheet(motion, drawn, columns=columns, side=side)
-            write_atomically(path, _png(picture))
+            write_atomically(path, png(picture))
             words = count(len(drawn), "posture")
             click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
 
@@ -157,17 +154,6 @@ def _files_in(folder: Path, motions: Sequence[Motion], source: Path) -> list[Pat
             if made:
                 folder.rmdir()
         raise
-
-
-def _png(picture: Image) -> bytes:
-    """The bytes of a file."""
-    from PIL.Image import Dither, Quantize
-
-    data = BytesIO()
-    # A third of the bytes, and to the eye the same. Of the ways to choose 256 colours, median cut loses those that are
-    # rare, as what is under the floor, and maximum coverage tints the ground; an octree keeps both.
-    picture.quantize(256, Quantize.FASTOCTREE, dither=Dither.NONE).save(data, "PNG")
-    return data.getvalue()
 
 
 def _range(clip: Path | str, length: int, start: int, end: int) -> range:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind import rotations as rot
 from motionmind.mirror import LEFT, MIDDLE, RIGHT
 from motionmind.render.anatomy import FACE, HAIR, MARK, Body
-from motionmind.render.solids import EMPTY, Canvas, Cones, Depths, Ellipsoids, Indices
+from motionmind.render.solids import Canvas, Cones, Ellipsoids
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -22,9 +24,13 @@ COLOURS = {
     HAIR: (84, 70, 62),
     MARK: (255, 226, 120),
 }
+INSERTED = COLOURS | {LEFT: (190, 95, 130), RIGHT: (95, 105, 195), MIDDLE: (140, 90, 200)}  # what the engine made
+BRIDGED = (20, 190, 120)  # balls around joints amid a move that no corpus attests
 INK = (34, 30, 34)
 _STEP = 0.016  # metres by which a part must stand before another for a line between them
 _HAZE = 0.30  # share of white in what is farthest from the viewer
+_STANDS_OUT = 1.2  # radius of a bridged joint's ball by that of the body there
+_LEAST_BALL = 0.050  # metres, on a body 1.70 m tall
 
 
 @dataclass(frozen=True)
@@ -83,40 +89,66 @@ def draw(canvas: Canvas, cones: Cones, balls: Ellipsoids, only: frozenset[int] |
     canvas.draw(cones, balls, numbers)
 
 
-def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2) -> Pixels:
+def plain(body: Body) -> Array:
+    """RGB [N, 3] of a body's solids, from 0 to 255: left is warm, right is cool, the trunk is neutral."""
+    return np.array([COLOURS[paint] for paint in body.paints], dtype=np.float64)
+
+
+def inserted(body: Body) -> Array:
+    """RGB [N, 3] of a body's solids where the engine made the movement: violet, left still warmer than right."""
+    return np.array([INSERTED[paint] for paint in body.paints], dtype=np.float64)
+
+
+def bridge_balls(body: Body, joints: Array, which: NDArray[np.bool_]) -> Ellipsoids:
+    """Balls around the bridged ones, `which` [J], of a body's joints, which are at `joints` [..., J, 3], metres.
+
+    They are larger than the body is there. Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they
+    have the numbers after those of `Body.parts`, by which `colour` knows them.
+    """
+    radii = _girths(body)[which]
+    return Ellipsoids(joints[..., which, :], radii[:, None, None] * np.eye(3))
+
+
+@lru_cache(maxsize=8)
+def _girths(body: Body) -> Array:
+    """Radii [J] in metres of balls that stand out from the solids that the joints are in."""
+    skeleton, rest = body.skeleton, np.tile(rot.IDENTITY, (len(body.skeleton), 1))
+    cones, balls = body.solids(rest, np.zeros(3))
+    joints = skeleton.positions(rest, np.zeros(3))[:, None]
+    along = cones.b - cones.a
+    t = ((joints - cones.a) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-12)
+    t = t.clip(0.0, 1.0)
+    thick = cones.a_radius + t * (cones.b_radius - cones.a_radius)
+    in_cones = np.linalg.norm(joints - cones.a - t[..., None] * along, axis=-1) < thick
+    in_balls = np.linalg.norm(np.linalg.inv(balls.axes) @ (joints - balls.centre)[..., None], axis=(-2, -1)) < 1.0
+    thin = np.linalg.norm(balls.axes, axis=-2).min(axis=-1)
+    radii = np.concatenate([in_cones * thick, in_balls * thin], axis=-1).max(axis=-1)
+    return np.asarray(np.maximum(_STANDS_OUT * radii, _LEAST_BALL * body.size))
+
+
+def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints: Array | None = None) -> Pixels:
     """The picture [H, W, 3] of what is on a canvas, before a background of the same shape.
 
-    Left is warm, right is cool, the trunk is neutral; what is farther is paler. A line, `line` pixels wide, runs round
-    each part where it stands before another, and is drawn on that other, so that the nearer part keeps its shape.
+    The solids have the RGB `paints` [N, 3], `plain(body)` by default; any whose number is beyond those of the body are
+    balls around bridged joints. What is farther is paler. A line, `line` pixels wide, runs round each part where it
+    stands before another, and is drawn on that other, so that the nearer part keeps its shape.
     """
+    from motionmind.render import raster
+
+    names = {name: number for number, name in enumerate(dict.fromkeys(body.parts))}
+    joints = len(body.skeleton)  # no more can be bridged
+    parts = np.array([names[part] for part in body.parts] + [len(names)] * joints)
+    colours = np.concatenate([plain(body) if paints is None else paints, np.tile(BRIDGED, (joints, 1))]).astype(float)
     picture = background.copy()
-    solid, depth = canvas.solid.reshape(-1), canvas.depth.reshape(-1)
-    filled = np.flatnonzero(solid != EMPTY)
-    far = _HAZE * np.clip(0.5 - depth[filled] / np.float32(0.9 * body.size), 0.0, 1.0)
-    lit, haze, of = (1.0 - far) * canvas.shade.reshape(-1)[filled], 255.0 * far, solid[filled]
-    paints = np.array([COLOURS[paint] for paint in body.paints], dtype=np.float32)
-    samples = picture.reshape(-1, 3)
-    for channel in range(3):  # one by one: numpy is slow on rows of three
-        samples[:, channel][filled] = paints[:, channel][of] * lit + haze
-    if len(filled):
-        width = canvas.solid.shape[1]
-        rows = slice(max(filled[0] // width - line, 0), filled[-1] // width + line + 1)
-        picture[rows].reshape(-1, 3)[_edges(canvas.solid[rows], canvas.depth[rows], body, line)] = INK
+    haze = 0.45 * body.size, -0.45 * body.size, _HAZE
+    ink = np.array(INK, dtype=np.uint8)
+    shown = canvas.solid, canvas.depth, canvas.shade
+    raster.colour(picture, *shown, colours, parts, haze, _STEP * body.size, line, ink)
     return picture
 
 
-def _edges(solid: Indices, depth: Depths, body: Body, line: int) -> NDArray[np.intp]:
-    """Pixels of [H, W], counted row by row, within `line` of one of another part that is nearer by a step."""
-    names = {name: number for number, name in enumerate(dict.fromkeys(body.parts))}
-    parts = np.array([names[part] for part in body.parts] + [-1])  # EMPTY takes the last
-    step, width = np.float32(_STEP * body.size), solid.shape[1]
-    solids, depths = solid.reshape(-1), depth.reshape(-1)
-    found = []
-    for by in range(1, line + 1):
-        below = np.flatnonzero(solid[by:] != solid[:-by])
-        beside = np.flatnonzero(solid[:, by:] != solid[:, :-by])
-        for first, other in ((below, by * width), (beside + beside // (width - by) * by, by)):
-            before = first[parts[solids[first]] != parts[solids[first + other]]]
-            ahead = depths[before + other] - depths[before]
-            found += [before[ahead > step], before[ahead < -step] + other]
-    return np.concatenate(found)
+def halved(picture: Pixels) -> Pixels:
+    """A picture [H, W, 3] at half its width and height, each pixel the mean of four."""
+    from motionmind.render import raster
+
+    return raster.halved(picture)

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind.jit import jit
 from motionmind.search.bound import Messages, step
-from motionmind.search.jit import jit
 from motionmind.search.problem import Floats, Grid, Ints
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.

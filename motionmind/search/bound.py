@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.search.jit import jit
+from motionmind.jit import jit
 from motionmind.search.problem import Floats, Grid, Indices, Ints
 
 

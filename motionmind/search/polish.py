@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from motionmind.jit import jit
 from motionmind.search.bound import discount
-from motionmind.search.jit import jit
 from motionmind.search.problem import Floats, Grid, Ints
 
 

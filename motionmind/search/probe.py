@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from motionmind.jit import jit
 from motionmind.search.bound import Messages, narrow, tighten
-from motionmind.search.jit import jit
 from motionmind.search.polish import polish
 from motionmind.search.problem import Floats, Grid, Indices, Ints
 

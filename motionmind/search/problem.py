@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.search.jit import jit
+from motionmind.jit import jit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,6 +6,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -16,41 +17,46 @@ _F = TypeVar("_F", bound=Callable[..., object])
 config: Any = numba.config
 
 
-def _cache_folder() -> str:
-    """A folder named after the state of all sources beside this one.
+def jit(function: _F) -> _F:
+    """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time.
+
+    It may call other compiled functions of its own folder, and runs beside other threads.
+    """
+    theirs = config.CACHE_DIR  # read when a function is decorated; nobody else's functions are to move
+    config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent)
+    try:
+        return cast(_F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    finally:
+        config.CACHE_DIR = theirs
+
+
+def is_compiled(package: str) -> bool:
+    """Whether compiled code of a package of this one, as "search", is on disk; that takes the search half a minute."""
+    source = Path(__file__).parent / package
+    return next(Path(_folder(source)).glob(f"{source.name}_*/*.nbi"), None) is not None
+
+
+@cache
+def _folder(source: Path) -> str:
+    """Where compiled code is kept: a folder named after the state of all sources in the folder `source`.
 
     numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
     go on using the old code after that file changed. It is in the user's cache directory, or where that cannot be
     written in the system's for temporary files, as a folder that nobody else may write to.
     """
-    sources = [(path.name, path.stat().st_mtime_ns) for path in sorted(Path(__file__).parent.glob("*.py"))]
-    state = hashlib.sha256(repr(sources).encode()).hexdigest()[:16]
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return given
+    files = [Path(__file__), *sorted(source.glob("*.py"))]
+    state = hashlib.sha256(repr([(str(file), file.stat().st_mtime_ns) for file in files]).encode()).hexdigest()[:16]
     own = Path(platformdirs.user_cache_dir("motionmind", appauthor=False))
     nearest = next(folder for folder in (own, *own.parents) if folder.exists())
     return str((own if os.access(nearest, os.W_OK) else _temporary()) / "compiled" / state)
 
 
+@cache
 def _temporary() -> Path:
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"motionmind-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)
     owned = folder.stat().st_uid in (user, 0) and not folder.is_symlink()
     return folder if owned else Path(tempfile.mkdtemp(prefix="motionmind-"))
-
-
-_FOLDER = _cache_folder()
-
-
-def jit(function: _F) -> _F:
-    """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time."""
-    theirs = config.CACHE_DIR  # read when a function is decorated; nobody else's functions are to move
-    config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", _FOLDER)
-    try:
-        return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
-    finally:
-        config.CACHE_DIR = theirs
-
-
-def is_compiled() -> bool:
-    """Whether compiled code is on disk already; where not, the first search takes half a minute longer."""
-    return next(Path(os.environ.get("NUMBA_CACHE_DIR", _FOLDER)).glob("**/*.nbi"), None) is not None

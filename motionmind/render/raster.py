@@ -1,0 +1,215 @@
+"""Inner loops of the pictures: solids into a depth buffer, the buffer into colours. They know neither bodies nor views.
+
+Lengths are metres in the viewer's axes, x to the right, y up, z towards the viewer; parallel projection. Canvases are
+passed as their arrays `solid`, `depth` and `shade` [H, W], and as their `place`.
+"""
+
+from __future__ import annotations
+
+from math import ceil, hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.jit import jit
+from motionmind.render.solids import EMPTY
+
+Array = NDArray[np.float64]
+Depths = NDArray[np.float32]
+Indices = NDArray[np.int16]
+Parts = NDArray[np.intp]
+Pixels = NDArray[np.uint8]
+Place = tuple[float, float, float]  # x and y of a canvas's upper left corner, and its pixels to a metre
+Buffers = tuple[Indices, Depths, Depths, Place]
+
+_UP, _TOWARDS = 0.6, 0.8  # where light comes from: above the viewer; no side, so that a mirrored body looks mirrored
+_SHADE = 0.62  # brightness of what the light does not reach
+_HAIR = 0.001  # pixels: surfaces no farther apart are one, but for rounding
+_END_ON = 1e-3  # of a cone's thickness: one whose ends lie no farther apart in the picture is drawn as two balls
+
+
+@jit
+def draw(
+    solid: Indices, depth: Depths, shade: Depths, place: Place, cones: Array, balls: Array, numbers: Indices
+) -> None:
+    """Draw solids on a canvas: what is nearest stays, and of solids that touch, as in a joint, the higher number.
+
+    Args:
+        solid, depth, shade, place: the canvas.
+        cones: of each round cone its ends' centres and their radii [N, 8].
+        balls: of each ellipsoid the centre, and A A' of the matrix A whose columns are its half axes [M, 4, 3].
+        numbers: what the canvas calls them [N + M].
+    """
+    canvas = solid, depth, shade, place
+    for i in range(len(cones)):
+        ax, ay, az, bx, by, bz, a, b = cones[i]
+        if (bx - ax) ** 2 + (by - ay) ** 2 - (b - a) ** 2 >= _END_ON * max(a, b) ** 2:
+            _cone(canvas, (ax, ay, az, a), (bx, by, bz, b), numbers[i])
+        else:  # seen from an end: one ball hides all but the rim of the other
+            _ellipsoid(canvas, (ax, ay, az), (a * a, 0.0, 0.0, a * a, 0.0, a * a), numbers[i])
+            _ellipsoid(canvas, (bx, by, bz), (b * b, 0.0, 0.0, b * b, 0.0, b * b), numbers[i])
+    for i in range(len(balls)):
+        (x, y, z), (xx, xy, xz), (_, yy, yz), (_, _, zz) = balls[i]
+        _ellipsoid(canvas, (x, y, z), (xx, xy, xz, yy, yz, zz), numbers[len(cones) + i])
+
+
+@jit
+def _cone(
+    canvas: Buffers, a: tuple[float, float, float, float], b: tuple[float, float, float, float], number: int
+) -> None:
+    """A round cone that is not seen from an end; of each end the centre and the radius.
+
+    Its surface is the farthest that any of its balls comes towards the viewer: at the pixel p the greatest
+    a_z + t d_z + sqrt(q(t)) for t in [0, 1], with q(t) = r(t)^2 - |p - c(t)|^2 in the picture's plane, where
+    q(t) = Q (A + 2 B t - t^2) and Q > 0. Without bounds it would be at t = B + d_z sqrt((B^2 + A) / (d_z^2 + Q)).
+    """
+    shade, place = canvas[2:]
+    ax, ay, az, radius = a
+    dx, dy, dz, widening = b[0] - ax, b[1] - ay, b[2] - az, b[3] - radius
+    Q = dx * dx + dy * dy - widening * widening
+    lean = dz / sqrt(dz * dz + Q)
+    widest, length = max(radius, b[3]), hypot(dx, dy)
+    rise = dy if abs(dy) > 1e-9 * length else 1e-9 * length
+    slope, half = dx / rise, widest * length / abs(rise)
+    left, step, per_Q, across = place[0] + 0.5 / place[2] - ax, 1.0 / place[2], 1.0 / Q, dx / Q
+    low_x, high_x = min(-radius, dx - b[3]), max(radius, dx + b[3])
+    first, after = _between(ay + max(radius, dy + b[3]), ay + min(-radius, dy - b[3]), place[1], -place[2], len(shade))
+    for row in range(first, after):
+        # Pixels lie in the cone's box, and in a strip along it that is as wide as its thicker end.
+        y = place[1] - (row + 0.5) / place[2] - ay
+        low, high = max(low_x, slope * y - half), min(high_x, slope * y + half)
+        start, end = _between(ax + low, ax + high, place[0], place[2], shade.shape[1])
+        row_A, row_B = (radius * radius - y * y) / Q, (radius * widening + dy * y) / Q  # what A and B are at x = 0
+        for column in range(start, end):
+            x = left + column * step
+            A, B = row_A - x * x * per_Q, row_B + x * across
+            t = min(max(B + lean * sqrt(max(B * B + A, 0.0)), 0.0), 1.0)
+            square = A + t * (2.0 * B - t)
+            if square > 0.0:
+                towards = sqrt(Q * square)
+                if _shows(canvas, row, column, az + t * dz + towards, number):
+                    bright = (_UP * (y - t * dy) + _TOWARDS * towards) / (radius + t * widening)
+                    shade[row, column] = _SHADE + (1.0 - _SHADE) * max(bright, 0.0)
+
+
+@jit
+def _ellipsoid(
+    canvas: Buffers,
+    centre: tuple[float, float, float],
+    square: tuple[float, float, float, float, float, float],
+    number: int,
+) -> None:
+    """An ellipsoid v' s^-1 v = 1 about its centre; `square` is the upper half of s = A A', row by row.
+
+    Over the pixel p of its shadow, the ellipse p' S^-1 p < 1 with S the picture's corner of s, the surface is at
+    k p + sqrt(d (1 - p' S^-1 p)), where k = S^-1 (s_xz, s_yz) and d = s_zz - k (s_xz, s_yz).
+    """
+    shade, place = canvas[2:]
+    xx, xy, xz, yy, yz, zz = square
+    det = xx * yy - xy * xy
+    ixx, ixy, iyy = yy / det, -xy / det, xx / det
+    kx, ky = ixx * xz + ixy * yz, ixy * xz + iyy * yz
+    d = zz - kx * xz - ky * yz
+    left, step = place[0] + 0.5 / place[2] - centre[0], 1.0 / place[2]
+    first, after = _between(centre[1] + sqrt(yy), centre[1] - sqrt(yy), place[1], -place[2], len(shade))
+    for row in range(first, after):
+        y = place[1] - (row + 0.5) / place[2] - centre[1]
+        middle, half = centre[0] + xy / yy * y, sqrt(max(det / yy * (1.0 - y * y / yy), 0.0))
+        start, end = _between(middle - half, middle + half, place[0], place[2], shade.shape[1])
+        for column in range(start, end):
+            x = left + column * step
+            px, py = ixx * x + ixy * y, ixy * x + iyy * y
+            rest = 1.0 - px * x - py * y
+            if rest > 0.0:
+                towards = sqrt(d * rest)
+                if _shows(canvas, row, column, centre[2] + kx * x + ky * y + towards, number):
+                    nz = towards / d
+                    nx, ny = px - kx * nz, py - ky * nz
+                    bright = (_UP * ny + _TOWARDS * nz) / sqrt(nx * nx + ny * ny + nz * nz)
+                    shade[row, column] = _SHADE + (1.0 - _SHADE) * max(bright, 0.0)
+
+
+@jit
+def _between(low: float, high: float, origin: float, scale: float, count: int) -> tuple[int, int]:
+    """The first of `count` pixels, `scale` to a metre from `origin` on, between two places, and the one after."""
+    first, after = (low - origin) * scale, (high - origin) * scale
+    return int(min(max(first, 0.0), count)), ceil(min(max(after, 0.0), count))
+
+
+@jit
+def _shows(canvas: Buffers, row: int, column: int, z: float, number: int) -> bool:
+    """Put a solid's surface at z into a pixel, and tell whether it is seen there."""
+    solid, depth, _, place = canvas
+    ahead, hair = z - depth[row, column], _HAIR / place[2]
+    depth[row, column] = max(depth[row, column], z)
+    if ahead <= hair and (ahead < -hair or number < solid[row, column]):
+        return False
+    solid[row, column] = number
+    return True
+
+
+@jit
+def colour(
+    picture: Pixels,
+    solid: Indices,
+    depth: Depths,
+    shade: Depths,
+    paints: Array,
+    parts: Parts,
+    haze: tuple[float, float, float],
+    step: float,
+    line: int,
+    ink: Pixels,
+) -> None:
+    """Paint what a canvas shows over a picture [H, W, 3].
+
+    Args:
+        picture: what is behind it, painted over.
+        solid, depth, shade: the canvas.
+        paints: RGB of the solids [N, 3].
+        parts: which part each is of [N]: between two parts, and round the body, there is a line.
+        haze: the depth at which it begins, that at which it is whole, and the share of white that it is then.
+        step: metres that a part must stand before another for a line between them; the line is on that other.
+        line: its width in pixels.
+        ink: its RGB [3].
+    """
+    height, width = solid.shape
+    clear, whole, most = haze
+    for row in range(height):
+        for column in range(width):
+            number = solid[row, column]
+            if number == EMPTY:
+                continue
+            z, behind = depth[row, column], False
+            for i in range(max(row - line, 0), min(row + line + 1, height)):
+                if solid[i, column] == EMPTY:
+                    picture[i, column] = ink
+                elif solid[i, column] != number and parts[solid[i, column]] != parts[number]:
+                    behind |= depth[i, column] > z + step
+            for j in range(max(column - line, 0), min(column + line + 1, width)):
+                if solid[row, j] == EMPTY:
+                    picture[row, j] = ink
+                elif solid[row, j] != number and parts[solid[row, j]] != parts[number]:
+                    behind |= depth[row, j] > z + step
+            if behind:
+                picture[row, column] = ink
+            else:
+                far = most * min(max((clear - z) / (clear - whole), 0.0), 1.0)
+                lit = (1.0 - far) * shade[row, column]
+                for channel in range(3):
+                    picture[row, column, channel] = int(paints[number, channel] * lit + 255.0 * far)
+
+
+@jit
+def halved(picture: Pixels) -> Pixels:
+    """A picture [H, W, 3] at half its width and height, each pixel the mean of four."""
+    height, width = len(picture) // 2, picture.shape[1] // 2
+    half = np.empty((height, width, 3), dtype=np.uint8)
+    for row in range(height):
+        for column in range(width):
+            for channel in range(3):
+                four = 2  # rounds
+                for at in range(4):
+                    four += picture[2 * row + at // 2, 2 * column + at % 2, channel]
+                half[row, column, channel] = four // 4
+    return half
