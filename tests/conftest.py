@@ -5,7 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from command_line import Ran, Run
 from hypothesis import HealthCheck, settings
+
+from motionmind.cli import main
 
 # The same examples on every run and every machine, and no failure because a machine was slow.
 settings.register_profile(
@@ -26,6 +29,22 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"recorded movement is not here: no folder {SHARED_DATA}")
     return SHARED_DATA
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """The command line in this process, in an empty folder, with a home of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MOTIONMIND_HOME", str(tmp_path / "home"))
+
+    def call(*arguments: object) -> Ran:
+        with pytest.raises(SystemExit) as end:
+            main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        assert isinstance(end.value.code, int)
+        return Ran(end.value.code, captured.out, captured.err)
+
+    return call
 
 
 _BAD = ["nan", "1e999", "1e300", "-", "{", "}", "[", "9" * 30, "End", "\0", "é", ":", ";", ",", "#", '"', "_", "0"]

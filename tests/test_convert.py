@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from command_line import Run
 
 from motionmind import rotations as rot
-from motionmind.cli import main
 from motionmind.formats import lost, read_motion, write_motion
 from motionmind.formats.bvh import read_bvh
 from motionmind.formats.npz import smpl_bodies
@@ -22,24 +22,10 @@ from motionmind.skeleton import Skeleton, human23, human44
 SUFFIXES = ["json", "bvh", "txt", "npz"]
 
 
-class Ran(NamedTuple):
-    code: int | str | None
-    out: str
-    err: str
-
-
 @pytest.fixture
-def convert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):  # type: ignore[no-untyped-def]
+def convert(run: Run) -> Run:
     """Runs `motionmind convert` in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Ran:
-        with pytest.raises(SystemExit) as end:
-            main(["convert", *map(str, arguments)])
-        shown = capsys.readouterr()
-        return Ran(end.value.code, shown.out, shown.err)
-
-    return run
+    return partial(run, "convert")
 
 
 def moving(skeleton: Skeleton, frames: int = 8, seed: int = 0) -> Motion:

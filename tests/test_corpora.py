@@ -252,3 +252,40 @@ def test_a_mirrored_score_mirrors_the_movement(tmp_path: Path) -> None:
 def _opposite(name: str) -> str:
     side, _, joint = name.partition("_")
     return {"left": f"right_{joint}", "right": f"left_{joint}"}.get(side, name)
+
+
+def test_kata_end_where_they_began(clips: dict[str, list[tuple[Score, list[Row], Motion]]]) -> None:
+    for _, rows, motion in clips["karate"]:
+        assert rows[-1].face % 360 == rows[0].face % 360, motion.name
+        assert np.linalg.norm((motion.root[-1] - motion.root[0])[[0, 2]]) < 0.10, motion.name
+
+
+def test_the_hand_at_the_barre_stays_at_its_height(clips: dict[str, list[tuple[Score, list[Row], Motion]]]) -> None:
+    """Whatever the legs and the torso do: the barre is 1.05 m high, and nothing lifts or sinks it by a hand."""
+    at_barre = 0
+    for score, rows, motion in clips["ballet"]:
+        skeleton = score.body.skeleton
+        places = skeleton.positions(motion.rotations, motion.root)
+        for side, name in enumerate(("left", "right")):
+            held = [row.limbs[1][side].get(("fingers", 2)) == -38.0 for row in rows]
+            heights = places[held, skeleton.index(f"{name}_fingers"), 1]
+            at_barre += len(heights)
+            assert np.all(np.abs(heights - 1.05) < 0.12), motion.name
+    assert at_barre > 400
+
+
+def test_an_insect_that_goes_slowly_could_stop_at_any_time(
+    clips: dict[str, list[tuple[Score, list[Row], Motion]]],
+) -> None:
+    """But for the tripod gait, which is fast, the centre of mass is over the polygon of the feet on the floor."""
+    for score, _, motion in clips["walk-hexapod"]:
+        if motion.name == "tripod":
+            continue
+        skeleton = score.body.skeleton
+        legs = [f"{side}_{leg}_tibia" for side in ("left", "right") for leg in ("fore", "middle", "hind")]
+        ends = [len(skeleton) + skeleton.index(leg) for leg in legs]
+        tips = skeleton.positions_and_tips(motion.rotations, motion.root)[:, ends]
+        centres = score.body.centre_of_mass(motion.rotations, motion.root)[:, [0, 2]]
+        for t, feet in enumerate(tips):
+            hull = ConvexHull(feet[feet[:, 1] < 0.004][:, [0, 2]])
+            assert (hull.equations @ [*centres[t], 1.0]).max() < 0.0, f"{motion.name} posture {t}"

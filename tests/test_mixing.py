@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.cli import main
 from motionmind.corpus.gather import gather
 from motionmind.discretize import Codebook
 from motionmind.engine import Engine
@@ -762,31 +762,6 @@ def test_gathered_clips_are_mirrored_and_priced() -> None:
 
 
 # --- the command line -------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Ran:
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Ran]
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MOTIONMIND_HOME", str(tmp_path / "home"))
-
-    def call(*arguments: object) -> Ran:
-        with pytest.raises(SystemExit) as end:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert isinstance(end.value.code, int)
-        return Ran(end.value.code, captured.out, captured.err)
-
-    return call
 
 
 def test_a_corpus_is_built_of_files_and_another_corpus_and_tells_it(run: Run) -> None:

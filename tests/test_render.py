@@ -5,20 +5,19 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
+from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from motionmind import rotations as rot
-from motionmind.cli import main
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
@@ -708,23 +707,6 @@ def test_the_balls_of_bridges_have_room() -> None:
 
 
 # --- the command ----------------------------------------------------------------------------------------------------
-
-Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """The command line in this process, in an empty folder: its exit code, and what it prints."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main([str(argument) for argument in arguments])
-        assert isinstance(end.value.code, int)
-        captured = capsys.readouterr()
-        return end.value.code, captured.out, captured.err
-
-    return call
 
 
 def opened(path: str) -> NDArray[np.uint8]:
