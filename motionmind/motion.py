@@ -161,15 +161,18 @@ class Motion:
             raise MotionMindError(
                 f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
             )
-        if len(self) == 1:
-            return self
         span = self.times[-1] - self.times[0]
         steps = int(np.floor(span * rate + 1e-3))
-        times = self.times[0] + np.arange(steps + 1) / rate
-        at = np.minimum(times, self.times[-1])
-        after = np.clip(np.searchsorted(self.times, at, side="right"), 1, len(self) - 1)
+        return self.at(self.times[0] + np.arange(steps + 1) / rate)
+
+    def at(self, times: Array) -> Motion:
+        """The motion at increasing `times`, seconds: rotations by slerp, root linear; its ends stay beyond them."""
+        if len(self) == 1:
+            frames = np.zeros(len(times), dtype=int)
+            return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times)
+        after = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self) - 1)
         before = after - 1
-        share = (at - self.times[before]) / (self.times[after] - self.times[before])
+        share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
         return replace(
             self,
             rotations=rot.normalise(rot.slerp(self.rotations[before], self.rotations[after], share[:, None])),

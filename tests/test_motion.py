@@ -189,6 +189,20 @@ def test_a_slice_keeps_its_times() -> None:
         motion.slice(3, 3)
 
 
+def test_at_any_time_the_motion_is_between_its_neighbours_and_beyond_its_ends_it_stays() -> None:
+    motion = some_motion(5)
+    middles = 0.5 * (motion.times[1:] + motion.times[:-1])
+    between = motion.at(middles)
+    half = rot.angle(motion.rotations[:-1], motion.rotations[1:]) / 2.0
+    np.testing.assert_allclose(rot.angle(between.rotations, motion.rotations[:-1]), half, atol=1e-7)
+    np.testing.assert_allclose(rot.angle(between.rotations, motion.rotations[1:]), half, atol=1e-7)
+    np.testing.assert_allclose(between.root, 0.5 * (motion.root[1:] + motion.root[:-1]), atol=1e-12)
+    np.testing.assert_allclose(motion.at(motion.times).rotations, motion.rotations, atol=1e-12)
+    beyond = motion.at(np.array([-7.0, 99.0]))
+    np.testing.assert_allclose(beyond.root, motion.root[[0, -1]], atol=1e-12)
+    np.testing.assert_allclose(some_motion(1).at(np.array([0.0, 1.0])).rotations, some_motion(1).rotations[[0, 0]])
+
+
 def test_frames_a_second_is_the_usual_step() -> None:
     assert some_motion(5, 25.0).fps == pytest.approx(25.0)
     assert some_motion(1).fps == 0.0

@@ -27,8 +27,9 @@ COLOURS = {
 INSERTED = COLOURS | {LEFT: (190, 95, 130), RIGHT: (95, 105, 195), MIDDLE: (140, 90, 200)}  # what the engine made
 BRIDGED = (20, 190, 120)  # balls around joints amid a move that no corpus attests
 INK = (34, 30, 34)
-_STEP = 0.016  # metres by which a part must stand before another for a line between them
+STEP = 0.016  # metres by which a part must stand before another for a line between them
 _HAZE = 0.30  # share of white in what is farthest from the viewer
+_DEEP = 0.45  # metres before and behind the root between which the haze grows, on a body 1.70 m tall
 _STANDS_OUT = 1.2  # radius of a bridged joint's ball by that of the body there
 _LEAST_BALL = 0.050  # metres, on a body 1.70 m tall
 
@@ -126,6 +127,11 @@ def _girths(body: Body) -> Array:
     return np.asarray(np.maximum(_STANDS_OUT * radii, _LEAST_BALL * body.size))
 
 
+def haze(body: Body) -> tuple[float, float, float]:
+    """The depths where haze begins and where it is full, metres in the viewer's axes, and how much white that is."""
+    return _DEEP * body.size, -_DEEP * body.size, _HAZE
+
+
 def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints: Array | None = None) -> Pixels:
     """The picture [H, W, 3] of what is on a canvas, before a background of the same shape.
 
@@ -140,10 +146,9 @@ def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints
     parts = np.array([names[part] for part in body.parts] + [len(names)] * joints)
     colours = np.concatenate([plain(body) if paints is None else paints, np.tile(BRIDGED, (joints, 1))]).astype(float)
     picture = background.copy()
-    haze = 0.45 * body.size, -0.45 * body.size, _HAZE
     ink = np.array(INK, dtype=np.uint8)
     shown = canvas.solid, canvas.depth, canvas.shade
-    raster.colour(picture, *shown, colours, parts, haze, _STEP * body.size, line, ink)
+    raster.colour(picture, *shown, colours, parts, haze(body), STEP * body.size, line, ink)
     return picture
 
 

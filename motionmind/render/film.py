@@ -1,0 +1,221 @@
+"""Films and stills of movement: `.gif` and `.mp4`, and one posture as `.png`.
+
+Frames are drawn one after another as they are encoded; never are more than two of them held.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from fractions import Fraction
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import GifImagePlugin, Image
+
+from motionmind.errors import MotionMindError
+from motionmind.formats.files import FilePath, write_atomically
+from motionmind.jit import jit
+from motionmind.motion import Motion
+from motionmind.render.figure import Pixels
+from motionmind.render.stage import HOLD, Stage, frame_rate, moments
+
+Indices = NDArray[np.uint8]
+Table = NDArray[np.int16]
+
+_GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second, at most: by default; and the most that browsers show in time
+_MP4_RATE, _MP4_MOST = 60.0, 120.0
+_COLOURS = 255  # of a GIF's palette; one more stands for what has not changed
+_SAMPLES = 10  # frames from which the palette is chosen
+_CELLS = 64  # of each of red, green and blue that are looked up as one colour of the palette
+_SHIFT = 2  # bits that these leave of a byte
+_QUALITY = 17  # x264's constant rate factor, at which drawn figures show no blocks
+
+
+def write_film(
+    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480
+) -> None:
+    """Film a motion: `.gif`, which loops and holds its last posture for 0.8 s, or `.mp4` (H.264).
+
+    The first and the last posture are among the frames. Times are honest: a GIF lasts as long as the motion, to a
+    hundredth of a second and but for the hold, an MP4 to a frame.
+
+    Args:
+        path: where it goes.
+        motion: movement on any skeleton.
+        fps: frames a second; by default the motion's own, at most 25 in a GIF and 60 in an MP4.
+        view: from where it is seen, as `Stage` has it.
+        size: height in pixels, as `Stage` has it.
+
+    Raises:
+        MotionMindError: the suffix is another, a number is out of range, the extra for MP4 is not installed, or the
+            file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in {".gif", ".mp4"}:
+        raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a name without suffix'}")
+    usual, most = (_GIF_RATE, _GIF_MOST) if suffix == ".gif" else (_MP4_RATE, _MP4_MOST)
+    rate = min(frame_rate(motion), usual) if fps is None else fps
+    if not 0.0 < rate <= most:
+        raise MotionMindError(f"{path}: a {suffix} has more than 0 and at most {most:g} frames a second, not {rate:g}")
+    stage = Stage(motion, moments(motion, rate), view=view, size=size)
+    write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
+
+
+def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: int = 480) -> None:
+    """Draw a motion of one posture as `.png`; arguments and errors as for `write_film`."""
+    if len(motion) != 1 or Path(path).suffix.lower() != ".png":
+        raise MotionMindError(f"{path}: a still is a .png of one posture, not of {len(motion)}")
+    file = BytesIO()
+    Image.fromarray(Stage(motion, view=view, size=size).picture(0)).save(file, "png")
+    write_atomically(path, file.getvalue())
+
+
+# --- GIF --------------------------------------------------------------------------------------------------------------
+
+
+def gif(stage: Stage) -> bytes:
+    """The film of a stage as a GIF: of each frame only the box that has changed, and in it only what has."""
+    palette, height, width = _palette(stage), stage.camera.height, stage.camera.width
+    table = np.full(_CELLS**3, -1, dtype=np.int16)
+    shown = np.full((height, width), _COLOURS, dtype=np.uint8)
+    parts = [
+        b"GIF89a" + _short(width) + _short(height) + b"\xf7\x00\x00",  # 0xf7: one palette of 256 colours
+        palette.tobytes(),
+        b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00",  # loops for ever
+    ]
+    for picture, hold in zip(stage.frames(), _delays(stage), strict=True):
+        changed = np.empty_like(shown)
+        top, bottom, left, right = _index(picture, palette, table, shown, changed)
+        box = Image.fromarray(changed[top:bottom, left:right])
+        # Leave the frame before where this one is transparent, which is what has not changed.
+        parts.append(b"\x21\xf9\x04\x05" + _short(hold) + bytes([_COLOURS, 0]))
+        parts += GifImagePlugin.getdata(box, (left, top))
+    return b"".join([*parts, b";"])
+
+
+def _delays(stage: Stage) -> list[int]:
+    """How long each frame is shown, in hundredths of a second: roundings do not add up."""
+    marks = np.round(100.0 * (stage.motion.times - stage.motion.times[0])).astype(int)
+    return [*np.diff(marks).tolist(), round(100.0 * HOLD)]
+
+
+def _palette(stage: Stage) -> Pixels:
+    """Colours [256, 3] for all frames, so that nothing flickers: from frames of all kinds, the last one unused.
+
+    A colour counts by the root of how often it is there, or paper and floor would leave nothing for small things.
+    """
+    of_each_kind = [np.flatnonzero(kind)[:1] for kind in (stage.motion.inserted(), stage.motion.bridged().any(axis=1))]
+    even = np.linspace(0, len(stage) - 1, _SAMPLES).astype(int)
+    tally = np.zeros((_CELLS**3, 4))
+    for picture in stage.frames(np.unique(np.concatenate([even, *of_each_kind])).tolist()):
+        _count(picture, tally)
+    cells = tally[tally[:, 3] > 0.0]
+    colours = np.round(cells[:, :3] / cells[:, 3:]).astype(np.uint8)
+    sample = np.repeat(colours, np.ceil(np.sqrt(cells[:, 3])).astype(int), axis=0)
+    quantised = Image.fromarray(sample[None]).quantize(_COLOURS, Image.Quantize.MEDIANCUT, kmeans=1)
+    chosen = np.array(quantised.getpalette(), dtype=np.uint8).reshape(-1, 3)[:_COLOURS]
+    return np.concatenate([chosen, np.zeros((_COLOURS + 1 - len(chosen), 3), dtype=np.uint8)])
+
+
+def _short(number: int) -> bytes:
+    return number.to_bytes(2, "little")
+
+
+@jit
+def _count(picture: Pixels, tally: NDArray[np.float64]) -> None:
+    """Add the colours of a picture [H, W, 3] to the sums of red, green and blue in each cell, and their number."""
+    for row in picture:
+        for r, g, b in row:
+            cell = ((r >> _SHIFT) * _CELLS + (g >> _SHIFT)) * _CELLS + (b >> _SHIFT)
+            tally[cell, 0] += r
+            tally[cell, 1] += g
+            tally[cell, 2] += b
+            tally[cell, 3] += 1.0
+
+
+@jit
+def _index(
+    picture: Pixels, palette: Pixels, table: Table, shown: Indices, changed: Indices
+) -> tuple[int, int, int, int]:
+    """Bring a picture [H, W, 3] onto the palette, and find what is new in it.
+
+    Args:
+        picture: the picture.
+        palette: RGB [256, 3].
+        table: the palette's colour nearest to each cell's middle, -1 where it has not been asked for; it is filled in.
+        shown: what the frame before showed [H, W]; what this one shows, afterwards.
+        changed: takes this frame's colours where they are new, else the last of the palette.
+
+    Returns:
+        The box of what is new: its first row, the row after it, its first column, and the column after it.
+    """
+    height, width = shown.shape
+    top, bottom, left, right = height, 0, width, 0
+    for y in range(height):
+        for x in range(width):
+            r, g, b = picture[y, x, 0] >> _SHIFT, picture[y, x, 1] >> _SHIFT, picture[y, x, 2] >> _SHIFT
+            cell = (r * _CELLS + g) * _CELLS + b
+            if table[cell] < 0:
+                middle = 1 << (_SHIFT - 1)
+                best = 1 << 30
+                for colour in range(_COLOURS):
+                    dr = palette[colour, 0] - ((r << _SHIFT) + middle)
+                    dg = palette[colour, 1] - ((g << _SHIFT) + middle)
+                    db = palette[colour, 2] - ((b << _SHIFT) + middle)
+                    apart = dr * dr + dg * dg + db * db
+                    if apart < best:
+                        best, table[cell] = apart, colour
+            changed[y, x] = _COLOURS
+            if table[cell] != shown[y, x]:
+                shown[y, x] = changed[y, x] = table[cell]
+                top, bottom, left, right = min(top, y), y + 1, min(left, x), max(right, x + 1)
+    if bottom == 0:  # nothing is new, but a frame has a pixel at least
+        return 0, 1, 0, 1
+    return top, bottom, left, right
+
+
+# --- MP4 --------------------------------------------------------------------------------------------------------------
+
+
+def mp4(stage: Stage, rate: float) -> bytes:
+    """The film of a stage as H.264 in an MP4, at `rate` frames a second; MotionMindError where no encoder is there."""
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise MotionMindError('.mp4 needs an encoder: pip install "motionmind[film]"') from None
+    with TemporaryDirectory() as folder:
+        file, log = Path(folder) / "film.mp4", Path(folder) / "log"
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), *_arguments(stage, rate), str(file)]
+        with log.open("w+b") as said, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as encoder:
+            _feed(encoder.stdin, stage.frames())
+        if encoder.returncode != 0:
+            lines = log.read_text(errors="replace").strip().splitlines() or ["it says nothing"]
+            raise MotionMindError(f"the MP4 encoder failed: {lines[0]}")
+        return file.read_bytes()
+
+
+def _arguments(stage: Stage, rate: float) -> list[str]:
+    # Colours are brought to BT.709 and said to be so, or players guess, and reds turn orange. The number of threads is
+    # fixed, because it shows in the bytes.
+    size = f"{stage.camera.width}x{stage.camera.height}"
+    raw = f"-f rawvideo -pix_fmt rgb24 -s {size} -r {Fraction(rate).limit_denominator(1001)}"
+    video = f"-c:v libx264 -preset medium -crf {_QUALITY} -tune animation -threads 2"
+    colour = "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -color_range tv"
+    convert = "-vf scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"
+    whole = "-an -movflags +faststart -fflags +bitexact -flags:v +bitexact"
+    return f"-y -nostdin -loglevel error {raw} -i - {convert} {video} {colour} {whole}".split()
+
+
+def _feed(pipe: IO[bytes] | None, pictures: Iterator[Pixels]) -> None:
+    assert pipe is not None
+    try:
+        for picture in pictures:
+            pipe.write(picture.tobytes())
+        pipe.close()
+    except BrokenPipeError:  # the encoder has given up, and its log says why
+        pass
