@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import all_or_none, check_outputs, read, read_mapping
+from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, read, read_mapping, write
 from motionmind.cli.options import (
     COUNT,
     FILE,
     HOME,
     NATS,
+    OUTPUTS,
     RATE,
     InOrder,
     example,
@@ -23,6 +24,7 @@ from motionmind.cli.options import (
 )
 from motionmind.cli.printing import count, note, print_tween, progress
 from motionmind.errors import MotionMindError
+from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.formats.papers import Form
@@ -50,7 +52,7 @@ def app(context: click.Context) -> None:
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
 @click.option("--corpus", required=True, metavar="NAME", help="Corpus whose style it takes, by name or folder.")
-@click.option("-o", "--output", type=FILE, help="Where the motion goes: .json, .bvh or .glb.")
+@click.option("-o", "--output", type=FILE, help=f"Where it goes: {OUTPUTS}.")
 @click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
 @click.option("--moves", type=COUNT, metavar="N", help="Number of moves  [default: the search finds it]")
 @click.option("--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find.")
@@ -83,11 +85,11 @@ def tween(
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
     from motionmind.engine import Engine
-    from motionmind.formats import read_posture, write_atomically, write_motion
+    from motionmind.formats import read_posture, write_atomically
     from motionmind.jit import is_compiled
 
     alone = report == Path("-")
-    wanted = ((output, (".json", ".bvh", ".glb")), (None if alone else report, ()), (problem, (".cfn",)))
+    wanted = ((output, MOVEMENT + PICTURES), (None if alone else report, ()), (problem, (".cfn",)))
     written = check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
@@ -97,7 +99,7 @@ def tween(
     text = json.dumps(result.report())
     with all_or_none(written):
         if output:
-            write_motion(output, result.motion)
+            write(output, result.motion)
         if problem:
             write_atomically(problem, result.problem().encode())
         if report and not alone:
@@ -113,7 +115,7 @@ def tween(
 @click.option(
     "--frame", type=int, metavar="N", required=True, help="Number of the frame, from 0; negative from the end."
 )
-@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh, .glb or .txt.")
+@click.option("-o", "--output", type=FILE, required=True, help=f"Where it goes: {OUTPUTS}; or .txt.")
 @reading
 def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
     """Take one posture out of a clip.
@@ -121,12 +123,11 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own, as on
     human44.
     """
-    from motionmind.formats import write_posture
     from motionmind.learned import own_skeleton
 
-    check_outputs([(output, (".json", ".bvh", ".glb", ".txt"))], [clip])
+    check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], [clip])
     motion = own_skeleton(read(clip, **source), read_mapping(joints))
-    write_posture(output, motion.posture(frame))
+    write(output, motion.posture(frame))
     click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
 
 

@@ -9,10 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
+from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
-    from motionmind.motion import Motion
+    from motionmind.motion import Motion, Posture
+
+MOVEMENT = (".json", ".bvh", ".glb", ".npz")
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
@@ -20,6 +24,24 @@ def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | Non
     from motionmind.formats import read_motion
 
     return read_motion(path, unit=unit, asf=asf, fps=source_fps)
+
+
+def write(path: Path, thing: Motion | Posture) -> None:
+    """Movement into a file, as movement or as a picture, as its suffix says; what it has no place for is said."""
+    from motionmind.formats import lost, write_motion, write_posture
+    from motionmind.motion import Posture
+    from motionmind.render.pictures import write_picture
+
+    motion = thing.as_motion() if isinstance(thing, Posture) else thing
+    if path.suffix.lower() in PICTURES:
+        write_picture(path, motion)
+        return
+    if isinstance(thing, Posture):
+        write_posture(path, thing)
+    else:
+        write_motion(path, thing)
+    if missing := lost(motion, path):
+        note(f"{path}: no place for {'; '.join(missing)}")
 
 
 def read_mapping(path: Path | None) -> dict[str, str] | None:

@@ -40,6 +40,7 @@ EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 COUNT = click.IntRange(min=1)
 NATS = Number(min=0)
+OUTPUTS = "movement (.json, .bvh, .glb, .npz), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
 RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.motion.FASTEST`
 
 HOME = click.option(

@@ -1,4 +1,4 @@
-"""The command that draws."""
+"""The commands that draw."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ import click
 
 from motionmind.cli.commands import app
 from motionmind.cli.files import all_or_none, check_outputs, read, read_mapping
-from motionmind.cli.options import COUNT, HOME, example, reading
+from motionmind.cli.options import COUNT, FILE, HOME, RATE, example, reading
 from motionmind.cli.printing import count
 from motionmind.errors import MotionMindError
+from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.motion import Motion
 
+_ON_A_SHEET = 48  # postures on a sheet where nobody says which
 _ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
 
 
@@ -72,8 +74,7 @@ def sheet(
     Each has its frame's number, which posture --frame takes, and its time. SOURCE is a file of movement, a score, or a
     corpus by its name or folder; scores and corpora hold clips, of which --clip takes some.
     """
-    from motionmind.formats import write_atomically
-    from motionmind.render.sheet import check_frames, contact_sheet, png
+    from motionmind.render.sheet import check_frames
 
     many = _holds_clips(source, home)
     folder = output if many and (output.is_dir() or not output.suffix) else None
@@ -93,10 +94,64 @@ def sheet(
     paths = _files_in(folder, motions, source) if folder else [output]
     with all_or_none(paths):
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
-            picture = contact_sheet(motion, drawn, columns=columns, side=side)
-            write_atomically(path, png(picture))
-            words = count(len(drawn), "posture")
-            click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
+            _write_sheet(path, motion, drawn, columns=columns, side=side)
+
+
+@app.command(epilog=example("motionmind render tween.json -o tween.gif"))
+@click.argument("source", type=_ANY)
+@click.option(
+    "-o", "--output", type=FILE, required=True, help="Where it goes: .png, .gif, .mp4, .svg (a film too) or .html."
+)
+@click.option("--clip", "name", metavar="NAME", help="Which clip of a score or a corpus  [default: its only one]")
+@click.option("--from", "start", type=int, metavar="N", default=0, help="First frame; negative from the end.")
+@click.option("--to", "end", type=int, metavar="N", default=-1, help="Last frame; negative from the end.")
+@click.option("--fps", type=RATE, help="Frames a second of a film  [default: the movement's own]")
+@click.option(
+    "--view",
+    type=click.Choice(["quarter", "front", "side", "left", "top"]),
+    help="From where a film or a posture is seen  [default: quarter]",
+)
+@click.option("--size", type=click.IntRange(120, 2160), metavar="PIXELS", help="How high  [default: 480]")
+@reading
+@HOME
+def render(
+    source: Path, output: Path, name: str | None, start: int, end: int, home: Path | None, **options: Any
+) -> None:
+    """Draw movement: as a picture, a film, or a page to play it in.
+
+    SOURCE is a file of movement, a score, or a corpus by its name or folder. .png is one posture, or a sheet of up to
+    48 of them, evenly spread (the command sheet has more to choose); .html is a page that plays the movement in any
+    browser, from disk, offline. What the engine inserted is drawn in violet, a joint that it bridged has a green ball.
+    """
+    from motionmind.render.pictures import write_picture
+
+    seen = {key: options.pop(key) for key in ("fps", "view", "size")}
+    check_outputs([(output, PICTURES)], [source])
+    many = _holds_clips(source, home)
+    if name and not many:
+        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
+    found = _clips(source, (name,) if name else (), home) if many else [_movement(source, **options)]
+    if len(found) != 1:
+        raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
+    motion, frames = found[0], _range(source, len(found[0]), start, end)
+    part = motion.slice(frames.start, frames.stop)
+    if output.suffix.lower() == ".png" and len(part) > 1 and not any(seen.values()):
+        _write_sheet(output, motion, _spread(frames, None, _ON_A_SHEET))  # numbered as in the whole
+        return
+    write_picture(output, part, **seen)
+    seconds = part.times[-1] - part.times[0]
+    kilobytes = output.stat().st_size / 1000
+    click.echo(f"{output}: {count(len(part), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
+
+
+def _write_sheet(path: Path, motion: Motion, frames: Sequence[int], **options: Any) -> None:
+    from motionmind.formats import write_atomically
+    from motionmind.render.sheet import contact_sheet, png
+
+    picture = contact_sheet(motion, frames, **options)
+    write_atomically(path, png(picture))
+    words = count(len(frames), "posture")
+    click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
 
 
 def _holds_clips(source: Path, home: Path | None) -> bool:

@@ -7,16 +7,17 @@ from pathlib import Path
 import click
 
 from motionmind.cli.commands import app
-from motionmind.cli.files import check_outputs
-from motionmind.cli.options import FILE, RATE, example, tolerances
+from motionmind.cli.files import MOVEMENT, check_outputs, write
+from motionmind.cli.options import FILE, OUTPUTS, RATE, example, tolerances
 from motionmind.cli.printing import count
+from motionmind.render import PICTURES
 
 _TOLERANCE = 12.0  # degrees for joints of which --tolerance does not speak
 
 
 @app.command(epilog=example("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh"))
 @click.argument("score", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Where it goes: .json, .bvh or .glb.")
+@click.option("-o", "--output", type=FILE, required=True, help=f"Where it goes: {OUTPUTS}.")
 @click.option("--clip", metavar="NAME", help="Which of its clips  [default: its only one]")
 @click.option("--posture", metavar="NAME", help="A posture that it names, instead of a clip.")
 @click.option("--fps", type=RATE, help="Frames a second  [default: a frame a posture]")
@@ -25,7 +26,6 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
 
     docs/notation.md explains how scores are written.
     """
-    from motionmind.formats import write_motion, write_posture
     from motionmind.notation import compose as notation
     from motionmind.notation.read import read_score
 
@@ -33,16 +33,16 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
         raise click.UsageError("--clip or --posture, not both")
     if fps and posture:
         raise click.UsageError("--fps is for clips; a posture has no frames a second")
-    check_outputs([(output, (".json", ".bvh", ".glb"))], [score])
+    check_outputs([(output, MOVEMENT + PICTURES)], [score])
     if posture:
         found = notation.posture(read_score(score), posture)
-        write_posture(output, found)
+        write(output, found)
         click.echo(f"{output}: {posture}, {len(found.skeleton)} joints ({found.skeleton.name})")
         return
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
     motion = motion if fps is None else motion.resample(fps)
-    write_motion(output, motion)
+    write(output, motion)
     click.echo(f"{output}: {motion.name}, {count(len(motion), 'frame')} in {seconds:.1f} s, {motion.skeleton.name}")
 
 
