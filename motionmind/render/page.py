@@ -1,0 +1,121 @@
+"""A motion as a page: one HTML file that plays it in any browser, from disk, without a network.
+
+The player's modules and three.js lie in `player/`, as they were written; there is no build step. A page opened from
+disk may not load one file from another, so each module goes into the page as a data: URL, and an import map says which
+name is which. The page forbids itself every request.
+"""
+
+from __future__ import annotations
+
+import html
+from base64 import b64encode
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.formats.files import FilePath, write_atomically
+from motionmind.motion import Motion
+from motionmind.render.anatomy import Body, body_of
+from motionmind.render.figure import BRIDGED, COLOURS, INK, INSERTED, bridge_balls
+
+Array = NDArray[np.float64]
+
+_PLAYER = Path(__file__).parent / "player"
+_THREE = {"three": "three.module.min.js", "three/core": "three.core.min.js", "three/OrbitControls": "OrbitControls.js"}
+_CORE = b'from"./three.core.min.js"'  # a path means nothing to a module that is a URL of its own
+_BITS = 20  # of each of the three numbers that a quaternion is written as
+# Which coefficients are written of a quaternion, by which is left out.
+_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
+
+
+def page(motion: Motion) -> str:
+    """The page that plays `motion`, on any skeleton."""
+    return Template(_text("page.html")).substitute(
+        title=html.escape(motion.name or motion.skeleton.name),
+        style=_text("player.css"),
+        modules=_modules(),
+        # numpy's numbers are floats; within a script element nothing but "<" can end it.
+        data=msgspec.json.encode(_data(motion), enc_hook=float).decode().replace("<", "\\u003c"),
+    )
+
+
+def write_page(path: FilePath, motion: Motion) -> None:
+    """Write the page that plays `motion` to `path`; MotionMindError if it cannot be written."""
+    write_atomically(path, page(motion).encode())
+
+
+@cache
+def _modules() -> str:
+    """The import map."""
+    sources = {f"motionmind/{file.stem}": file.read_bytes() for file in sorted(_PLAYER.glob("*.js"))}
+    for name, file in _THREE.items():
+        sources[name] = (_PLAYER / "three" / file).read_bytes().replace(_CORE, b'from"three/core"')
+    urls = {name: f"data:text/javascript;charset=utf-8;base64,{_base64(source)}" for name, source in sources.items()}
+    return msgspec.json.encode({"imports": urls}).decode()
+
+
+def _data(motion: Motion) -> dict[str, Any]:
+    """What the player reads; player/README.md says what is what."""
+    skeleton = motion.skeleton
+    body = body_of(skeleton)
+    return {
+        "name": motion.name,
+        "skeleton": {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist()},
+        "body": _body_data(body),
+        "colours": {"given": COLOURS, "inserted": INSERTED, "bridged": BRIDGED, "ink": INK},
+        "times": _base64(motion.times.astype("<f8").tobytes()),
+        "root": _base64(motion.root.astype("<f4").tobytes()),
+        "rotations": _base64(packed(motion.rotations).tobytes()),
+        "insertions": [
+            {
+                "times": one.times.tolist(),
+                "bridged": [{"joint": skeleton.index(joint), "move": move} for joint, move in one.bridged],
+            }
+            for one in motion.insertions
+        ],
+    }
+
+
+def _body_data(body: Body) -> dict[str, Any]:
+    joints = len(body.skeleton)
+    marks = bridge_balls(body, np.zeros((joints, 3)), np.ones(joints, dtype=bool))
+    return {
+        "size": body.size,
+        "frames": [asdict(frame) for frame in body.frames],
+        "cones": [asdict(cone) for cone in body.cones],
+        "balls": [asdict(ball) for ball in body.balls],
+        "marks": marks.axes[:, 0, 0].tolist(),
+    }
+
+
+def packed(rotations: Array) -> NDArray[np.uint64]:
+    """Unit quaternions [..., 4] in 64 bits each [...], to 1e-6 a coefficient.
+
+    The coefficient that is largest in size follows from the others, so it is left out; `q` and `-q` being the same
+    rotation, it is taken as positive. From the highest bit on: which it is (4 bits), and the other three in their
+    order, 20 bits each, as whole numbers from 0 to 2^20 - 2 for -1 / sqrt(2) to 1 / sqrt(2). Source: Fiedler,
+    "Snapshot compression" (gafferongames.com, 2015), "smallest three".
+    """
+    largest = np.argmax(np.abs(rotations), axis=-1)
+    sign = np.where(np.take_along_axis(rotations, largest[..., None], axis=-1) < 0.0, -1.0, 1.0)
+    others = sign * np.take_along_axis(rotations, _OTHERS[largest], axis=-1)
+    most = 2 ** (_BITS - 1) - 1
+    levels = np.rint((np.sqrt(2.0) * others).clip(-1.0, 1.0) * most + most).astype("<u8")
+    word = largest.astype("<u8")
+    for i in range(3):
+        word = word << np.uint64(_BITS) | levels[..., i]
+    return np.asarray(word.astype("<u8"))
+
+
+def _text(name: str) -> str:
+    return (_PLAYER / name).read_text(encoding="utf-8")
+
+
+def _base64(data: bytes) -> str:
+    return b64encode(data).decode("ascii")

@@ -1,0 +1,154 @@
+/** The page: what is on it, put together; buttons and keys. README.md describes `window.motionmind`. */
+
+import { Body } from "motionmind/body";
+import { Motion } from "motionmind/motion";
+import { Player } from "motionmind/player";
+import { Stage } from "motionmind/stage";
+import { Timeline } from "motionmind/timeline";
+
+const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
+const VIEWS = ["front", "side", "top", "quarter"];
+
+const $ = (id) => document.getElementById(id);
+
+function start() {
+  const data = JSON.parse($("data").textContent);
+  const motion = new Motion(data);
+  const body = new Body(data.skeleton, data.body);
+  let stale = true; // the picture is not that of now
+  const stage = makeStage(motion, body, data.colours, () => (stale = true));
+  if (!stage) return;
+  const player = new Player(motion);
+  const timeline = new Timeline($("timeline"), player, data.colours);
+  const moving = motion.length > 1;
+  for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
+  $("ends").hidden = motion.insertions.length === 0;
+
+  const refresh = () => {
+    stale = true;
+    describe(player);
+  };
+  player.addEventListener("change", refresh);
+  bind(player, stage, refresh);
+
+  let last = performance.now();
+  const draw = (now) => {
+    player.advance(Math.min((now - last) / 1000, LONGEST));
+    last = now;
+    if (stale) {
+      stale = false;
+      stage.show(player.time, {
+        ends: pressed("ends"),
+        onion: pressed("onion") ? Number($("apart").value) : 0,
+      });
+      stage.render();
+    }
+    requestAnimationFrame(draw);
+  };
+  timeline.update();
+  refresh();
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
+  requestAnimationFrame(draw);
+
+  window.motionmind = { motion, body, player, stage, timeline, solids: (frame) => solids(motion, body, frame) };
+}
+
+/** The stage; undefined, and a message on the page, where the browser cannot draw it. */
+function makeStage(...things) {
+  try {
+    return new Stage($("canvas"), ...things);
+  } catch (error) {
+    $("message").hidden = false;
+    $("message").textContent =
+      "This browser shows no 3D pictures (WebGL 2 is not available), so the movement cannot be shown. " +
+      "Turn on hardware acceleration in its settings, or open the page in another browser.";
+    for (const element of document.querySelectorAll("footer, #views, #canvas")) element.hidden = true;
+    return undefined;
+  }
+}
+
+/** Buttons and keys. */
+function bind(player, stage, refresh) {
+  const switched = (id) => () => {
+    $(id).setAttribute("aria-pressed", String(!pressed(id)));
+    refresh();
+  };
+  const look = (view) => () => {
+    stage.look(view);
+    for (const name of VIEWS) $(name).setAttribute("aria-pressed", String(name === view));
+    refresh();
+  };
+  const actions = {
+    play: () => player.toggle(),
+    back: () => player.step(-1),
+    forward: () => player.step(1),
+    loop: () => (player.loop = !player.loop),
+    onion: switched("onion"),
+    ends: switched("ends"),
+    reset: look("quarter"),
+    ...Object.fromEntries(VIEWS.map((view) => [view, look(view)])),
+  };
+  for (const [id, action] of Object.entries(actions)) {
+    $(id).addEventListener("click", (event) => {
+      action();
+      if (event.detail > 0) $(id).blur(); // clicked, not chosen by keys: the space bar goes on to play and pause
+    });
+  }
+  stage.controls.addEventListener("start", () => {
+    for (const name of VIEWS) $(name).setAttribute("aria-pressed", "false");
+  });
+  $("speed").addEventListener("change", () => (player.speed = Number($("speed").value)));
+  $("apart").addEventListener("change", refresh);
+
+  const keys = {
+    " ": actions.play,
+    ArrowLeft: actions.back,
+    ArrowRight: actions.forward,
+    Home: () => player.seek(player.motion.start),
+    End: () => player.seek(player.motion.end),
+    l: actions.loop,
+    o: actions.onion,
+    a: actions.ends,
+    r: actions.reset,
+    ...Object.fromEntries(VIEWS.map((view, i) => [String(i + 1), actions[view]])),
+  };
+  document.addEventListener("keydown", (event) => {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const taken = event.target.closest("select") || (key === " " && event.target.closest("button"));
+    if (taken || event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(keys, key)) return;
+    event.preventDefault();
+    keys[key]();
+  });
+}
+
+/** Say in words where the player is. */
+function describe(player) {
+  const { motion, frame, time } = player;
+  $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
+  $("play").dataset.playing = player.playing;
+  $("loop").setAttribute("aria-pressed", String(player.loop));
+  const bridged = motion.bridgedAt(time).map((joint) => motion.joints[joint]);
+  $("frame").textContent = `frame ${frame} of ${motion.length - 1}`;
+  $("time").textContent = `${time.toFixed(2)} s`;
+  $("inserted").hidden = !motion.insertedAt(time);
+  $("bridged").hidden = bridged.length === 0;
+  $("bridged").textContent = `bridged: ${bridged.join(", ")}`;
+}
+
+function pressed(id) {
+  return $(id).getAttribute("aria-pressed") === "true";
+}
+
+/** The solids of a frame, in the world: eight numbers a cone and twelve an ellipsoid, as Body writes them. */
+function solids(motion, body, frame) {
+  const rotations = new Float64Array(motion.joints.length * 4);
+  const root = new Float64Array(3);
+  motion.sample(motion.times[frame], rotations, root);
+  body.pose(rotations, root);
+  const found = { cones: new Array(body.cones.length * 8), balls: new Array(body.balls.length * 12) };
+  body.writeCones(found.cones);
+  body.writeBalls(found.balls);
+  return { ...found, joints: [...body.joints] };
+}
+
+start();

@@ -1,0 +1,266 @@
+/** Where the body is seen: floor, shadow, ghosts, body; the camera and what it may do. */
+
+import {
+  BufferGeometry,
+  Color,
+  Group,
+  LineSegments,
+  Mesh,
+  PerspectiveCamera,
+  RingGeometry,
+  Scene,
+  ShaderMaterial,
+  SRGBColorSpace,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/OrbitControls";
+import { COARSE, Figures, FINE, Marks, PAPER } from "motionmind/figure";
+
+const FIELD = 26; // degrees from the picture's lower edge to its upper one
+const SHARPEST = 2; // device pixels to a CSS pixel, at most
+const SAMPLES = 150; // postures, at most, by which a path's extent is found
+const MARGIN = 0.12; // metres round the ends of limbs that a body 1.70 m tall takes up, and some air
+const PIECES = 16; // of a line of the floor's grid, along which it fades
+const GHOSTS = 0.34; // strength of A and B
+const ONION = [0.44, 0.3, 0.18]; // strength of the frames before and after, from the nearest on
+
+/** Directions to look from. At rest the body faces +z, the audience; its left is +x. */
+const VIEWS = {
+  front: [0, 0.08, 1],
+  side: [-1, 0.08, 0], // from stage right: the audience is to the right
+  top: [0, 1, 0.0001], // the audience is below
+  quarter: [-0.62, 0.34, 1],
+};
+
+export class Stage {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {Motion} motion
+   * @param {Body} body
+   * @param {object} colours {given, inserted, bridged, ink}
+   * @param {function} onChange called when the picture must be drawn again
+   */
+  constructor(canvas, motion, body, colours, onChange) {
+    this.motion = motion;
+    this.body = body;
+    this.rotations = new Float64Array(motion.joints.length * 4);
+    this.root = new Float64Array(3);
+    this.renderer = new WebGLRenderer({ canvas, antialias: window.devicePixelRatio < SHARPEST });
+    this.renderer.autoClear = false;
+    this.renderer.setClearColor(new Color().setRGB(...PAPER, SRGBColorSpace));
+    this.#measure();
+
+    this.figure = new Figures(body, 1, FINE, colours);
+    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours);
+    this.marks = new Marks(body, colours.bridged, this.figure.uniforms);
+    this.ghosts.uniforms.middle = this.figure.uniforms.middle;
+    this.ghostsShown = "";
+    this.layers = [new Scene(), new Scene(), new Scene()];
+    if (this.grounded) this.layers[0].add(floor(this.middle, this.reach, body.size), this.figure.shadows);
+    this.layers[1].add(this.ghosts.group);
+    this.layers[2].add(this.figure.group, this.marks.group);
+
+    this.camera = new PerspectiveCamera(FIELD, 1, 0.01 * this.reach, 100 * this.reach);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.maxPolarAngle = 0.5 * Math.PI; // not under the floor
+    this.controls.minDistance = 0.2 * this.reach;
+    this.controls.maxDistance = 30 * this.reach;
+    this.controls.addEventListener("start", () => (this.view = undefined));
+    this.controls.addEventListener("change", onChange);
+    this.look("quarter");
+    new ResizeObserver(() => {
+      this.#resize();
+      onChange();
+    }).observe(canvas.parentElement);
+  }
+
+  /** Look from "front", "side", "top" or "quarter", so that the whole path is seen. */
+  look(view) {
+    this.view = view;
+    const towards = new Vector3(...VIEWS[view]).normalize();
+    const right = new Vector3(0, 1, 0).cross(towards).normalize();
+    const up = towards.clone().cross(right);
+    const tall = Math.tan((FIELD * Math.PI) / 360);
+    const wide = tall * this.camera.aspect;
+    const [x, y, z] = [right, up, towards].map((axis) => this.cloud.map((place) => place.dot(axis)));
+    const middle = [x, y].map((values) => 0.5 * (least(values) + most(values)));
+    const margin = MARGIN * this.body.size;
+    const far = most(
+      z.map((depth, i) => {
+        const [across, above] = [Math.abs(x[i] - middle[0]) + margin, Math.abs(y[i] - middle[1]) + margin];
+        return depth + margin + Math.max(across / wide, above / tall);
+      }),
+    );
+    const depth = 0.5 * (least(z) + most(z));
+    this.controls.target
+      .set(0, 0, 0)
+      .addScaledVector(right, middle[0])
+      .addScaledVector(up, middle[1])
+      .addScaledVector(towards, depth);
+    this.camera.position.copy(this.controls.target).addScaledVector(towards, far - depth);
+    this.controls.update();
+  }
+
+  /**
+   * Put the body where it is at `time`.
+   * @param {object} ghosts {ends: whether the A and B of the insertion that goes on are shown, onion: how many frames
+   *   the ghosts before and after are apart, 0 for none}
+   */
+  show(time, { ends, onion }) {
+    this.#showGhosts(time, ends, onion);
+    this.#pose(time);
+    this.figure.set(0, this.#palette(time));
+    this.figure.show(1);
+    this.figure.uniforms.middle.value.fromArray(this.root);
+    this.marks.show(this.motion.bridgedAt(time));
+  }
+
+  render() {
+    this.renderer.clear();
+    for (const layer of this.layers) {
+      this.renderer.clearDepth(); // ghosts are behind the body, wherever they are, and hide nothing of it
+      this.renderer.render(layer, this.camera);
+    }
+  }
+
+  #showGhosts(time, ends, onion) {
+    const { times } = this.motion;
+    const ghosts = [];
+    const insertion = ends && this.motion.insertionAt(time);
+    if (insertion) ghosts.push([insertion.times[0], GHOSTS], [insertion.times.at(-1), GHOSTS]);
+    if (onion > 0) {
+      const frame = this.motion.frameAt(time);
+      ONION.forEach((strength, i) => {
+        for (const at of [frame - (i + 1) * onion, frame + (i + 1) * onion]) {
+          if (times[at] !== undefined) ghosts.push([times[at], strength]);
+        }
+      });
+    }
+    const shown = JSON.stringify(ghosts);
+    if (shown === this.ghostsShown) return;
+    this.ghostsShown = shown;
+    ghosts.forEach(([at, strength], index) => {
+      this.#pose(at);
+      this.ghosts.set(index, this.#palette(at), strength);
+    });
+    this.ghosts.show(ghosts.length);
+  }
+
+  #pose(time) {
+    this.motion.sample(time, this.rotations, this.root);
+    this.body.pose(this.rotations, this.root);
+  }
+
+  #palette(time) {
+    return this.motion.insertedAt(time) ? "inserted" : "given";
+  }
+
+  /** Find where the path leads: `cloud`, places in the body in many postures; its `middle`, its `reach` from there. */
+  #measure() {
+    const step = Math.max(1, Math.ceil(this.motion.length / SAMPLES));
+    const [cones, balls] = [new Array(this.body.cones.length * 8), new Array(this.body.balls.length * 12)];
+    this.cloud = [];
+    for (let frame = 0; frame < this.motion.length; frame += step) {
+      this.#pose(this.motion.times[frame]);
+      this.body.writeCones(cones);
+      this.body.writeBalls(balls);
+      for (let i = 0; i < cones.length; i += 4) this.cloud.push(new Vector3().fromArray(cones, i));
+      for (let i = 0; i < balls.length; i += 12) {
+        const centre = new Vector3().fromArray(balls, i);
+        for (let axis = 3; axis < 12; axis += 3) {
+          const half = new Vector3().fromArray(balls, i + axis);
+          this.cloud.push(centre.clone().add(half), centre.clone().sub(half));
+        }
+      }
+    }
+    const heights = this.cloud.map((place) => place.y);
+    const [low, high] = [least(heights), most(heights)];
+    // A recording's floor may be so far off that it would leave no room for the body.
+    this.grounded = Math.abs(low) < Math.max(high - low, this.body.size);
+    if (this.grounded) this.cloud = this.cloud.concat(this.cloud.map((place) => new Vector3(place.x, 0, place.z)));
+    this.middle = new Vector3();
+    for (const place of this.cloud) this.middle.addScaledVector(place, 1 / this.cloud.length);
+    this.reach = this.body.size + most(this.cloud.map((place) => place.distanceTo(this.middle)));
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, SHARPEST));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    const pixel = (2 * Math.tan((FIELD * Math.PI) / 360)) / height;
+    this.figure.pixel = pixel;
+    this.ghosts.pixel = pixel;
+    if (this.view) this.look(this.view);
+  }
+}
+
+/** A grey disc with a grid of metres (or of a tenth, or of ten, as the body's size is) that fades into the paper. */
+function floor(middle, reach, size) {
+  const radius = 2.4 * reach + 2 * size;
+  const step = 10 ** Math.round(Math.log10(size));
+  const disc = new RingGeometry(0, radius, 48, 10).rotateX(-0.5 * Math.PI).translate(middle.x, 0, middle.z);
+  const lines = [];
+  for (const [along, across] of [
+    ["x", "z"],
+    ["z", "x"],
+  ]) {
+    const reached = Math.floor((middle[across] + radius) / step);
+    for (let i = Math.ceil((middle[across] - radius) / step); i <= reached; i++) {
+      const half = Math.sqrt(radius ** 2 - (i * step - middle[across]) ** 2);
+      const places = Array.from({ length: PIECES + 1 }, (_, k) => {
+        const place = new Vector3();
+        place[along] = middle[along] + half * ((2 * k) / PIECES - 1);
+        place[across] = i * step;
+        return place;
+      });
+      for (let k = 0; k < PIECES; k++) lines.push(places[k], places[k + 1]);
+    }
+  }
+  const grid = new BufferGeometry().setFromPoints(lines);
+  const ground = new Group().add(
+    new Mesh(disc, fading(middle, radius, [0.035, 0.038, 0.042])),
+    new LineSegments(grid, fading(middle, radius, [0.105, 0.108, 0.112])),
+  );
+  ground.renderOrder = -1; // before the shadow
+  return ground;
+}
+
+/** A material by so much darker than paper, the less the nearer to the edge of the floor. */
+function fading(middle, radius, grey) {
+  return new ShaderMaterial({
+    uniforms: {
+      middle: { value: middle },
+      radius: { value: radius },
+      grey: { value: new Vector3(...grey) },
+      paper: { value: new Vector3(...PAPER) },
+    },
+    vertexShader: /* glsl */ `
+      uniform vec3 middle;
+      uniform float radius;
+      varying float vFade;
+      void main() {
+        vFade = 1.0 - smoothstep(0.35, 1.0, distance(position.xz, middle.xz) / radius);
+        gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0);
+      }`,
+    fragmentShader: /* glsl */ `
+      uniform vec3 grey, paper;
+      varying float vFade;
+      void main() {
+        gl_FragColor = vec4(paper - vFade * grey, 1.0);
+      }`,
+    depthTest: false,
+    depthWrite: false,
+  });
+}
+
+function least(values) {
+  return values.reduce((a, b) => Math.min(a, b));
+}
+
+function most(values) {
+  return values.reduce((a, b) => Math.max(a, b));
+}
