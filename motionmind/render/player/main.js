@@ -41,7 +41,7 @@ function start() {
         ends: pressed("ends"),
         onion: pressed("onion") ? Number($("apart").value) : 0,
       });
-      stage.render();
+      stage.render(player.playing);
     }
     requestAnimationFrame(draw);
   };

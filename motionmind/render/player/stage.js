@@ -19,6 +19,7 @@ import { COARSE, Figures, FINE, Marks, PAPER } from "motionmind/figure";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const SHARPEST = 2; // device pixels to a CSS pixel, at most
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // what browsers call drawing without a GPU
 const SAMPLES = 150; // postures, at most, by which a path's extent is found
 const MARGIN = 0.12; // metres round the ends of limbs that a body 1.70 m tall takes up, and some air
 const PIECES = 16; // of a line of the floor's grid, along which it fades
@@ -46,7 +47,8 @@ export class Stage {
     this.body = body;
     this.rotations = new Float64Array(motion.joints.length * 4);
     this.root = new Float64Array(3);
-    this.renderer = new WebGLRenderer({ canvas, antialias: window.devicePixelRatio < SHARPEST });
+    this.software = drawnInSoftware();
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software && window.devicePixelRatio < SHARPEST });
     this.renderer.autoClear = false;
     this.renderer.setClearColor(new Color().setRGB(...PAPER, SRGBColorSpace));
     this.#measure();
@@ -66,7 +68,15 @@ export class Stage {
     this.controls.maxPolarAngle = 0.5 * Math.PI; // not under the floor
     this.controls.minDistance = 0.2 * this.reach;
     this.controls.maxDistance = 30 * this.reach;
-    this.controls.addEventListener("start", () => (this.view = undefined));
+    this.dragged = false;
+    this.controls.addEventListener("start", () => {
+      this.view = undefined;
+      this.dragged = true;
+    });
+    this.controls.addEventListener("end", () => {
+      this.dragged = false;
+      onChange();
+    });
     this.controls.addEventListener("change", onChange);
     this.look("quarter");
     new ResizeObserver(() => {
@@ -116,7 +126,9 @@ export class Stage {
     this.marks.show(this.motion.bridgedAt(time));
   }
 
-  render() {
+  /** Draw it; `moving` says that the next picture is to follow at once. */
+  render(moving) {
+    this.#sharpen(moving || this.dragged);
     this.renderer.clear();
     for (const layer of this.layers) {
       this.renderer.clearDepth(); // ghosts are behind the body, wherever they are, and hide nothing of it
@@ -184,10 +196,16 @@ export class Stage {
     this.reach = this.body.size + most(this.cloud.map((place) => place.distanceTo(this.middle)));
   }
 
+  /** Without a GPU to smooth all edges takes longer than all else: there what moves is drawn plainly, what rests finely. */
+  #sharpen(moving) {
+    const own = Math.min(window.devicePixelRatio, SHARPEST);
+    const ratio = this.software ? (moving ? 1 : SHARPEST) : own;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+  }
+
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, SHARPEST));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -196,6 +214,15 @@ export class Stage {
     this.ghosts.pixel = pixel;
     if (this.view) this.look(this.view);
   }
+}
+
+/** Whether the browser has no GPU to draw with, as far as it tells. */
+function drawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const told = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = told ? gl.getParameter(told.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return SOFTWARE.test(name);
 }
 
 /** A grey disc with a grid of metres (or of a tenth, or of ten, as the body's size is) that fades into the paper. */
