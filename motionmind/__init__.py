@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from motionmind.learned import own_skeleton
     from motionmind.motion import Insertion, Motion, Posture
     from motionmind.notation.compose import compose
+    from motionmind.render.pictures import write_picture
     from motionmind.render.sheet import contact_sheet
     from motionmind.retarget import to_human23
     from motionmind.skeleton import Skeleton, human23, human44
@@ -61,6 +62,7 @@ __all__ = [
     "read_posture",
     "to_human23",
     "write_motion",
+    "write_picture",
     "write_posture",
 ]
 
@@ -79,6 +81,7 @@ _HOMES = {
     "learned": ("own_skeleton",),
     "motion": ("Insertion", "Motion", "Posture"),
     "notation.compose": ("compose",),
+    "render.pictures": ("write_picture",),
     "render.sheet": ("contact_sheet",),
     "retarget": ("to_human23",),
     "skeleton": ("Skeleton", "human23", "human44"),

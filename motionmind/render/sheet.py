@@ -83,8 +83,11 @@ def png(picture: Image.Image) -> bytes:
     """A contact sheet as a file."""
     data = BytesIO()
     # A third of the bytes, and to the eye the same. Of the ways to choose 256 colours, median cut loses those that are
-    # rare, as what is under the floor, and maximum coverage tints the ground; an octree keeps both.
-    picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(data, "PNG")
+    # rare, as what is under the floor, and maximum coverage tints the ground; an octree keeps both. A quarter of the
+    # pixels are enough to choose by.
+    quarter = picture.resize((ceil(picture.width / 2), ceil(picture.height / 2)), Image.Resampling.NEAREST)
+    palette = quarter.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    picture.quantize(palette=palette, dither=Image.Dither.NONE).save(data, "PNG", compress_level=4)
     return data.getvalue()
 
 
