@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import insect
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
@@ -31,19 +32,6 @@ from motionmind.skeleton import Skeleton, human23
 from motionmind.tween import Tween
 
 Array = NDArray[np.float64]
-
-
-def insect() -> Skeleton:
-    """A thorax, a head, and six legs of two joints."""
-    names, parents, offsets = ["thorax", "head"], [-1, 0], [(0.0, 0.0, 0.0), (0.0, 0.0, 0.01)]
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        for z, where in ((0.008, "front"), (0.0, "middle"), (-0.008, "hind")):
-            names += [f"{side}_{where}_coxa", f"{side}_{where}_tibia"]
-            parents += [0, len(names) - 2]
-            offsets += [(sign * 0.004, 0.0, z), (sign * 0.01, 0.004, 0.0)]
-    tips = np.zeros((len(names), 3))
-    tips[3::2] = [(x, -0.012, 0.0) for x in (0.006,) * 3 + (-0.006,) * 3]
-    return Skeleton("insect", tuple(names), tuple(parents), np.array(offsets), tips)
 
 
 def scurry(name: str, seed: int, frames: int = 40) -> Motion:

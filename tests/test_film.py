@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import ant
 from bundled_clips import ballet_clip
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -57,18 +58,6 @@ def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
     return replace(skeleton, offsets=skeleton.offsets * factor, tips=skeleton.tips * factor)
 
 
-def insect() -> Skeleton:
-    """Six legs of two joints, 2 cm across."""
-    names, parents, offsets, tips = ["body"], [-1], [[0.0, 0.0, 0.0]], [[0.0, 0.0, -0.008]]
-    for side, out in (("left", 1.0), ("right", -1.0)):
-        for row, z in (("front", 0.003), ("mid", 0.0), ("hind", -0.003)):
-            parents += [0, len(names)]
-            names += [f"{side}_{row}_femur", f"{side}_{row}_tibia"]
-            offsets += [[0.002 * out, 0.0, z], [0.005 * out, 0.003, z]]
-            tips += [[0.0, 0.0, 0.0], [0.003 * out, -0.009, z]]
-    return Skeleton("ant", tuple(names), tuple(parents), np.array(offsets), np.array(tips))
-
-
 def chain() -> Skeleton:
     """Two bones of half a metre, one on the other."""
     return Skeleton("chain", ("a", "b", "c"), (-1, 0, 1), np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.5, 0.0]]))
@@ -109,7 +98,7 @@ def bridged(motion: Motion, *joints: str) -> Motion:
 
 ODD = {
     "one posture": lambda: movement(frames=1),
-    "six legs": lambda: movement(insect()),
+    "six legs": lambda: movement(ant()),
     "44 joints": lambda: movement(human44()),
     "leaping": leaping,
     "lying": lying,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import ant
 from bundled_clips import ballet_clip
 from command_line import Run
 from hypothesis import given, settings
@@ -104,18 +105,6 @@ def place(posture: Posture, joint: str, view: View) -> Array:
     """Where a joint is in a picture about the root (x, y, and z towards the viewer), metres."""
     joints = posture.skeleton.positions(posture.rotations, np.zeros(3))
     return view.axes @ joints[posture.skeleton.index(joint)]
-
-
-def insect() -> Skeleton:
-    """Six legs of two joints, 2 cm across."""
-    names, parents, offsets, tips = ["body"], [-1], [[0.0, 0.0, 0.0]], [[0.0, 0.0, -0.008]]
-    for side, out in (("left", 1.0), ("right", -1.0)):
-        for row, z in (("front", 0.003), ("mid", 0.0), ("hind", -0.003)):
-            parents += [0, len(names)]
-            names += [f"{side}_{row}_femur", f"{side}_{row}_tibia"]
-            offsets += [[0.002 * out, 0.0, z], [0.005 * out, 0.003, z]]
-            tips += [[0.0, 0.0, 0.0], [0.003 * out, -0.009, z]]
-    return Skeleton("ant", tuple(names), tuple(parents), np.array(offsets), np.array(tips))
 
 
 def clip(postures: int = 6, skeleton: Skeleton | None = None) -> Motion:
@@ -518,7 +507,7 @@ def test_a_sheet_has_one_numbered_cell_a_posture(columns: int, words: list[tuple
 @given(seeds, st.sampled_from(["human", "insect"]))
 @settings(max_examples=40)
 def test_nothing_is_cut_off(seed: int, kind: str) -> None:
-    rows = [random_posture(seed + i, insect() if kind == "insect" else None) for i in range(3)]
+    rows = [random_posture(seed + i, ant() if kind == "insect" else None) for i in range(3)]
     motion = Motion(
         rows[0].skeleton,
         np.stack([row.rotations for row in rows]),
@@ -600,7 +589,7 @@ def test_a_foot_in_the_air_is_not_on_the_floor() -> None:
 
 
 def test_an_insect_has_six_legs_in_two_colours() -> None:
-    skeleton = insect()
+    skeleton = ant()
     rotations = np.tile(rot.IDENTITY, (len(skeleton), 1))
     body = body_of(skeleton)
     assert sum(paint == LEFT for paint in body.paints) == sum(paint == RIGHT for paint in body.paints) == 9
@@ -613,7 +602,7 @@ def test_an_insect_has_six_legs_in_two_colours() -> None:
 
 
 def test_a_sheet_has_bounds() -> None:
-    many = clip(1, insect())
+    many = clip(1, ant())
     times = np.arange(MOST + 1.0)
     many = Motion(many.skeleton, many.rotations[np.zeros(MOST + 1, dtype=int)], np.zeros((MOST + 1, 3)), times, "long")
     with pytest.raises(MotionMindError, match=r"^long: a sheet holds 400 postures, not 401; .* --every 2$"):
