@@ -97,7 +97,7 @@ def sheet(
             _write_sheet(path, motion, drawn, columns=columns, side=side)
 
 
-@app.command(epilog=example("motionmind render tween.json -o tween.gif"))
+@app.command(epilog=example("motionmind render clip.bvh -o clip.html"))
 @click.argument("source", type=_ANY)
 @click.option(
     "-o", "--output", type=FILE, required=True, help="Where it goes: .png, .gif, .mp4, .svg (a film too) or .html."
