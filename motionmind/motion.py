@@ -100,6 +100,8 @@ class Motion:
         _settle(self, (len(times), len(self.skeleton), 4), (len(times), 3))
         times.setflags(write=False)
         object.__setattr__(self, "times", times)
+        # A file's name may hold bytes that are no text, and no format writes those.
+        object.__setattr__(self, "name", self.name.encode("utf-8", "replace").decode())
         for before, after in pairwise(self.insertions):
             if after.times[0] < before.times[-1] - _MOMENT:
                 raise MotionMindError(f"{self.name or 'motion'}: insertions must follow one another")

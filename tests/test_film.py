@@ -434,7 +434,7 @@ def test_what_cannot_be_written_is_told_in_a_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "fps", "words"),
-    [("a.gif", 51.0, "at most 50"), ("a.gif", 0.0, "more than 0"), ("a.mp4", 121.0, "at most 120"),
+    [("a.gif", 51.0, "to 50 frames a second"), ("a.gif", 0.0, "from 0.01 to 50"), ("a.mp4", 121.0, "to 120 frames"),
      ("a.gif", float("nan"), "nan"), ("a.avi", None, r"\.avi"), ("a", None, "without suffix")],
 )  # fmt: skip
 def test_what_cannot_be_filmed_is_refused(tmp_path: Path, name: str, fps: float | None, words: str) -> None:

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import ant
 from numpy.typing import NDArray
 from PIL import Image
-from test_render import insect, moved
+from test_render import moved
 
 from motionmind import rotations as rot
 from motionmind.mirror import LEFT, RIGHT
@@ -73,7 +74,7 @@ def arabesque() -> Pixels:
 
 def hexapod() -> Pixels:
     """An insect whose left middle leg is lifted and whose right hind leg is ahead."""
-    posture = bent(insect(), left_mid_femur=(0.0, 0.0, 0.6), right_hind_femur=(0.0, -0.7, 0.0))
+    posture = bent(ant(), left_mid_femur=(0.0, 0.0, 0.6), right_hind_femur=(0.0, -0.7, 0.0))
     return tile(moved(posture.as_motion(), 0.0, 0.0062, 0.0), 0)
 
 

@@ -488,3 +488,19 @@ def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:
     tab = show(bridged())
     tab.get("controls = [...document.querySelectorAll('button, select, [role=slider], [role=group]')]")
     assert tab.get("controls.filter(one => !one.ariaLabel && !one.innerText.trim()).map(one => one.id)") == []
+
+
+def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -> None:
+    motion = bridged()
+    for part, ends in ((motion, 2), (motion.slice(3, 12), 1), (motion.slice(3, 6), 0)):
+        tab = show(part)
+        assert tab.get("motionmind.motion.insertions.map(one => motionmind.motion.ends(one).length)") == [ends]
+        assert tab.get("document.getElementById('ends').hidden") == (ends == 0)
+
+
+def test_a_leap_of_one_frame_amid_many_is_seen_whole(show: Callable[..., Opened]) -> None:
+    motion = still(700)
+    root = motion.root.copy()
+    root[433, 1] += 3.0
+    tab = show(replace(motion, root=root))
+    assert tab.get("Math.max(...motionmind.stage.cloud.map(place => place.y))") > 3.5

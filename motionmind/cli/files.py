@@ -65,14 +65,14 @@ def clip_names(files: Sequence[Path]) -> dict[Path, str]:
 def check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence[Path]) -> list[Path]:
     """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
     paths = [path for path, _ in wanted]
-    places, sources = [path.resolve() for path in paths], [path.resolve() for path in read]
+    places, sources = [_place(path) for path in paths], [_place(path) for path in read]
     for path, suffixes in wanted:
-        folder = path.resolve().parent
+        folder = _place(path).parent
         if suffixes and path.suffix.lower() not in suffixes:
             fault = f"the name must end in one of {', '.join(suffixes)}"
-        elif places.count(path.resolve()) > 1:
+        elif places.count(_place(path)) > 1:
             fault = "it is to be written twice"
-        elif path.resolve() in sources:
+        elif _place(path) in sources:
             fault = "it is read from"
         elif not folder.is_dir():
             fault = f"there is no folder {folder}"
@@ -82,6 +82,17 @@ def check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence
             continue
         raise MotionMindError(f"{path}: cannot be written: {fault}")
     return paths
+
+
+def _place(path: Path) -> Path:
+    """Where a path leads to; MotionMindError where that is nowhere, as with links in a circle."""
+    try:
+        found = path.resolve()
+        found.exists()
+    except (OSError, RuntimeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or "it leads nowhere"
+        raise MotionMindError(f"{path}: cannot be used: {reason[0].lower()}{reason[1:]}") from error
+    return found
 
 
 @contextmanager

@@ -21,7 +21,6 @@ from motionmind.render import PICTURES
 if TYPE_CHECKING:
     from motionmind.motion import Motion
 
-_ON_A_SHEET = 48  # postures on a sheet where nobody says which
 _ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
 
 
@@ -74,7 +73,8 @@ def sheet(
     Each has its frame's number, which posture --frame takes, and its time. SOURCE is a file of movement, a score, or a
     corpus by its name or folder; scores and corpora hold clips, of which --clip takes some.
     """
-    from motionmind.render.sheet import check_frames
+    from motionmind.formats import write_atomically
+    from motionmind.render.sheet import check_frames, contact_sheet, png
 
     many = _holds_clips(source, home)
     folder = output if many and (output.is_dir() or not output.suffix) else None
@@ -94,7 +94,10 @@ def sheet(
     paths = _files_in(folder, motions, source) if folder else [output]
     with all_or_none(paths):
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
-            _write_sheet(path, motion, drawn, columns=columns, side=side)
+            picture = contact_sheet(motion, drawn, columns=columns, side=side)
+            write_atomically(path, png(picture))
+            words = count(len(drawn), "posture")
+            click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
 
 
 @app.command(epilog=example("motionmind render clip.bvh -o clip.html"))
@@ -105,7 +108,9 @@ def sheet(
 @click.option("--clip", "name", metavar="NAME", help="Which clip of a score or a corpus  [default: its only one]")
 @click.option("--from", "start", type=int, metavar="N", default=0, help="First frame; negative from the end.")
 @click.option("--to", "end", type=int, metavar="N", default=-1, help="Last frame; negative from the end.")
-@click.option("--fps", type=RATE, help="Frames a second of a film  [default: the movement's own]")
+@click.option(
+    "--fps", type=RATE, help="Frames a second of a film  [default: the movement's own, at most 25 in .gif; .svg 12]"
+)
 @click.option(
     "--view",
     type=click.Choice(["quarter", "front", "side", "left", "top"]),
@@ -135,23 +140,10 @@ def render(
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
     motion, frames = found[0], _range(source, len(found[0]), start, end)
     part = motion.slice(frames.start, frames.stop)
-    if output.suffix.lower() == ".png" and len(part) > 1 and not any(seen.values()):
-        _write_sheet(output, motion, _spread(frames, None, _ON_A_SHEET))  # numbered as in the whole
-        return
-    write_picture(output, part, **seen)
+    write_picture(output, part, first=frames.start, **seen)
     seconds = part.times[-1] - part.times[0]
     kilobytes = output.stat().st_size / 1000
     click.echo(f"{output}: {count(len(part), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
-
-
-def _write_sheet(path: Path, motion: Motion, frames: Sequence[int], **options: Any) -> None:
-    from motionmind.formats import write_atomically
-    from motionmind.render.sheet import contact_sheet, png
-
-    picture = contact_sheet(motion, frames, **options)
-    write_atomically(path, png(picture))
-    words = count(len(frames), "posture")
-    click.echo(f"{path}: {words} of {len(motion)}, {picture.width} x {picture.height} pixels")
 
 
 def _holds_clips(source: Path, home: Path | None) -> bool:
@@ -226,7 +218,6 @@ def _spread(frames: range, every: int | None, postures: int | None) -> Sequence[
     """Those of the frames that are drawn: every so many, or so many, from the first to the last."""
     if every and postures:
         raise MotionMindError("--every and --postures both say which frames to draw; give one of them")
-    if not postures or postures >= len(frames):
-        return frames[:: every or 1]
-    gaps = max(postures - 1, 1)
-    return [frames[round(at * (len(frames) - 1) / gaps)] for at in range(postures)]
+    from motionmind.render.sheet import evenly
+
+    return evenly(frames, postures) if postures else frames[:: every or 1]

@@ -28,11 +28,12 @@ def write_atomically(path: FilePath, data: bytes) -> None:
     `/dev/stdout`) is written to as it is. MotionMindError where writing fails; the temporary file is gone then.
     """
     try:
-        target = Path(os.path.realpath(path))
-        mode = target.stat().st_mode if target.exists() else None
+        given = Path(path)
+        mode = given.stat().st_mode if given.exists() else None
         if mode is not None and not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            target.write_bytes(data)
+            given.write_bytes(data)
             return
+        target = Path(os.path.realpath(path))
         if mode is not None and stat.S_ISDIR(mode):
             raise IsADirectoryError(0, "it is a folder")
         _write_beside_and_move(target, data, mode)

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.errors import FormatError
+from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats._clock import even_step
 from motionmind.formats.files import FilePath, read_bytes, write_atomically
 from motionmind.formats.text import LARGEST
@@ -97,6 +97,8 @@ def write_npz(path: FilePath, motion: Motion) -> None:
             so), or the file cannot be written.
     """
     step = even_step(motion, "AMASS")
+    if 1.0 / step > FASTEST:
+        raise MotionMindError(f"{path}: {1.0 / step:g} frames a second are more than {FASTEST:g}")
     body, rotations, root = _on_smpl(motion)
     rotations[:, 0] = rot.inv_mul(_UPRIGHT, rotations[:, 0])
     arrays: dict[str, Any] = {
@@ -156,6 +158,8 @@ def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Array:
     """The array as floats; FormatError says which element is no number."""
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise FormatError(f"{name!r} holds no numbers", path=path)
+    if array.size * 8 > _LARGEST_ARRAY:
+        raise FormatError(f"{name!r} is larger than movement is", path=path)
     numbers = array.astype(np.float64)
     bad = np.argwhere(~(np.abs(numbers) <= LARGEST))  # NaN too
     if len(bad):

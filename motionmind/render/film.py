@@ -22,7 +22,7 @@ from motionmind.formats.files import FilePath, write_atomically
 from motionmind.jit import jit
 from motionmind.motion import Motion
 from motionmind.render.figure import Pixels
-from motionmind.render.stage import HOLD, Stage, frame_rate, moments
+from motionmind.render.stage import HOLD, SLOWEST, Stage, frame_rate, moments
 
 Indices = NDArray[np.uint8]
 Table = NDArray[np.int16]
@@ -37,7 +37,7 @@ _QUALITY = 17  # x264's constant rate factor, at which drawn figures show no blo
 
 
 def write_film(
-    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480
+    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480, first: int = 0
 ) -> None:
     """Film a motion: `.gif`, which loops and holds its last posture for 0.8 s, or `.mp4` (H.264).
 
@@ -47,9 +47,11 @@ def write_film(
     Args:
         path: where it goes.
         motion: movement on any skeleton.
-        fps: frames a second; by default the motion's own, at most 25 in a GIF and 60 in an MP4.
+        fps: frames a second; by default the motion's own, at most 25 in a GIF and 60 in an MP4, and 25 where it
+            has fewer than 12.
         view: from where it is seen, as `Stage` has it.
         size: height in pixels, as `Stage` has it.
+        first: number of the first frame, as `Stage` has it.
 
     Raises:
         MotionMindError: the suffix is another, a number is out of range, the extra for MP4 is not installed, or the
@@ -60,9 +62,9 @@ def write_film(
         raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a name without suffix'}")
     usual, most = (_GIF_RATE, _GIF_MOST) if suffix == ".gif" else (_MP4_RATE, _MP4_MOST)
     rate = min(frame_rate(motion), usual) if fps is None else fps
-    if not 0.0 < rate <= most:
-        raise MotionMindError(f"{path}: a {suffix} has more than 0 and at most {most:g} frames a second, not {rate:g}")
-    stage = Stage(motion, moments(motion, rate), view=view, size=size)
+    if not SLOWEST <= rate <= most:
+        raise MotionMindError(f"{path}: a {suffix} has from {SLOWEST:g} to {most:g} frames a second, not {rate:g}")
+    stage = Stage(motion, moments(motion, rate), view=view, size=size, first=first)
     write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
 
 
@@ -190,9 +192,12 @@ def mp4(stage: Stage, rate: float) -> bytes:
         raise MotionMindError('.mp4 needs an encoder: pip install "motionmind[film]"') from None
     with TemporaryDirectory() as folder:
         file, log = Path(folder) / "film.mp4", Path(folder) / "log"
-        command = [imageio_ffmpeg.get_ffmpeg_exe(), *_arguments(stage, rate), str(file)]
-        with log.open("w+b") as said, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as encoder:
-            _feed(encoder.stdin, stage.frames())
+        try:
+            command = [imageio_ffmpeg.get_ffmpeg_exe(), *_arguments(stage, rate), str(file)]
+            with log.open("w+b") as said, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as encoder:
+                _feed(encoder.stdin, stage.frames())
+        except (RuntimeError, OSError) as error:
+            raise MotionMindError(f"the MP4 encoder cannot be run: {error}") from error
         if encoder.returncode != 0:
             lines = log.read_text(errors="replace").strip().splitlines() or ["it says nothing"]
             raise MotionMindError(f"the MP4 encoder failed: {lines[0]}")

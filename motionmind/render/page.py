@@ -11,6 +11,7 @@ import html
 from base64 import b64encode
 from dataclasses import asdict
 from functools import cache
+from itertools import product
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -34,20 +35,20 @@ _BITS = 20  # of each of the three numbers that a quaternion is written as
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 
-def page(motion: Motion) -> str:
-    """The page that plays `motion`, on any skeleton."""
+def page(motion: Motion, first: int = 0) -> str:
+    """The page that plays `motion`, on any skeleton; `first` is its first frame's number in what it is a part of."""
     return Template(_text("page.html")).substitute(
         title=html.escape(motion.name or motion.skeleton.name),
         style=_text("player.css"),
         modules=_modules(),
         # numpy's numbers are floats; within a script element nothing but "<" can end it.
-        data=msgspec.json.encode(_data(motion), enc_hook=float).decode().replace("<", "\\u003c"),
+        data=msgspec.json.encode(_data(motion, first), enc_hook=float).decode().replace("<", "\\u003c"),
     )
 
 
-def write_page(path: FilePath, motion: Motion) -> None:
+def write_page(path: FilePath, motion: Motion, first: int = 0) -> None:
     """Write the page that plays `motion` to `path`; MotionMindError if it cannot be written."""
-    write_atomically(path, page(motion).encode())
+    write_atomically(path, page(motion, first).encode())
 
 
 @cache
@@ -60,12 +61,14 @@ def _modules() -> str:
     return msgspec.json.encode({"imports": urls}).decode()
 
 
-def _data(motion: Motion) -> dict[str, Any]:
+def _data(motion: Motion, first: int) -> dict[str, Any]:
     """What the player reads; player/README.md says what is what."""
     skeleton = motion.skeleton
     body = body_of(skeleton)
     return {
         "name": motion.name,
+        "first": first,
+        "farthest": _farthest(motion),
         "skeleton": {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist()},
         "body": _body_data(body),
         "colours": {"given": COLOURS, "inserted": INSERTED, "bridged": BRIDGED, "ink": INK},
@@ -80,6 +83,15 @@ def _data(motion: Motion) -> dict[str, Any]:
             for one in motion.insertions
         ],
     }
+
+
+def _farthest(motion: Motion) -> list[int]:
+    """Frames in which some joint is farther than in all others, in one of 26 directions."""
+    joints = motion.skeleton.positions(motion.rotations, motion.root)
+    found = set[int]()
+    for direction in product((-1.0, 0.0, 1.0), repeat=3):
+        found.add(int((joints @ np.array(direction)).max(axis=-1).argmax()))
+    return sorted(found)
 
 
 def _body_data(body: Body) -> dict[str, Any]:

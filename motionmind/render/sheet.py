@@ -41,6 +41,7 @@ Side = Literal["right", "left"]
 
 MOST = 400  # postures on a sheet: nobody looks through more
 _PIXELS = 60e6  # of a sheet: more make a picture that viewers refuse
+_NARROW = 100.0  # pixels that the side view is wide at least, for the words under it
 _TALL = 200.0  # pixels of a body's height
 _LARGEST = 480.0  # pixels that one view may be wide or high, where a body leaps or lies
 _SMOOTH = 2  # samples a pixel, each way, which `halved` brings together
@@ -54,7 +55,12 @@ _SINKS = 0.006  # share of the body's height by which it may be under the floor 
 
 
 def contact_sheet(
-    motion: Motion, frames: Sequence[int] | None = None, *, columns: int | None = None, side: Side = "right"
+    motion: Motion,
+    frames: Sequence[int] | None = None,
+    *,
+    columns: int | None = None,
+    side: Side = "right",
+    first: int = 0,
 ) -> Image.Image:
     """A picture of postures of a motion, in rows from left to right, each numbered with its frame and its time.
 
@@ -69,13 +75,17 @@ def contact_sheet(
         columns: postures in a row; by default as many as make the sheet about as wide as a screen.
         side: the side of the stage, "right" or "left" for the performer who faces the audience, from which the side
             view is taken.
+        first: the number of the motion's first frame, where it is a part of something longer.
 
     Raises:
-        MotionMindError: there are more than 400 frames to draw, or none, or one that the motion has not.
+        MotionMindError: there are more than 400 frames to draw, or none, or one that the motion has not; or there is no
+            such side, or no column.
     """
+    if side not in ("right", "left") or (columns is not None and columns < 1):
+        raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")
     chosen = list(range(len(motion))) if frames is None else list(frames)
     check_frames(motion, chosen)
-    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT)
+    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, first)
     return sheet.picture(columns)
 
 
@@ -89,6 +99,13 @@ def png(picture: Image.Image) -> bytes:
     palette = quarter.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     picture.quantize(palette=palette, dither=Image.Dither.NONE).save(data, "PNG", compress_level=4)
     return data.getvalue()
+
+
+def evenly(frames: range, most: int) -> Sequence[int]:
+    """So many of the frames, from the first to the last; all of them where there are no more."""
+    if most >= len(frames):
+        return frames
+    return [frames[round(at * (len(frames) - 1) / max(most - 1, 1))] for at in range(most)]
 
 
 def check_frames(motion: Motion, frames: Sequence[int]) -> None:
@@ -123,8 +140,9 @@ class _Window:
 
     @property
     def floor(self) -> int:
-        """The first row of samples under the floor, or the nearest to it that the window has."""
-        return min(max(round(self.pixel(0.0, 0.0)[1]), 0), _SMOOTH * self.height)
+        """The first row of samples under the floor; the last of the window where the floor is far from it."""
+        row, last = round(self.pixel(0.0, 0.0)[1]), _SMOOTH * self.height
+        return row if 0 <= row <= last else last
 
     def pixel(self, x: float, y: float) -> tuple[float, float]:
         """Where a point of the view, metres, is in its picture, in samples."""
@@ -144,8 +162,8 @@ def _window(view: View, half: float, low: float, high: float, scale: float) -> _
 class _Sheet:
     """The postures to draw, placed, and the windows that they are seen through: the same for all of them."""
 
-    def __init__(self, motion: Motion, frames: list[int], side: View) -> None:
-        self.motion, self.frames = motion, frames
+    def __init__(self, motion: Motion, frames: list[int], side: View, first: int = 0) -> None:
+        self.motion, self.frames, self.first = motion, frames, first
         self.body: Body = body_of(motion.skeleton)
         root = motion.root[frames]
         self.cones, self.balls = self.body.solids(motion.rotations[frames], root)
@@ -167,6 +185,7 @@ class _Sheet:
             _LARGEST / max(high - low, *(2.0 * half for half in halves)),
             sqrt(_PIXELS / len(frames) / (2.0 * sum(halves) * (high - low + far - near))),
         )
+        halves[1] = max(halves[1], 0.5 * _NARROW / scale)
         self.windows = [_window(view, half, low, high, scale) for view, half in zip((FRONT, side), halves, strict=True)]
         self.easels: dict[_Window, tuple[Canvas, Pixels]] = {}
         self.plan = _window(ABOVE, halves[0], near, far, scale) if far > near else None
@@ -202,7 +221,7 @@ class _Sheet:
             sheet.paste(self._above(at, self.plan), (corner[0], y))
         x = corner[0] + self.windows[0].width
         frame = self.frames[at]
-        pen.text((x + 4, y + 3), f"{frame}", _WORDS, ImageFont.load_default(15))
+        pen.text((x + 4, y + 3), f"{self.first + frame}", _WORDS, ImageFont.load_default(15))
         right = x + self.windows[1].width - 5
         pen.text((right, y + 6), f"{self.motion.times[frame]:.2f} s", _PALE, _small(), anchor="ra")
 

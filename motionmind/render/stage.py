@@ -8,7 +8,7 @@ does.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -44,6 +44,7 @@ HOLD = 0.8  # seconds for which the last frame of a film stays, before it all be
 GHOST = 0.22  # how much of a ghost's colours the backdrop takes
 _STRIP = 3.4  # by the height of the letters: what is written underneath
 _SMALL_BODY = 0.6  # of a body's height: one that is rolled up smaller is not made larger
+SLOWEST = 0.01  # frames a second of a film
 _LEAST_RATE, _RATE = 12.0, 25.0  # frames a second: movement written more sparsely than the first is drawn at the second
 _MOMENT = 1e-6  # seconds: times that are no further apart are one
 _BLOCK = 64  # frames whose solids are placed at once
@@ -111,7 +112,9 @@ class Stage:
         thick: thickness of the line of time in pixels.
     """
 
-    def __init__(self, motion: Motion, times: Array | None = None, *, view: str = "quarter", size: int = 480) -> None:
+    def __init__(
+        self, motion: Motion, times: Array | None = None, *, view: str = "quarter", size: int = 480, first: int = 0
+    ) -> None:
         """The stage for the moments `times` of a motion (its own by default).
 
         Args:
@@ -119,15 +122,16 @@ class Stage:
             times: when to draw it [T], seconds, increasing; `moments` finds them.
             view: from where: one of `VIEWS`.
             size: height of the picture in pixels; it is less high where the movement is flat.
+            first: number of the motion's first frame in what it is a part of.
 
         Raises:
             MotionMindError: there is no such view, or the size is not one from 120 to 2160.
         """
         if view not in VIEWS:
             raise MotionMindError(f"no view {view!r}; there are {', '.join(VIEWS)}")
-        if not SMALLEST <= size <= LARGEST:
-            raise MotionMindError(f"a picture is from {SMALLEST} to {LARGEST} pixels high, not {size}")
-        self._given = motion
+        if not SMALLEST <= size <= LARGEST or size != int(size):
+            raise MotionMindError(f"a picture is from {SMALLEST} to {LARGEST} whole pixels high, not {size}")
+        self._given, self._first = motion, first
         self.motion = motion if times is None else motion.at(times)
         self.body = body_of(motion.skeleton)
         self._paints = plain(self.body), inserted(self.body)
@@ -189,7 +193,7 @@ class Stage:
         time, words = self.motion.times[number], list[tuple[str, Ink]]()
         if len(self) > 1:
             frame = int(np.argmin(np.abs(self._given.times - time)))
-            words += [(f"{time:.2f} s", WORDS), (f"frame {frame}", PALE)]
+            words += [(f"{time:.2f} s", WORDS), (f"frame {self._first + frame}", PALE)]
         if self._made[number]:
             words.append(("inserted", VIOLET))
         if self._bridged[number].any():
@@ -299,7 +303,8 @@ class Stage:
         image, above = Image.fromarray(picture[-self.strip :]), self.camera.height - self.strip
         pen, font, x = ImageDraw.Draw(image), _font(self.letters), float(self.camera.margin)
         # Times and frames keep their columns while they grow.
-        columns = [font.getlength(f"{self.motion.times[-1]:.2f} s"), font.getlength(f"frame {len(self._given) - 1}")]
+        last = f"{self.motion.times[-1]:.2f} s", f"frame {self._first + len(self._given) - 1}"
+        columns = [font.getlength(words) for words in last]
         for place, (phrase, ink) in enumerate(self.words(number)):
             text = phrase
             while text and x + font.getlength(text) > self.camera.width - self.camera.margin:
@@ -325,7 +330,11 @@ def _ends(motion: Motion, insertion: Insertion) -> Motion | None:
     """The postures A and B of an insertion, as far as they are in a motion of more than one."""
     first, last = motion.times[[0, -1]]
     times = [time for time in insertion.times[[0, -1]] if first - _MOMENT <= time <= last + _MOMENT]
-    return motion.at(np.array(times)) if len(motion) > 1 and len(insertion.times) > 1 and times else None
+    return (
+        replace(motion, insertions=()).at(np.array(times))
+        if len(motion) > 1 and len(insertion.times) > 1 and times
+        else None
+    )
 
 
 def _one(cones: Cones, balls: Ellipsoids, number: int) -> tuple[Cones, Ellipsoids]:

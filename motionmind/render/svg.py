@@ -22,7 +22,7 @@ from motionmind.render.camera import SMOOTH, Corner
 from motionmind.render.figure import BRIDGED, INK, STEP, haze
 from motionmind.render.ground import GRID, GROUND, PAPER, SHADOW, Ground
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import GHOST, HOLD, TRACK, VIOLET, WORDS, Drawing, Stage, moments
+from motionmind.render.stage import GHOST, HOLD, SLOWEST, TRACK, VIOLET, WORDS, Drawing, Stage, moments
 from motionmind.render.trace import Lines, outlines, path, ridges, smooth
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ _LINE = 1.25  # width of lines, by those of pictures
 
 
 def write_svg(
-    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480
+    path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480, first: int = 0
 ) -> None:
     """Draw a motion as an animated SVG at `path`; a motion of one frame as a still one.
 
@@ -51,21 +51,22 @@ def write_svg(
         fps: frames a second; 12 by default.
         view: from where, one of `camera.VIEWS`.
         size: height of the picture in pixels.
+        first: number of the first frame, as `Stage` has it.
 
     Raises:
         MotionMindError: rate, view or size are none, or the file cannot be written.
     """
-    write_atomically(path, svg(motion, fps=fps, view=view, size=size).encode())
+    write_atomically(path, svg(motion, fps=fps, view=view, size=size, first=first).encode())
 
 
-def svg(motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480) -> str:
+def svg(motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480, first: int = 0) -> str:
     """The text of the file that `write_svg` writes.
 
     Each frame is a group among the definitions; one reference to them is shown, and its target changes.
     """
-    if fps is not None and not 0.0 < fps <= _MOST:
-        raise MotionMindError(f"an SVG has more than 0 and at most {_MOST:g} frames a second, not {fps:g}")
-    stage = Stage(motion, moments(motion, fps or _RATE), view=view, size=size)
+    if fps is not None and not SLOWEST <= fps <= _MOST:
+        raise MotionMindError(f"an SVG has from {SLOWEST:g} to {_MOST:g} frames a second, not {fps:g}")
+    stage = Stage(motion, moments(motion, fps or _RATE), view=view, size=size, first=first)
     artist = _Artist(stage)
     width, height = stage.camera.width, stage.camera.height
     text = [

@@ -22,7 +22,7 @@ function start() {
   const timeline = new Timeline($("timeline"), player, data.colours);
   const moving = motion.length > 1;
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
-  $("ends").hidden = motion.insertions.length === 0;
+  $("ends").hidden = motion.insertions.every((insertion) => motion.ends(insertion).length === 0);
 
   const refresh = () => {
     stale = true;
@@ -128,7 +128,7 @@ function describe(player) {
   $("play").dataset.playing = player.playing;
   $("loop").setAttribute("aria-pressed", String(player.loop));
   const bridged = motion.bridgedAt(time).map((joint) => motion.joints[joint]);
-  $("frame").textContent = `frame ${frame} of ${motion.length - 1}`;
+  $("frame").textContent = `frame ${motion.first + frame} of ${motion.first + motion.length - 1}`;
   $("time").textContent = `${time.toFixed(2)} s`;
   $("inserted").hidden = !motion.insertedAt(time);
   $("bridged").hidden = bridged.length === 0;

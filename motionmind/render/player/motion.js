@@ -10,6 +10,8 @@ export class Motion {
     this.times = new Float64Array(decoded(data.times)); // seconds, increasing [T]
     this.root = new Float32Array(decoded(data.root)); // metres [T * 3]
     this.rotations = unpacked(new Uint32Array(decoded(data.rotations))); // x, y, z, w, local to the parent [T * J * 4]
+    this.first = data.first; // the number of the first frame, where these are a part of something longer
+    this.farthest = data.farthest; // frames in which the body reaches farthest in some direction
     this.insertions = data.insertions; // {times [M + 1], bridged: [{joint, move}]}, from the earliest to the latest
   }
 
@@ -53,6 +55,11 @@ export class Motion {
   /** The insertion from whose A to whose B `time` is, or undefined. */
   insertionAt(time) {
     return this.insertions.find(({ times }) => times[0] - MOMENT <= time && time <= times.at(-1) + MOMENT);
+  }
+
+  /** When those of an insertion's A and B are that the frames hold. */
+  ends({ times }) {
+    return [times[0], times.at(-1)].filter((time) => this.start - MOMENT <= time && time <= this.end + MOMENT);
   }
 
   /** Whether the engine made the posture at `time`: it is between the A and the B of an insertion. */

@@ -20,7 +20,7 @@ import { COARSE, Figures, FINE, Marks, PAPER } from "motionmind/figure";
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const SHARPEST = 2; // device pixels to a CSS pixel, at most
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // what browsers call drawing without a GPU
-const SAMPLES = 150; // postures, at most, by which a path's extent is found
+const SAMPLES = 150; // postures, at most, beside those that reach farthest, by which a path's extent is found
 const MARGIN = 0.12; // metres round the ends of limbs that a body 1.70 m tall takes up, and some air
 const PIECES = 16; // of a line of the floor's grid, along which it fades
 const GHOSTS = 0.34; // strength of A and B
@@ -140,7 +140,7 @@ export class Stage {
     const { times } = this.motion;
     const ghosts = [];
     const insertion = ends && this.motion.insertionAt(time);
-    if (insertion) ghosts.push([insertion.times[0], GHOSTS], [insertion.times.at(-1), GHOSTS]);
+    if (insertion) for (const at of this.motion.ends(insertion)) ghosts.push([at, GHOSTS]);
     if (onion > 0) {
       const frame = this.motion.frameAt(time);
       ONION.forEach((strength, i) => {
@@ -173,7 +173,9 @@ export class Stage {
     const step = Math.max(1, Math.ceil(this.motion.length / SAMPLES));
     const [cones, balls] = [new Array(this.body.cones.length * 8), new Array(this.body.balls.length * 12)];
     this.cloud = [];
-    for (let frame = 0; frame < this.motion.length; frame += step) {
+    const frames = new Set(this.motion.farthest);
+    for (let frame = 0; frame < this.motion.length; frame += step) frames.add(frame);
+    for (const frame of frames) {
       this.#pose(this.motion.times[frame]);
       this.body.writeCones(cones);
       this.body.writeBalls(balls);

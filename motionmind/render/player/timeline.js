@@ -33,7 +33,7 @@ export class Timeline {
     const { time, frame } = this.player;
     this.playhead.style.left = `${100 * this.#share(time)}%`;
     this.element.setAttribute("aria-valuenow", time.toFixed(3));
-    this.element.setAttribute("aria-valuetext", `frame ${frame}, ${time.toFixed(2)} seconds`);
+    this.element.setAttribute("aria-valuetext", `frame ${this.motion.first + frame}, ${time.toFixed(2)} seconds`);
   }
 
   /** Draw all but the playhead. */
@@ -81,7 +81,7 @@ export class Timeline {
     const time = this.#timeAt(event);
     if (this.element.hasPointerCapture(event.pointerId)) this.player.seek(time);
     const bridged = this.motion.bridgedAt(time).map((joint) => this.motion.joints[joint]);
-    const words = [`${time.toFixed(2)} s`, `frame ${this.motion.frameAt(time)}`];
+    const words = [`${time.toFixed(2)} s`, `frame ${this.motion.first + this.motion.frameAt(time)}`];
     if (bridged.length > 0) words.push(`bridged: ${bridged.join(", ")}`);
     this.hint.textContent = words.join(" · ");
     this.hint.hidden = false;
