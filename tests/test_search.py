@@ -314,6 +314,7 @@ def test_more_states_than_a_node_can_number_are_refused() -> None:
         pair_ptr=np.zeros(1, np.int64),
         pair_states=np.zeros(0, np.int32),
         pair_costs=np.zeros(0),
+        allowed=np.ones(states, dtype=bool),
     )
     with pytest.raises(ValueError, match="70000"):
         solve.solve(model, np.array([0]), np.array([2]), Rules(1.0, 1.0, 1, 3, 100))

@@ -84,6 +84,7 @@ class Toy:
             _pointer(pairs),
             np.concatenate([*pairs, []]).astype(np.int32),
             np.concatenate([*discounts, []]).astype(np.float64),
+            np.ones(starts[-1], dtype=bool),
         )
 
     def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

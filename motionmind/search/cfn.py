@@ -8,45 +8,59 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from motionmind.search.problem import Ints, Model, build_grid, costs_to_go, with_waits
-from motionmind.search.solve import Rules
+from motionmind.search.solve import Rules, Via
 
 DECIMALS = 6
 
 
-def cfn(model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, lanes: Sequence[str]) -> str:
+def cfn(
+    model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, lanes: Sequence[str], vias: Sequence[Via] = ()
+) -> str:
     """The problem of exactly `moves` moves from states `start` [L] to `goal` [L], with the costs that are searched.
 
     Variables are named lane_t and their values after the lane's states, such as "s12"; the optimum is the cost that a
-    certificate states, the price of the moves themselves included.
+    certificate states, the price of the moves themselves included. `vias` are passed at the moves that they name.
     """
     held = with_waits(model, goal, rules.wait)
-    grid = build_grid(held, start, moves, costs_to_go(held, goal, moves), np.inf)
-    names = [f"{lanes[i % grid.lanes]}_{i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
-    domains = [slice(grid.dom_ptr[i], grid.dom_ptr[i + 1]) for i in range(len(names))]
+    stops = [(0, start), *((via.move or 0, via.states) for via in vias), (moves, goal)]
+    legs = [
+        (first, build_grid(held, leaving, last - first, costs_to_go(held, arriving, last - first), np.inf))
+        for (first, leaving), (last, arriving) in pairwise(stops)
+    ]
+    variables: dict[str, list[str]] = {}
 
     def functions() -> Iterator[tuple[str, list[str], dict[str, object]]]:
         yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
-        for i, name in enumerate(names):
-            lane = i % grid.lanes
-            yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
-            if i + grid.lanes < len(names):
-                after = i + grid.lanes
-                rows = range(domains[i].start, domains[i].stop)
-                edges = [(p, e) for p in rows for e in range(grid.row_ptr[p], grid.row_ptr[p + 1])]
-                listed = [
-                    (p - domains[i].start, grid.row_to[e] - domains[after].start, grid.row_cost[e]) for p, e in edges
-                ]
-                yield f"move_{name}", [name, names[after]], {"defaultcost": None, "costs": _flat(listed)}
-            if grid.up_ptr[i + 1] > grid.up_ptr[i]:
-                above = i - lane + grid.parents[lane]
-                couplings = range(grid.up_ptr[i], grid.up_ptr[i + 1])
-                pairs = [(u, q) for u in couplings for q in range(grid.col_ptr[u], grid.col_ptr[u + 1])]
-                listed = [(u - couplings.start, grid.col_to[q] - domains[i].start, grid.col_cost[q]) for u, q in pairs]
-                yield f"coordinate_{name}", [names[above], name], {"defaultcost": 0.0, "costs": _flat(listed)}
+        for first, grid in legs:
+            names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
+            domains = [slice(*span) for span in pairwise(grid.dom_ptr)]
+            for i, name in enumerate(names):
+                lane = i % grid.lanes
+                if name not in variables:  # what a leg starts with, the leg before has paid for
+                    variables[name] = [f"s{s}" for s in grid.dom[domains[i]]]
+                    yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
+                if i + grid.lanes < len(names):
+                    after = i + grid.lanes
+                    rows = range(domains[i].start, domains[i].stop)
+                    edges = [(p, e) for p in rows for e in range(grid.row_ptr[p], grid.row_ptr[p + 1])]
+                    listed = [
+                        (p - domains[i].start, grid.row_to[e] - domains[after].start, grid.row_cost[e])
+                        for p, e in edges
+                    ]
+                    yield f"move_{name}", [name, names[after]], {"defaultcost": None, "costs": _flat(listed)}
+                if grid.up_ptr[i + 1] > grid.up_ptr[i]:
+                    above = i - lane + grid.parents[lane]
+                    couplings = range(grid.up_ptr[i], grid.up_ptr[i + 1])
+                    pairs = [(u, q) for u in couplings for q in range(grid.col_ptr[u], grid.col_ptr[u + 1])]
+                    listed = [
+                        (u - couplings.start, grid.col_to[q] - domains[i].start, grid.col_cost[q]) for u, q in pairs
+                    ]
+                    yield f"coordinate_{name}", [names[above], name], {"defaultcost": 0.0, "costs": _flat(listed)}
 
     parts = list(functions())
     # Above what any path can cost: the sum of the dearest entries of all functions.
@@ -55,14 +69,11 @@ def cfn(model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, lanes: 
     for name, scope, body in parts:
         default = {"defaultcost": forbidden} if body.get("defaultcost", 0.0) is None else {}
         lines.append(f"{json.dumps(name)}: {json.dumps({'scope': scope, **body, **default})}")
-    variables = [
-        f"{json.dumps(name)}: {json.dumps([f's{s}' for s in grid.dom[where]])}"
-        for name, where in zip(names, domains, strict=True)
-    ]
+    values = [f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items()]
     problem = {"name": f"tween_{moves}_moves", "mustbe": f"<{forbidden:.{DECIMALS}f}"}
     return (
         f'{{"problem": {json.dumps(problem)},\n"variables": {{\n'
-        + ",\n".join(variables)
+        + ",\n".join(values)
         + '\n},\n"functions": {\n'
         + ",\n".join(lines)
         + "\n}}\n"

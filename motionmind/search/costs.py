@@ -61,4 +61,5 @@ def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price:
         pair_ptr,
         np.array(net.pair_states),
         discounts,
+        np.ones(len(graph.visits), dtype=bool),
     )

@@ -42,6 +42,7 @@ class Model(NamedTuple):
         pair_ptr: pairs of each pair row [sum + 1].
         pair_states: the lane's state in a listed pair [Q], increasing within a pair row.
         pair_costs: its discount, below 0 [Q].
+        allowed: whether a lane may be in a state on the way, at moves after the first posture and before the last [G].
     """
 
     starts: Ints
@@ -55,6 +56,7 @@ class Model(NamedTuple):
     pair_ptr: Ints
     pair_states: Indices
     pair_costs: Floats
+    allowed: NDArray[np.bool_]
 
 
 class Grid(NamedTuple):
@@ -122,8 +124,9 @@ def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
 
         V[0, goal] = 0,   V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + V[k - 1, s']
 
-    Infinite where no such walk exists. Summed over lanes it bounds the cost of T moves from below, since each
-    coupling is counted once, at the least it can cost its lane.
+    over states s' that are allowed on the way, and the goal with the last move. Infinite where no such walk exists.
+    Summed over lanes it bounds the cost of T moves from below, since each coupling is counted once, at the least it can
+    cost its lane.
     """
     value = np.full((moves + 1, model.starts[-1]), np.inf)
     for lane in range(len(model.parents)):
@@ -134,7 +137,8 @@ def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
                 best = np.inf
                 for e in range(model.indptr[row], model.indptr[row + 1]):
                     target = first + model.targets[e]
-                    best = min(best, model.costs[e] + model.alone[target] + value[k - 1, target])
+                    if k == 1 or model.allowed[target]:
+                        best = min(best, model.costs[e] + model.alone[target] + value[k - 1, target])
                 value[k, row] = best
     return value
 
@@ -148,7 +152,7 @@ def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
         value[0, first + start[lane]] = 0.0
         for t in range(moves):
             for row in range(first, last):
-                if value[t, row] < np.inf:
+                if value[t, row] < np.inf and (t == 0 or model.allowed[row]):
                     for e in range(model.indptr[row], model.indptr[row + 1]):
                         target = first + model.targets[e]
                         cost = value[t, row] + model.costs[e] + model.alone[target]
@@ -160,9 +164,9 @@ def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
 def build_grid(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> Grid:
     """The problem of exactly `moves` moves from `start` [L] to the goal that `to_go` leads to.
 
-    A state is in a domain if some walk of exactly T moves passes through it then, and if the cheapest such walk,
-    beside the other lanes' cheapest, costs less than `below` (a path's cost already known, or infinity): no better
-    path is lost. `to_go` is `costs_to_go` for at least T moves.
+    A state is in a domain if it is allowed there, some walk of exactly T moves passes through it then, and the cheapest
+    such walk, beside the other lanes' cheapest, costs less than `below` (a path's cost already known, or infinity): no
+    better path is lost. `to_go` is `costs_to_go` for at least T moves.
     """
     lanes = len(model.parents)
     dom_ptr, dom, place = _domains(model, start, moves, to_go, below)
@@ -204,7 +208,7 @@ def _domains(
                 for e in range(model.indptr[row], model.indptr[row + 1]):
                     led_to[model.targets[e]] = True
         for state in range(len(led_to)):
-            if led_to[state]:
+            if led_to[state] and (t in (0, moves) or model.allowed[first + state]):
                 through = so_far[t, first + state] + to_go[moves - t, first + state]
                 if through < np.inf and through - least <= spare + margin:
                     place[t, first + state] = count

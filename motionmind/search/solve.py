@@ -2,22 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.search import astar, bound
+from motionmind.search.legs import Legs
 from motionmind.search.polish import polish
 from motionmind.search.probe import probe
-from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
+from motionmind.search.problem import Floats, Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
 CASES = 1000  # that the bound is split into at most, for each number of moves
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
+
+Status = Literal["optimal", "bounded", "interrupted"]
+
+
+class Via(NamedTuple):
+    """States [L] to pass through between start and goal, at a certain move or, for None, at any."""
+
+    states: Ints
+    move: int | None = None
+
+
+class Progress(NamedTuple):
+    """How far a search is: the cost of the best path so far, infinite before there is any, what is proven of all paths,
+    and the nodes that A* has expanded."""
+
+    cost: float
+    lower_bound: float
+    expansions: int
+
+
+Watch = Callable[[Progress], bool | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,19 +51,21 @@ class Certificate:
         path: states [T + 1, L].
         cost: its cost in nats.
         lower_bound: no path within the rules costs less than this, in nats.
-        status: "optimal" where both agree to 1e-6 nats, else "bounded".
+        status: "optimal" where both agree to 1e-6 nats, else "interrupted" if it was, else "bounded".
         expansions: nodes expanded by A*.
         peak_nodes: the greatest number of nodes held at once.
         seconds: of the parts "problem", "bound" and "search"; a measurement, and no part of the proof.
+        passed: the moves at which it passes its vias.
     """
 
     path: NDArray[np.int32]
     cost: float
     lower_bound: float
-    status: Literal["optimal", "bounded"]
+    status: Status
     expansions: int
     peak_nodes: int
     seconds: dict[str, float]
+    passed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,54 +89,93 @@ class Rules:
     sweeps: int = 160
 
 
-def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
+def solve(
+    model: Model, start: Ints, goal: Ints, rules: Rules, vias: Sequence[Via] = (), watch: Watch | None = None
+) -> Certificate | None:
     """The best path from states `start` [L] to `goal` [L] over all numbers of moves; None where there is none.
 
     Numbers of moves are looked at in the order of what the lanes cost on their own. Each is bounded, then searched, and
     only as long as its bound is below the best path found; so the least bound of all proves the answer.
+
+    It passes through `vias` in their order, which divide it into legs of at least one move; with vias it is numbers of
+    moves of a leg that are looked at, each below what the best path leaves when the other legs cost as little as is
+    proven.
+
+    `watch` is told between pieces of work how far the search is; where it returns True the search ends as soon as any
+    path is known, with what is proven by then.
     """
     if np.diff(model.starts).max() > MOST_STATES:
         raise ValueError(f"a lane has {np.diff(model.starts).max()} states; the search takes up to {MOST_STATES}")
     clock = _Clock()
     held = with_waits(model, goal, rules.wait)
-    to_go = costs_to_go(held, goal, rules.longest)
-    alone = to_go[:, model.starts[:-1] + start].sum(axis=1) + rules.per_move * np.arange(rules.longest + 1)
+    stops = [start, *(via.states for via in vias), goal]
+    to_go = [costs_to_go(held, stop, rules.longest) for stop in stops[1:]]
+    legs = Legs(alone(held, stops, to_go, rules), rules.shortest, [via.move for via in vias])
     clock.lap("problem")
 
-    best, path, expansions, peak = np.inf, np.zeros((0, len(start)), dtype=np.int32), 0, 0
-    lower = np.where(np.arange(rules.longest + 1) >= rules.shortest, alone, np.inf)
-    for moves in np.argsort(lower, kind="stable"):
-        if not lower[moves] < best - PROVEN:
+    expansions, peak, interrupted = 0, 0, False
+
+    def stop() -> bool:
+        nonlocal interrupted
+        if watch is not None and not interrupted:
+            interrupted = bool(watch(Progress(legs.best, legs.lower_bound(), expansions)))
+        return interrupted
+
+    while True:
+        leg, moves, least, below = legs.most_promising()
+        if not least < legs.best - PROVEN or (stop() and np.isfinite(legs.best)):
             break
-        toll = rules.per_move * int(moves)
-        grid = build_grid(held, start, int(moves), to_go, best - toll)
+        toll = rules.per_move * moves
+        best, path = below - toll, np.zeros((0, len(start)), dtype=np.int32)
+        grid = build_grid(held, stops[leg], moves, to_go[leg], best)
         clock.lap("problem")
-        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best - toll)
-        known = min(found, best - toll)
-        if found < best - toll:
-            best, path = found + toll, states
+        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best, stop)
+        if found < best:
+            best, path = found, states
         clock.lap("bound")
-        if proven < known - PROVEN and expansions < rules.node_budget:
+        if proven < best - PROVEN and expansions < rules.node_budget and not stop():
             chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
             # f grows from what the messages prove by themselves; cases may have proven more.
             found, searched, expanded, held_nodes = astar.search(
-                grid, messages, float(messages.constants.sum()), known, chosen, rules.node_budget,
+                grid, messages, float(messages.constants.sum()), best, chosen, rules.node_budget,
                 rules.node_budget - expansions,
             )  # fmt: skip
             proven = max(proven, searched)
-            if found < known:
-                best, path = found + toll, _states(grid, chosen)
+            if found < best:
+                best, path = found, _states(grid, chosen)
             expansions, peak = expansions + expanded, max(peak, held_nodes)
             clock.lap("search")
-        lower[moves] = max(lower[moves], proven + toll)
-    if not np.isfinite(best):
+        legs.learn(leg, moves, proven + toll, best + toll if len(path) else np.inf, path)
+    if not np.isfinite(legs.best):
         return None
-    least = min(float(lower.min()), best)
-    proven_best = best - least <= PROVEN
-    return Certificate(path, best, least, "optimal" if proven_best else "bounded", expansions, peak, clock.seconds)
+    lower, (path, passed) = legs.lower_bound(), legs.path()
+    status: Status = "optimal" if legs.best - lower <= PROVEN else "interrupted" if interrupted else "bounded"
+    return Certificate(path, legs.best, lower, status, expansions, peak, clock.seconds, passed)
 
 
-def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
+def alone(held: Model, stops: Sequence[Ints], to_go: Sequence[Floats], rules: Rules) -> Floats:
+    """What each of K legs costs at least, its lanes on their own, at each number of moves [K, longest + 1].
+
+    Infinite where a leg cannot have as many moves, and finite where it can. `held` has its waits, and `to_go` leads to
+    each stop but the first.
+    """
+    moves = np.arange(rules.longest + 1)
+    out = np.array(
+        [
+            costs[:, held.starts[:-1] + stop].sum(axis=1) + rules.per_move * moves
+            for stop, costs in zip(stops[:-1], to_go, strict=True)
+        ]
+    )
+    if len(out) > 1:
+        out[:, 0] = np.inf
+    if not all(held.allowed[held.starts[:-1] + stop].all() for stop in stops[1:-1]):
+        out[:] = np.inf
+    return out
+
+
+def _bound(
+    grid: Grid, sweeps: int, below: float, stop: Callable[[], bool]
+) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
     """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
 
     Every few sweeps the path that they met, if better than those before, is polished, and positions that no better
@@ -135,6 +199,8 @@ def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray
         if np.any(np.diff(grid.dom_ptr) == 0):
             proven = known
             break
+        if stop():
+            return min(proven, known), cost, states, grid, messages
         if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
             break
     if proven < min(cost, below) - PROVEN:
