@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from motionmind import rotations as rot
 from motionmind import survey
+from motionmind.asked import culprits, restricted, restrictions
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
 from motionmind.grammar.coordination import fit_network
@@ -18,10 +21,12 @@ from motionmind.learned import Learned
 from motionmind.mapping import joint_mapping
 from motionmind.motion import FASTEST, Posture
 from motionmind.realise.realise import realise
+from motionmind.realise.timing import usual
 from motionmind.retarget import to_human23
-from motionmind.search.costs import price
+from motionmind.search.astar import nodes_in
+from motionmind.search.costs import dearer, price, shared_moves
 from motionmind.search.problem import Model
-from motionmind.search.solve import Certificate, Rules, solve
+from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
 from motionmind.tween import Posed, Tween, diagnose, explain
 
@@ -31,8 +36,10 @@ if TYPE_CHECKING:
 
 NODE_BUDGET = 200_000
 MAX_MOVES = 60
+DIVERSITY = 2.0  # nats
 MOST_MOVES = 10_000  # what is asked for beyond these is a slip of the keyboard, and more than memory holds
 MOST_NODES = 1_000_000_000
+MOST_MEMORY = 1 << 50  # bytes
 SLOWEST = 0.01  # frames a second
 
 
@@ -40,7 +47,7 @@ SLOWEST = 0.01  # frames a second
 class Engine(Learned):
     """What was learned from a corpus (see Learned), ready to answer."""
 
-    _priced: dict[tuple[Weights, float, float | None], Model] = field(default_factory=dict, repr=False)
+    _priced: dict[tuple[Weights, float, float | None, float], Model] = field(default_factory=dict, repr=False)
 
     # --- asking -----------------------------------------------------------------------------------------------------
 
@@ -49,62 +56,117 @@ class Engine(Learned):
         a: Posture,
         b: Posture,
         *,
-        moves: int | None = None,
+        moves: int | tuple[int, int] | None = None,
         max_moves: int = MAX_MOVES,
+        duration: float | None = None,
+        pin: Mapping[str, str] = MappingProxyType({}),
+        hold: Sequence[str] = (),
+        avoid: Sequence[tuple[str, int | str]] = (),
+        via: Sequence[Posture | tuple[Posture, int]] = (),
+        unlike: Sequence[Tween] = (),
+        diversity: float = DIVERSITY,
         strict: bool = False,
         node_budget: int = NODE_BUDGET,
+        memory: int | None = None,
         weights: Weights = "conditional",
+        novelty: float = 0.0,
         lambda_: float = 1.0,
         beta: float = 1.0,
         tau: float = 1.0,
         bridge_price: float = 1.0,
         fps: float = 30.0,
+        watch: Watch | None = None,
     ) -> Tween:
         """The best movement from posture `a` to posture `b` in the style of the corpus.
 
         Args:
             a: where it starts, exactly.
             b: where it ends, exactly.
-            moves: how many moves; None lets the search find the best number.
+            moves: how many moves, or the least and the greatest number; None lets the search find the best number.
             max_moves: the greatest number that it may find.
+            duration: seconds that the motion lasts, exactly; where `moves` is None they tell how many moves, each as
+                long as the corpus's usual.
+            pin: joints that are in A's state until the last move ("A"), or in B's from the first move on ("B").
+            hold: joints that stay in their state all the way, where A and B agree; a standing leg, say.
+            avoid: joints, each with a state, by its number or name, that it is not in on the way from A to B.
+            via: postures to pass through on the way, in this order; at any move, or as (posture, move) at that one.
+            unlike: tweens that it is to differ from.
+            diversity: nats for each move of a joint from one state to another that one of `unlike` makes, for each.
             strict: no bridges: every move of every joint is attested, or a wait at its goal.
             node_budget: nodes that the search may hold at once; it stops after as many expansions.
+            memory: bytes that those nodes may take; instead of `node_budget`.
             weights: "conditional", -log P(next state | state), or "printed", as the papers print it.
+            novelty: from 0, where what is frequent in the corpus is cheap, to 1, where all moves that it attests from a
+                state cost the same.
             lambda_: factor of the network's -log P(joint's state | parent's state), summed over joints and postures.
             beta: nats for each move that a joint waits at its goal.
             tau: nats for each move.
             bridge_price: nats for each degree of an unattested move.
             fps: frames a second of the motion.
+            watch: called between pieces of work with how far the search is; where it returns True, the best path so
+                far is the answer, with what is proven by then.
 
         Raises:
             NoPathError: nothing joins them under these rules; the message is the diagnosis.
-            SkeletonError: a posture is on another skeleton than the corpus.
-            MotionMindError: an option is out of its range.
+            SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
+            MotionMindError: an option is out of its range, or asks for what cannot be.
         """
-        _check_options(moves, max_moves, node_budget, fps, weights, lambda_, beta, tau, bridge_price)
-        a, b = self._on_skeleton(a, "A"), self._on_skeleton(b, "B")
+        least, most = _range(moves, max_moves)
+        _check_options(node_budget, fps, weights, novelty, lambda_, beta, tau, bridge_price, diversity)
+        if memory is not None:
+            node_budget = _nodes(memory, len(self.space))
+        if duration is not None:
+            least, most = self._moves_in(duration, fps, moves, least, most)
+        fixed = moves is not None or duration is not None
+        a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
+        postures, at = self._vias(via)
         began = perf_counter()
-        ends = self.corpus.to_lanes(np.stack([a.rotations, b.rotations]))
-        states = self.space.assign(ends)
-        snap = self.space.distance(ends, states)
-        start, goal = states.astype(np.int64)
-        model = self._model(weights, lambda_, None if strict else bridge_price)
-        rules = Rules(beta, tau, moves or 1, moves or max_moves, node_budget)
+        stops = self.corpus.to_lanes(np.stack([end.rotations for end in (a, *postures, b)]))
+        states = self.space.assign(stops)
+        snap = self.space.distance(stops, states)
+        start, *passing, goal = states.astype(np.int64)
+        asked = restrictions(self.space, start, goal, pin, hold, avoid)
+        model = self._model(weights, lambda_, None if strict else bridge_price, novelty)
+        if unlike:
+            model = dearer(model, [other.path for other in unlike], diversity)
+        posed = Posed(
+            restricted(model, asked),
+            start,
+            goal,
+            Rules(beta, tau, least, most, node_budget),
+            tuple(Via(through, move) for through, move in zip(passing, at, strict=True)),
+        )
         posing = perf_counter() - began
-        if moves is None and _same(a, b):
+        if not fixed and not via and _same(a, b):
             stay = states[:1]
             certificate: Certificate | None = Certificate(
                 stay, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0}
             )
         else:
-            certificate = solve(model, start, goal, rules)
+            certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
         if certificate is None:
-            raise NoPathError(diagnose(model, self.grammar, start, goal, rules, strict))
+            faults = culprits(self.grammar.lanes, model, posed, asked)
+            raise NoPathError(faults or diagnose(model, self.grammar, start, goal, posed.rules, strict))
         attested, bridges, waits, sources = explain(
-            certificate, self.grammar, self.corpus, self.grammar.transitions.weights(weights), beta, bridge_price
+            certificate,
+            self.grammar,
+            self.corpus,
+            self.grammar.transitions.weights(weights, novelty),
+            beta,
+            bridge_price,
         )
         began = perf_counter()
-        motion = realise(certificate.path, a, b, self.corpus, self.states, self.grammar, self.carriage, fps)
+        motion = realise(
+            certificate.path,
+            a,
+            b,
+            self.corpus,
+            self.states,
+            self.grammar,
+            self.carriage,
+            fps,
+            duration,
+        )
         spent = certificate.seconds
         (insertion,) = motion.insertions
         # A facing that is bridged shows at the root, which turns with it.
@@ -120,7 +182,10 @@ class Engine(Learned):
             attested=attested,
             bridges=bridges,
             waits=waits,
-            snap_degrees=snap,
+            shared=shared_moves(certificate.path, [other.path for other in unlike]),
+            passed=certificate.passed,
+            snap_degrees=snap[[0, -1]],
+            via_degrees=snap[1:-1],
             sources=sources,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
@@ -132,12 +197,60 @@ class Engine(Learned):
                 "search": spent["search"],
                 "realise": perf_counter() - began,
             },
-            posed=Posed(model, start, goal, rules),
+            posed=posed,
+            asked={
+                "moves": list(moves) if isinstance(moves, tuple) else moves,
+                "max_moves": max_moves,
+                "duration": duration,
+                "pin": dict(pin),
+                "hold": list(hold),
+                "avoid": [list(one) for one in avoid],
+                "via": list(at),
+                "unlike": len(unlike),
+                "diversity": diversity,
+                "strict": strict,
+                "node_budget": node_budget,
+                "memory": memory,
+                "weights": weights,
+                "novelty": novelty,
+                "lambda": lambda_,
+                "beta": beta,
+                "tau": tau,
+                "bridge_price": bridge_price,
+                "fps": fps,
+            },
         )
 
-    def _model(self, weights: Weights, coordination: float, bridge_price: float | None) -> Model:
+    def _vias(self, via: Sequence[Posture | tuple[Posture, int]]) -> tuple[list[Posture], list[int | None]]:
+        """The postures to pass through, and the move at which each is, or None."""
+        postures, at = [], []
+        for number, given in enumerate(via, start=1):
+            posture, move = given if isinstance(given, tuple) else (given, None)
+            if move is not None and not (isinstance(move, int | np.integer) and 1 <= move < MOST_MOVES):
+                raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
+            postures.append(self._on_skeleton(posture, f"via {number}"))
+            at.append(None if move is None else int(move))
+        return postures, at
+
+    def _moves_in(
+        self, duration: float, fps: float, moves: int | tuple[int, int] | None, least: int, most: int
+    ) -> tuple[int, int]:
+        """The least and greatest number of moves of a motion that lasts `duration` seconds: the nearest number of
+        moves of the corpus's usual length, unless `moves` says otherwise."""
+        seconds = usual(self.grammar.transitions)
+        longest = MOST_MOVES * seconds
+        if not 1.0 / fps <= duration <= longest:
+            raise MotionMindError(
+                f"duration must be a number of seconds from a frame's {1.0 / fps:g} to {longest:g}, not {duration}"
+            )
+        if moves is not None:
+            return least, most
+        nearest = max(1, round(duration / seconds))
+        return nearest, nearest
+
+    def _model(self, weights: Weights, coordination: float, bridge_price: float | None, novelty: float) -> Model:
         """The costs of the grammar, kept from one question to the next as long as they are asked for alike."""
-        asked = (weights, coordination, bridge_price)
+        asked = (weights, coordination, bridge_price, novelty)
         if asked not in self._priced:
             self._priced.clear()
             self._priced[asked] = price(self.grammar, *asked)
@@ -150,9 +263,7 @@ class Engine(Learned):
             posture = to_human23(posture)
         difference = skeleton.difference(posture.skeleton)
         if difference is not None:
-            raise SkeletonError(
-                f"posture {which} is on another skeleton than corpus {self.corpus.name!r}: {difference}"
-            )
+            raise SkeletonError(f"{which} is on another skeleton than corpus {self.corpus.name!r}: {difference}")
         return posture
 
     # --- looking ----------------------------------------------------------------------------------------------------
@@ -208,20 +319,41 @@ def _same(a: Posture, b: Posture) -> bool:
     return bool(np.all(rot.angle(a.rotations, b.rotations) < 1e-6) and np.all(np.abs(a.root - b.root) < 1e-6))
 
 
-def _check_options(
-    moves: int | None, max_moves: int, node_budget: int, fps: float, weights: str, *prices: float
-) -> None:
-    for name, value, most in (
-        ("moves", moves, MOST_MOVES),
-        ("max_moves", max_moves, MOST_MOVES),
-        ("node_budget", node_budget, MOST_NODES),
-    ):
-        if value is not None and not (isinstance(value, int | np.integer) and 1 <= value <= most):
-            raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
+def _range(moves: int | tuple[int, int] | None, max_moves: int) -> tuple[int, int]:
+    """The least and the greatest number of moves."""
+    _check_count("max_moves", max_moves, MOST_MOVES)
+    if moves is None:
+        return 1, max_moves
+    least, most = moves if isinstance(moves, tuple) else (moves, moves)
+    _check_count("moves", least, MOST_MOVES)
+    _check_count("moves", most, MOST_MOVES)
+    if least > most:
+        raise MotionMindError(f"moves must be a range from the least to the greatest, not from {least} to {most}")
+    return int(least), int(most)
+
+
+def _nodes(memory: int, lanes: int) -> int:
+    """How many nodes there may be in `memory` bytes."""
+    _check_count("memory", memory, MOST_MEMORY)
+    nodes = nodes_in(int(memory), lanes)
+    if nodes < 1:
+        raise MotionMindError(f"memory of {memory} bytes holds not one node; give some megabytes")
+    return min(nodes, MOST_NODES)
+
+
+def _check_count(name: str, value: int, most: int) -> None:
+    if not (isinstance(value, int | np.integer) and 1 <= value <= most):
+        raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
+
+
+def _check_options(node_budget: int, fps: float, weights: str, novelty: float, *prices: float) -> None:
+    _check_count("node_budget", node_budget, MOST_NODES)
     if not SLOWEST <= fps <= FASTEST:
         raise MotionMindError(f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {fps}")
     if weights not in ("conditional", "printed"):
         raise MotionMindError(f"weights must be 'conditional' or 'printed', not {weights!r}")
-    for name, price_ in zip(("lambda", "beta", "tau", "bridge_price"), prices, strict=True):
+    if not 0.0 <= novelty <= 1.0:
+        raise MotionMindError(f"novelty must be a number from 0 to 1, not {novelty}")
+    for name, price_ in zip(("lambda", "beta", "tau", "bridge_price", "diversity"), prices, strict=True):
         if not (np.isfinite(price_) and price_ >= 0.0):
             raise MotionMindError(f"{name} must be a number of nats of at least 0, not {price_}")

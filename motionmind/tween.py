@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Motion
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Ints, Model
-from motionmind.search.solve import Certificate, Rules
+from motionmind.search.solve import Certificate, Rules, Status, Via
 
 Floats = NDArray[np.float64]
 
@@ -59,12 +59,13 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """The problem as the search was given it: the costs, start and goal states [L], and the rules."""
+    """The problem as the search was given it: the costs, start and goal states [L], the rules, and the vias."""
 
     model: Model
     start: Ints
     goal: Ints
     rules: Rules
+    vias: tuple[Via, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,36 +76,46 @@ class Tween:
         motion: the movement; its first and last frames are A and B, and its one insertion leads from one to the other.
         joints: the lanes [L]: the skeleton's joints, then "facing" where that is a lane of its own.
         path: states of the lanes [moves + 1, L].
-        status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded".
+        status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded", or "interrupted" if the search
+            was ended before its time.
         cost: of the path, nats.
         lower_bound: no path within the rules that were asked for costs less, nats.
         attested: share of the joints' moves that the corpus attests.
         bridges: the moves that it does not, but for waits.
         waits: moves spent waiting at the goal.
+        shared: how many moves of joints it shares with the tweens that it was to differ from, counted for each of them.
+        passed: the moves at which it passes the postures that it was to pass through.
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
+        via_degrees: the same for the postures that it was to pass through [K, L].
         sources: for each move and lane one place in the corpus that attests it, None where none does.
         expansions: of A*.
         peak_nodes: the greatest number of nodes that A* held.
         node_budget: the number that it might hold.
         seconds: spent on "load", "problem", "bound", "search" and "realise"; measured, so it differs from run to run.
+        posed: the problem that was solved.
+        asked: what was asked for, as plain values.
     """
 
     motion: Motion
     joints: tuple[str, ...]
     path: NDArray[np.int32]
-    status: Literal["optimal", "bounded"]
+    status: Status
     cost: float
     lower_bound: float
     attested: float
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
+    shared: int
+    passed: tuple[int, ...]
     snap_degrees: Floats
+    via_degrees: Floats
     sources: tuple[tuple[Source | None, ...], ...]
     expansions: int
     peak_nodes: int
     node_budget: int
     seconds: dict[str, float]
     posed: Posed
+    asked: dict[str, Any]
 
     @property
     def moves(self) -> int:
@@ -119,6 +130,7 @@ class Tween:
     def report(self) -> dict[str, Any]:
         """All but the movement itself, as plain values for JSON."""
         return {
+            "asked": self.asked,
             "status": self.status,
             "cost": self.cost,
             "lower_bound": self.lower_bound,
@@ -135,6 +147,11 @@ class Tween:
                 {"joint": b.joint, "move": b.move, "degrees": b.degrees, "price": b.price} for b in self.bridges
             ],
             "waits": [{"joint": w.joint, "move": w.move, "price": w.price} for w in self.waits],
+            "shared": self.shared,
+            "vias": [
+                {"move": move, "snap_degrees": dict(zip(self.joints, map(float, row), strict=True))}
+                for move, row in zip(self.passed, self.via_degrees, strict=True)
+            ],
             "snap_degrees": {
                 end: dict(zip(self.joints, map(float, row), strict=True))
                 for end, row in zip("AB", self.snap_degrees, strict=True)
@@ -143,9 +160,13 @@ class Tween:
         }
 
     def problem(self) -> str:
-        """The problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`."""
+        """The problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`.
+
+        Postures to pass through are passed there at the moves at which this tween passes them.
+        """
         posed = self.posed
-        return cfn(posed.model, posed.start, posed.goal, posed.rules, self.moves, self.joints)
+        vias = [Via(via.states, move) for via, move in zip(posed.vias, self.passed, strict=True)]
+        return cfn(posed.model, posed.start, posed.goal, posed.rules, self.moves, self.joints, vias)
 
 
 def explain(

@@ -216,6 +216,7 @@ def test_a_body_of_one_joint_is_a_body() -> None:
 # --- what it says -----------------------------------------------------------------------------------------------------
 
 REPORT = [
+    "asked",
     "status",
     "cost",
     "lower_bound",
@@ -230,6 +231,8 @@ REPORT = [
     "attested",
     "bridges",
     "waits",
+    "shared",
+    "vias",
     "snap_degrees",
     "sources",
 ]

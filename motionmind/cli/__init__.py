@@ -13,7 +13,7 @@ import click
 import motionmind.cli.corpora
 import motionmind.cli.pictures
 import motionmind.cli.scores  # noqa: F401 (each adds its commands)
-from motionmind.cli.commands import app
+from motionmind.cli.commands import INTERRUPTED, app
 from motionmind.cli.printing import Notes, say
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 
@@ -21,7 +21,6 @@ __all__ = ["app", "main"]
 
 BAD_INPUT = 2  # exit code for everything that the user can put right
 NO_PATH = 3  # where nothing joins A and B
-INTERRUPTED = 130  # by Ctrl-C, as shells have it
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

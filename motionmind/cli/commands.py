@@ -19,15 +19,25 @@ from motionmind.cli.options import (
     OUTPUTS,
     RATE,
     InOrder,
+    Moves,
+    Number,
+    Size,
+    avoided,
     example,
+    numbered,
+    passing,
+    pins,
     reading,
 )
-from motionmind.cli.printing import count, note, print_tween, progress
+from motionmind.cli.printing import Interruption, count, note, print_alternatives, print_tween, progress
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.formats.papers import Form
+    from motionmind.tween import Tween
+
+INTERRUPTED = 130  # by Ctrl-C, as shells have it
 
 
 @click.group(
@@ -54,13 +64,41 @@ def app(context: click.Context) -> None:
 @click.option("--corpus", required=True, metavar="NAME", help="Corpus whose style it takes, by name or folder.")
 @click.option("-o", "--output", type=FILE, help=f"Where it goes: {OUTPUTS}.")
 @click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
-@click.option("--moves", type=COUNT, metavar="N", help="Number of moves  [default: the search finds it]")
+@click.option(
+    "--moves", type=Moves(), metavar="N", help="Number of moves, or a range, 6..10  [default: the search finds it]"
+)
 @click.option("--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find.")
+@click.option(
+    "--duration", type=Number(min=0, min_open=True), metavar="SECONDS", help="How long it lasts; and so how many moves."
+)
+@click.option(
+    "--pin", multiple=True, metavar="JOINT[=B]", help="In A's state until the last move; =B: in B's from the first on."
+)
+@click.option(
+    "--hold",
+    multiple=True,
+    metavar="JOINTS",
+    help="In their state all the way, where A and B agree; with commas between.",
+)
+@click.option("--avoid", multiple=True, metavar="JOINT=STATE", help="Not in this state on the way, by number or name.")
+@click.option(
+    "--via", multiple=True, metavar="FILE[@N]", help="A posture to pass through, at move N or any; several in order."
+)
+@click.option("--alternatives", type=COUNT, metavar="K", help="So many tweens that differ: out-1.json, out-2.json, ...")
+@click.option(
+    "--diversity", type=NATS, default=2.0, help="Nats for each joint's move that an alternative shares with one before."
+)
 @click.option("--strict", is_flag=True, help="No bridges: every move attested, or exit code 3.")
-@click.option("--node-budget", type=COUNT, metavar="N", default=200_000, help="Nodes that the search may hold at once.")
+@click.option(
+    "--node-budget", type=COUNT, metavar="N", help="Nodes that the search may hold at once  [default: 200000]"
+)
+@click.option("--memory", type=Size(), metavar="SIZE", help="What these may take, as 200MB, instead of their number.")
 @click.option("--problem", type=FILE, help="Where the problem that was solved goes: .cfn, for toulbar2.")
 @click.option(
     "--weights", type=click.Choice(["conditional", "printed"]), default="conditional", help="How transitions weigh."
+)
+@click.option(
+    "--novelty", type=Number(min=0, max=1), default=0.0, help="0: the frequent is cheap; 1: all that is attested alike."
 )
 @click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of how joints coordinate.")
 @click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal.")
@@ -76,11 +114,19 @@ def tween(
     report: Path | None,
     problem: Path | None,
     home: Path | None,
+    alternatives: int | None,
+    node_budget: int | None,
+    memory: int | None,
+    pin: tuple[str, ...],
+    hold: tuple[str, ...],
+    avoid: tuple[str, ...],
+    via: tuple[str, ...],
     **options: Any,
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
 
-    Exit code 3 says that nothing joins them under the rules that were asked for.
+    Ctrl-C ends the search: what it has found by then is written, with what is proven of it, and the exit code is 130.
+    Exit code 3 says that nothing joins A and B under the rules that were asked for.
     """
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
@@ -88,26 +134,51 @@ def tween(
     from motionmind.formats import read_posture, write_atomically
     from motionmind.jit import is_compiled
 
+    if node_budget is not None and memory is not None:
+        raise MotionMindError("--memory says how many nodes there may be, and so does --node-budget: give one of them")
+    if node_budget is not None:
+        options["node_budget"] = node_budget
+    stops = passing(via)
+    options |= {"memory": memory, "pin": pins(pin), "avoid": avoided(avoid)}
+    options["hold"] = [joint for word in hold for joint in word.split(",")]
+
     alone = report == Path("-")
     wanted = ((output, MOVEMENT + PICTURES), (None if alone else report, ()), (problem, (".cfn",)))
-    written = check_outputs([(path, suffixes) for path, suffixes in wanted if path], [a, b])
+    numbers = range(1, (alternatives or 1) + 1)
+    places = [
+        [(numbered(path, number, alternatives), suffixes) for path, suffixes in wanted if path] for number in numbers
+    ]
+    check_outputs([place for group in places for place in group], [a, b, *(path for path, _ in stops)])
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
+    options["via"] = [read_posture(path) if move is None else (read_posture(path), move) for path, move in stops]
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
-    result = engine.tween(*ends, **options)
-    text = json.dumps(result.report())
-    with all_or_none(written):
-        if output:
-            write(output, result.motion)
-        if problem:
-            write_atomically(problem, result.problem().encode())
-        if report and not alone:
-            write_atomically(report, f"{text}\n".encode())
+    found: list[Tween] = []
+    with Interruption() as interruption:
+        for _ in numbers:
+            found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
+            if interruption.asked:
+                break
+    files = [numbered(path, number, alternatives) for number in numbers[: len(found)] for path, _ in wanted if path]
+    with all_or_none(files):
+        for number, result in zip(numbers, found, strict=False):
+            if output:
+                write(numbered(output, number, alternatives), result.motion)
+            if problem:
+                write_atomically(numbered(problem, number, alternatives), result.problem().encode())
+            if report and not alone:
+                text = json.dumps(result.report())
+                write_atomically(numbered(report, number, alternatives), f"{text}\n".encode())
     if alone:
-        click.echo(text)
+        reports = [result.report() for result in found]
+        click.echo(json.dumps(reports[0] if alternatives is None else reports))
+    elif alternatives is None:
+        print_tween(found[0], files)
     else:
-        print_tween(result, written)
+        print_alternatives(found, files)
+    if interruption.asked:
+        click.get_current_context().exit(INTERRUPTED)
 
 
 @app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import click
 
@@ -33,6 +34,36 @@ class Number(click.FloatRange):
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)
         return number
+
+
+class Moves(click.ParamType["int | tuple[int, int]"]):
+    """A number of moves, "8", or a range of it, "6..10"."""
+
+    name = "moves"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | tuple[int, int]:
+        """The number, or the least and the greatest."""
+        words = str(value).split("..")
+        if len(words) > 2 or not all(word.isdecimal() and int(word) > 0 for word in words):
+            self.fail(f"{value!r} is no number of moves such as 8, and no range such as 6..10.", param, ctx)
+        least, most = int(words[0]), int(words[-1])
+        if least > most:
+            self.fail(f"{value!r} ends before it begins.", param, ctx)
+        return least if len(words) == 1 else (least, most)
+
+
+class Size(click.ParamType[int]):
+    """Bytes, as 200MB; units are powers of 1000."""
+
+    name = "size"
+    units: ClassVar[dict[str, int]] = {"": 1, "KB": 1000, "MB": 1000**2, "GB": 1000**3}
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number of bytes."""
+        found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([KMG]B)?", str(value).strip(), re.IGNORECASE | re.ASCII)
+        if not found:
+            self.fail(f"{value!r} is no size such as 200MB.", param, ctx)
+        return round(float(found[1]) * self.units[(found[2] or "").upper()])
 
 
 FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
@@ -106,3 +137,40 @@ def mixture(given: Sequence[str]) -> dict[str, float]:
             raise MotionMindError(f"--mix {word}: {corpus} is given twice")
         found[corpus] = value
     return found
+
+
+def pins(given: Sequence[str]) -> dict[str, str]:
+    """Which joint is pinned to which end, from words such as "left_wrist", to A, and "left_wrist=B"."""
+    found: dict[str, str] = {}
+    for word in given:
+        joint, equals, end = word.partition("=")
+        if end not in ("A", "B") and equals:
+            raise MotionMindError(f"--pin {word}: give JOINT or JOINT=A for A's state, JOINT=B for B's")
+        if found.setdefault(joint, end or "A") != (end or "A"):
+            raise MotionMindError(f"--pin {word}: {joint} is pinned to A and to B")
+    return found
+
+
+def avoided(given: Sequence[str]) -> list[tuple[str, int | str]]:
+    """Joints and the states that they avoid, from words such as "left_hip=7" and "left_hip=passe"."""
+    found: list[tuple[str, int | str]] = []
+    for word in given:
+        joint, _, state = word.partition("=")
+        if not state:
+            raise MotionMindError(f"--avoid {word}: give JOINT=STATE, such as left_hip=7")
+        found.append((joint, int(state) if state.isdecimal() else state))
+    return found
+
+
+def passing(given: Sequence[str]) -> list[tuple[Path, int | None]]:
+    """Files of postures to pass through and the moves at which, from words such as "C.json" and "C.json@3"."""
+    found: list[tuple[Path, int | None]] = []
+    for word in given:
+        name, _, move = word.rpartition("@")
+        found.append((Path(name), int(move)) if name and move.isdecimal() else (Path(word), None))
+    return found
+
+
+def numbered(path: Path, number: int, of: int | None) -> Path:
+    """The file of one of several tweens: "out.json" becomes "out-1.json"; as it is for a single one."""
+    return path if of is None else path.with_stem(f"{path.stem}-{number}")

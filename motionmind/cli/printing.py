@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
+import math
+import signal
 import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
@@ -14,6 +17,7 @@ import click
 from motionmind.errors import MotionMindWarning
 
 if TYPE_CHECKING:
+    from motionmind.search.solve import Progress
     from motionmind.tween import Tween
 
 
@@ -49,6 +53,38 @@ def count(number: int, what: str) -> str:
     return f"{number} {what}{'s' * (number != 1)}"
 
 
+class Interruption:
+    """While it is entered, Ctrl-C does not end the program but asks the search to end with what it has found.
+
+    Attributes:
+        asked: whether Ctrl-C was pressed.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._said = monotonic()
+
+    def __enter__(self) -> Interruption:
+        self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+        if sys.stderr.isatty():
+            click.echo("\r\x1b[2K", err=True, nl=False)
+
+    def watch(self, so_far: Progress) -> bool:
+        """Say on a terminal, once a second, how far the search is; whether it is to end."""
+        if sys.stderr.isatty() and monotonic() > self._said + 1.0:
+            self._said = monotonic()
+            best = f"best so far {so_far.cost:.3f}" if so_far.cost < math.inf else "no path yet"
+            click.echo(f"\r\x1b[2K{best}, proven {so_far.lower_bound:.3f} nats (Ctrl-C ends here)", err=True, nl=False)
+        return self.asked
+
+    def _ask(self, *_: object) -> None:
+        self.asked = True
+
+
 def print_tween(result: Tween, files: Sequence[Path]) -> None:
     """A tween in a few lines: moves, cost, what is proven, what it is made of, and the files written."""
     seconds = float(result.motion.times[-1])
@@ -62,14 +98,31 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         ("bridged", ", ".join(bridged) or "none"),
         ("waited", ", ".join(f"{joint} {count(times, 'move')}" for joint, times in waited.items()) or "none"),
     ]
-    for end, row in zip("AB", result.snap_degrees, strict=True):
+    stops = [("A", "", result.snap_degrees[0]), ("B", "", result.snap_degrees[1])]
+    for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
+        stops.insert(number, (f"via {number}", f"at move {move}, ", row))
+    for stop, where, row in stops:
         worst = int(row.argmax())
         mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
-        lines.append((end, f"{mean} off the corpus's states, at most {most}"))
+        lines.append((stop, f"{where}{mean} off the corpus's states, at most {most}"))
     if files:
         lines.append(("written", ", ".join(map(click.format_filename, files))))
     for name, line in lines:
         click.echo(f"{name:10}{line}")
+
+
+def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
+    """Tweens that differ, a line each: what each costs, the price of what it shares with those before included."""
+    click.echo("    moves  seconds      cost  proven      gap    attested  bridged  shared with those before")
+    for number, result in enumerate(results, start=1):
+        changes = int((result.path[1:] != result.path[:-1]).sum())
+        click.echo(
+            f"{number:2}  {result.moves:5}  {result.motion.times[-1]:7.2f}  {result.cost:8.3f}  {result.status:11} "
+            f"{result.gap:6.2%} {result.attested:8.1%}  {len(result.bridges):7}  {result.shared} of "
+            f"{count(changes * (number - 1), 'move')}"
+        )
+    if files:
+        click.echo(f"written   {', '.join(map(click.format_filename, files))}")
 
 
 def _attesters(result: Tween) -> str:

@@ -51,13 +51,17 @@ class Transitions:
         """Number of states in each lane [L]."""
         return np.diff(self.starts)
 
-    def weights(self, scheme: Weights) -> Floats:
+    def weights(self, scheme: Weights, novelty: float = 0.0) -> Floats:
         """Weight in nats of each transition s -> s' [E].
 
         `conditional` is -log P(s' | s) = log C(s) - log C(s, s'), C(s) counted over the transitions that leave s
         ([I98] 2.2.1); `printed` is -log f(s) + log f(s') - log f(s, s') with relative frequencies, as [C98] and
-        [TR97] print it.
+        [TR97] print it. `novelty` from 0 to 1 tempers either: at 1 all n transitions that leave s cost log n alike.
         """
+        weights = self._weights(scheme)
+        return (1.0 - novelty) * weights + novelty * np.log(np.diff(self.indptr)[self.sources])
+
+    def _weights(self, scheme: Weights) -> Floats:
         sources = self.sources
         if scheme == "conditional":
             leaving = np.bincount(sources, weights=self.counts, minlength=len(self.visits))

@@ -26,6 +26,7 @@ def realise(
     grammar: Grammar,
     carriage: Carriage,
     fps: float,
+    length: float | None = None,
 ) -> Motion:
     """The motion of a path of states [T + 1, L] from posture `a` to posture `b`, on the body of `a`.
 
@@ -44,11 +45,13 @@ def realise(
         grammar: what was learned.
         carriage: how its bodies travel and stand.
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
+        length: seconds that it lasts, to which frames are fitted; None for as long as the corpus takes.
     """
     if len(path) == 1:
         return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
     seconds = durations(path, grammar.transitions)
-    frames = max(1, round(float(seconds.sum()) * fps))
+    frames = max(1, round((length or float(seconds.sum())) * fps))
+    fps = frames / length if length else fps
     seconds *= frames / fps / seconds.sum()
     keys = np.concatenate([[0.0], np.cumsum(seconds)])
     times = np.arange(frames + 1) / fps

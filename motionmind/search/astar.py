@@ -140,6 +140,15 @@ def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
     return nodes
 
 
+def nodes_in(memory: int, lanes: int) -> int:
+    """How many nodes `memory` bytes hold at least, with what finds them and what forgetting takes for a while.
+
+    A node has 44 bytes and 2 a lane, less than 8 in the buckets, whose number is a power of two, and 13 while leaves
+    are forgotten.
+    """
+    return memory // (44 + 2 * lanes + 8 + 13)
+
+
 @jit
 def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
     """Write the positions that a node and its ancestors chose, the start that the root stands for among them."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Weights
 from motionmind.search.problem import Model
 
 
-def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None) -> Model:
+def price(
+    grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float = 0.0
+) -> Model:
     """The costs of a grammar.
 
     Args:
@@ -17,9 +22,10 @@ def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price:
         weights: how transitions are weighed.
         coordination: lambda, the factor of the network's -log P.
         bridge_price: nats for each degree that a bridge spans; None leaves bridges out.
+        novelty: from 0 to 1, how little it matters which attested transitions are frequent.
     """
     graph, bridges, net = grammar.transitions, grammar.bridges, grammar.coordination
-    rows, targets, costs = graph.sources, graph.targets, graph.weights(weights)
+    rows, targets, costs = graph.sources, graph.targets, graph.weights(weights, novelty)
     if bridge_price is not None:
         bridged = np.repeat(np.arange(len(bridges.indptr) - 1), np.diff(bridges.indptr))
         rows = np.concatenate([rows, bridged])
@@ -63,3 +69,32 @@ def price(grammar: Grammar, weights: Weights, coordination: float, bridge_price:
         discounts,
         np.ones(len(graph.visits), dtype=bool),
     )
+
+
+def changes(path: NDArray[np.int32]) -> list[tuple[int, int, int]]:
+    """The moves of a path of states [T + 1, L] from one state to another: lane, from, to."""
+    before, after = path[:-1], path[1:]
+    moves, lanes = np.nonzero(before != after)
+    return list(zip(lanes.tolist(), before[moves, lanes].tolist(), after[moves, lanes].tolist(), strict=True))
+
+
+def dearer(model: Model, paths: Sequence[NDArray[np.int32]], nats: float) -> Model:
+    """The model in which each move from one state to another costs `nats` more for every one of `paths` that makes it.
+
+    To hold still is no move that could be shared.
+    """
+    costs = model.costs.copy()
+    for path in paths:
+        for lane, state, target in set(changes(path)):
+            row = model.starts[lane] + state
+            first, last = model.indptr[row], model.indptr[row + 1]
+            at = first + np.searchsorted(model.targets[first:last], target)
+            if at < last and model.targets[at] == target:
+                costs[at] += nats
+    return model._replace(costs=costs)
+
+
+def shared_moves(path: NDArray[np.int32], others: Sequence[NDArray[np.int32]]) -> int:
+    """How many moves of lanes from one state to another a path shares with others, counted for each of these."""
+    made = changes(path)
+    return sum(move in theirs for theirs in map(set, map(changes, others)) for move in made)

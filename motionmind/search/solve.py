@@ -153,6 +153,15 @@ def solve(
     return Certificate(path, legs.best, lower, status, expansions, peak, clock.seconds, passed)
 
 
+def feasible(model: Model, start: Ints, goal: Ints, rules: Rules, vias: Sequence[Via]) -> bool:
+    """Whether there is any path from `start` to `goal` through `vias`."""
+    held = with_waits(model, goal, rules.wait)
+    stops = [start, *(via.states for via in vias), goal]
+    to_go = [costs_to_go(held, stop, rules.longest) for stop in stops[1:]]
+    legs = Legs(alone(held, stops, to_go, rules), rules.shortest, [via.move for via in vias])
+    return bool(np.isfinite(legs.lower_bound()))
+
+
 def alone(held: Model, stops: Sequence[Ints], to_go: Sequence[Floats], rules: Rules) -> Floats:
     """What each of K legs costs at least, its lanes on their own, at each number of moves [K, longest + 1].
 

@@ -1,0 +1,125 @@
+"""Restrictions in the words of joints: where a joint is pinned, what it holds, which states it avoids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.discretize import StateSpace
+from motionmind.errors import MotionMindError
+from motionmind.search.problem import Ints, Model, costs_to_go, with_waits
+from motionmind.search.solve import feasible
+from motionmind.tween import Posed
+
+
+class Restriction(NamedTuple):
+    """What was asked, such as "pin left_wrist=B", and whether each state may then be on the way [G]."""
+
+    name: str
+    allowed: NDArray[np.bool_]
+
+
+def restrictions(
+    space: StateSpace,
+    start: Ints,
+    goal: Ints,
+    pin: Mapping[str, str],
+    hold: Sequence[str],
+    avoid: Sequence[tuple[str, int | str]],
+) -> list[Restriction]:
+    """Which states each joint may be in on the way, after posture A and before posture B.
+
+    Args:
+        space: the states of each joint.
+        start: A's states [L].
+        goal: B's states [L].
+        pin: joints that are in A's state until the last move, or in B's from the first on: "A" or "B".
+        hold: joints that stay in the state that A and B share.
+        avoid: joints, each with a state, by its number or its name, that it is not in.
+
+    Raises:
+        MotionMindError: no such joint or state, or A and B differ where a joint is to be held.
+    """
+    out = []
+    for joint, end in pin.items():
+        if end not in ("A", "B"):
+            raise MotionMindError(f"pin {joint}={end}: a joint is pinned to A or to B")
+        state = int((start if end == "A" else goal)[space.index(joint)])
+        out.append(Restriction(f"pin {joint}={end}", _only(space, space.index(joint), state)))
+    for joint in hold:
+        lane = space.index(joint)
+        if start[lane] != goal[lane]:
+            a, b = (space.label(lane, int(end[lane])) for end in (start, goal))
+            raise MotionMindError(f"hold {joint}: A and B differ there, {a} and {b}, so that it cannot be held")
+        out.append(Restriction(f"hold {joint}", _only(space, lane, int(start[lane]))))
+    for joint, wanted in avoid:
+        lane = space.index(joint)
+        allowed = np.ones(space.starts[-1], dtype=bool)
+        allowed[space.starts[lane] + _state(space, lane, wanted)] = False
+        out.append(Restriction(f"avoid {joint}={wanted}", allowed))
+    return out
+
+
+def restricted(model: Model, asked: Sequence[Restriction]) -> Model:
+    """The model with those states on the way that all restrictions allow."""
+    return model._replace(allowed=np.logical_and.reduce([model.allowed, *(one.allowed for one in asked)]))
+
+
+def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[Restriction]) -> str:
+    """What was asked that leaves no path, one line each; nothing where without all of it there is none either.
+
+    Args:
+        lanes: names [L].
+        model: the costs before any restriction.
+        posed: the problem that has no path.
+        asked: the restrictions in it.
+    """
+    ends, rules, vias = (posed.start, posed.goal), posed.rules, posed.vias
+    if not feasible(model, *ends, rules, ()):
+        return ""
+    names = [*(one.name for one in asked), *(_via(posed, i) for i in range(len(vias)))]
+    alone = [
+        feasible(restricted(model, [*asked[:i], *asked[i + 1 :]]), *ends, rules, vias) for i in range(len(asked))
+    ] + [feasible(posed.model, *ends, rules, [*vias[:i], *vias[i + 1 :]]) for i in range(len(vias))]
+    lines = [f"without {name} there is one" for name, helps in zip(names, alone, strict=True) if helps]
+    lines = lines or [f"without all of {', '.join(names)} there is one"]
+
+    held = with_waits(posed.model, posed.goal, rules.wait)
+    stops = [posed.start, *(via.states for via in vias), posed.goal]
+    for leg in range(len(stops) - 1):
+        costs = costs_to_go(held, stops[leg + 1], rules.longest)[1:, held.starts[:-1] + stops[leg]]
+        stuck = [joint for lane, joint in enumerate(lanes) if not np.isfinite(costs[:, lane]).any()]
+        if stuck:
+            here, there = ("A", *(_via(posed, i) for i in range(len(vias))), "B")[leg : leg + 2]
+            lines.append(f"{', '.join(stuck)}: no way from {here} to {there}")
+    number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
+    return "\n  ".join([f"no path from A to B in {number} moves under what was asked:", *lines])
+
+
+def _via(posed: Posed, i: int) -> str:
+    move = posed.vias[i].move
+    return f"via {i + 1}" + ("" if move is None else f" at move {move}")
+
+
+def _only(space: StateSpace, lane: int, state: int) -> NDArray[np.bool_]:
+    allowed = np.ones(space.starts[-1], dtype=bool)
+    allowed[space.starts[lane] : space.starts[lane + 1]] = False
+    allowed[space.starts[lane] + state] = True
+    return allowed
+
+
+def _state(space: StateSpace, lane: int, wanted: int | str) -> int:
+    """The state that a number or a name stands for."""
+    if wanted in space.labels[lane]:
+        return space.labels[lane].index(str(wanted))
+    if isinstance(wanted, int) or wanted.isdecimal():
+        space.label(lane, int(wanted))  # which says what numbers there are
+        return int(wanted)
+    named = f": {', '.join(space.labels[lane])}" if space.labels[lane] else "; here none is named"
+    raise MotionMindError(
+        f"avoid {space.names[lane]}={wanted}: a state is given by its number, 0 to {space.sizes[lane] - 1}, or by its "
+        f"name{named}"
+    )
