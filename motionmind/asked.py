@@ -113,13 +113,14 @@ def _only(space: StateSpace, lane: int, state: int) -> NDArray[np.bool_]:
 
 def _state(space: StateSpace, lane: int, wanted: int | str) -> int:
     """The state that a number or a name stands for."""
-    if wanted in space.labels[lane]:
-        return space.labels[lane].index(str(wanted))
-    if isinstance(wanted, int) or wanted.isdecimal():
-        space.label(lane, int(wanted))  # which says what numbers there are
-        return int(wanted)
+    word = str(wanted)
+    if word in space.labels[lane]:
+        return space.labels[lane].index(word)
+    if word.isdecimal():
+        space.label(lane, int(word))  # which says what numbers there are
+        return int(word)
     named = f": {', '.join(space.labels[lane])}" if space.labels[lane] else "; here none is named"
     raise MotionMindError(
-        f"avoid {space.names[lane]}={wanted}: a state is given by its number, 0 to {space.sizes[lane] - 1}, or by its "
+        f"avoid {space.names[lane]}={word}: a state is given by its number, 0 to {space.sizes[lane] - 1}, or by its "
         f"name{named}"
     )
