@@ -38,7 +38,8 @@ class Case:
     def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> tuple[float, float, int, int]:
         """Cost, bound, expansions and peak of nodes of A*."""
         path = np.zeros(len(self.grid.dom_ptr) - 1, np.int64)
-        return astar.search(self.grid, self.messages, self.bound, cost, path, budget, expansions)
+        on = np.zeros(1, dtype=bool)
+        return astar.search(self.grid, self.messages, self.bound, cost, path, budget, expansions, on)
 
     @property
     def depth(self) -> int:

@@ -209,7 +209,8 @@ def test_a_narrowed_grid_keeps_every_path_that_is_cheaper(spare: float) -> None:
             smaller, messages = bound.narrow(grid, messages, optimum + spare)
             taken_out += len(grid.dom) - len(smaller.dom)
             grid = smaller
-        cost, lower, _, _ = astar.search(grid, messages, messages.constants.sum(), np.inf, path, 50_000, 50_000)
+        proven, on = messages.constants.sum(), np.zeros(1, dtype=bool)
+        cost, lower, _, _ = astar.search(grid, messages, proven, np.inf, path, 50_000, 50_000, on)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0

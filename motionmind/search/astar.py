@@ -48,12 +48,20 @@ class _Nodes(NamedTuple):
 
 @jit
 def search(
-    grid: Grid, m: Messages, bound: float, cost: float, path: Ints, budget: int, expansions: int
+    grid: Grid,
+    m: Messages,
+    bound: float,
+    cost: float,
+    path: Ints,
+    budget: int,
+    expansions: int,
+    ended: NDArray[np.bool_],
 ) -> tuple[float, float, int, int]:
     """Search for a path that costs less than `cost`; write the best to `path` [n] (positions).
 
     Returns its cost (or `cost`), a lower bound on the cost of every path, the number of expansions (at most
     `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `m` proves from the start.
+    It stops when `ended` [1] is set, from another thread.
     """
     nodes = _root(grid, bound, budget)
     lower = cost
@@ -61,7 +69,7 @@ def search(
         node = nodes.heap[0]
         if nodes.key[node] >= cost - SAME:
             break
-        if nodes.tally[_EXPANDED] >= expansions:
+        if nodes.tally[_EXPANDED] >= expansions or ended[0]:
             lower = nodes.key[node]
             break
         _close(nodes, node)

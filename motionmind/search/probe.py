@@ -8,6 +8,7 @@ for what the messages bound is a relaxation in which a variable may be half one 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionmind.jit import jit
 from motionmind.search.bound import Messages, narrow, tighten
@@ -21,11 +22,20 @@ _SAME = 1e-9
 
 @jit
 def probe(
-    grid: Grid, m: Messages, order: Ints, proven: float, cost: float, below: float, states: Indices, cases: int
+    grid: Grid,
+    m: Messages,
+    order: Ints,
+    proven: float,
+    cost: float,
+    below: float,
+    states: Indices,
+    cases: int,
+    ended: NDArray[np.bool_],
 ) -> tuple[float, float, Grid, Messages]:
     """Go through the variables in the given order and bound up to `cases` cases.
 
-    Stops when the bound meets the cost of the best path. Better paths found in a case are written to `states` [n].
+    Stops when the bound meets the cost of the best path, and when `ended` [1] is set, from another thread. Better paths
+    found in a case are written to `states` [n].
     Returns the bound (on paths cheaper than `below`), the cost of the best path, and the grid without what was struck
     off, with its messages.
     """
@@ -36,6 +46,8 @@ def probe(
         if grid.dom_ptr[i + 1] - grid.dom_ptr[i] < 2:
             continue
         for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
+            if ended[0]:
+                return proven, cost, grid, m
             if m.through[p] < known - _SAME:
                 bound, found = _bound_case(grid, m, i, p, known, cost, states)
                 cost = min(cost, found)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,10 @@ from motionmind.search.problem import Floats, Grid, Ints, Model, build_grid, cos
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
 CASES = 1000  # that the bound is split into at most, for each number of moves
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
+SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
+_Result = TypeVar("_Result")
 Status = Literal["optimal", "bounded", "interrupted"]
 
 
@@ -113,31 +116,25 @@ def solve(
     legs = Legs(alone(held, stops, to_go, rules), rules.shortest, [via.move for via in vias])
     clock.lap("problem")
 
-    expansions, peak, interrupted = 0, 0, False
-
-    def stop() -> bool:
-        nonlocal interrupted
-        if watch is not None and not interrupted:
-            interrupted = bool(watch(Progress(legs.best, legs.lower_bound(), expansions)))
-        return interrupted
-
+    expansions, peak = 0, 0
+    attention = _Attention(watch, lambda: Progress(legs.best, legs.lower_bound(), expansions))
     while True:
         leg, moves, least, below = legs.most_promising()
-        if not least < legs.best - PROVEN or (stop() and np.isfinite(legs.best)):
+        if not least < legs.best - PROVEN or (attention.ends() and np.isfinite(legs.best)):
             break
         toll = rules.per_move * moves
         best, path = below - toll, np.zeros((0, len(start)), dtype=np.int32)
         grid = build_grid(held, stops[leg], moves, to_go[leg], best)
         clock.lap("problem")
-        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best, stop)
+        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best, attention)
         if found < best:
             best, path = found, states
         clock.lap("bound")
-        if proven < best - PROVEN and expansions < rules.node_budget and not stop():
+        if proven < best - PROVEN and expansions < rules.node_budget and not attention.ends():
             chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
             # f grows from what the messages prove by themselves; cases may have proven more.
-            found, searched, expanded, held_nodes = astar.search(
-                grid, messages, float(messages.constants.sum()), best, chosen, rules.node_budget,
+            found, searched, expanded, held_nodes = attention.pay(
+                astar.search, grid, messages, float(messages.constants.sum()), best, chosen, rules.node_budget,
                 rules.node_budget - expansions,
             )  # fmt: skip
             proven = max(proven, searched)
@@ -149,7 +146,7 @@ def solve(
     if not np.isfinite(legs.best):
         return None
     lower, (path, passed) = legs.lower_bound(), legs.path()
-    status: Status = "optimal" if legs.best - lower <= PROVEN else "interrupted" if interrupted else "bounded"
+    status: Status = "optimal" if legs.best - lower <= PROVEN else "interrupted" if attention.ended[0] else "bounded"
     return Certificate(path, legs.best, lower, status, expansions, peak, clock.seconds, passed)
 
 
@@ -183,7 +180,7 @@ def alone(held: Model, stops: Sequence[Ints], to_go: Sequence[Floats], rules: Ru
 
 
 def _bound(
-    grid: Grid, sweeps: int, below: float, stop: Callable[[], bool]
+    grid: Grid, sweeps: int, below: float, attention: _Attention
 ) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
     """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
 
@@ -208,14 +205,16 @@ def _bound(
         if np.any(np.diff(grid.dom_ptr) == 0):
             proven = known
             break
-        if stop():
+        if attention.ends():
             return min(proven, known), cost, states, grid, messages
         if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
             break
     if proven < min(cost, below) - PROVEN:
         flat = states.ravel().copy()
         fewest_first = np.argsort(np.diff(grid.dom_ptr), kind="stable")
-        proven, cost, grid, messages = probe(grid, messages, fewest_first, proven, cost, below, flat, CASES)
+        proven, cost, grid, messages = attention.pay(
+            probe, grid, messages, fewest_first, proven, cost, below, flat, CASES
+        )
         states = flat.reshape(-1, grid.lanes)
     return min(proven, cost, below), cost, states, grid, messages
 
@@ -223,6 +222,41 @@ def _bound(
 def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
     """States [T + 1, L] of a path of positions."""
     return grid.dom[chosen].reshape(grid.moves + 1, grid.lanes)
+
+
+class _Attention:
+    """Whether the search is to end before its time: what `watch` says when it is told how far the search is.
+
+    Attributes:
+        ended: whether it said so [1].
+    """
+
+    def __init__(self, watch: Watch | None, so_far: Callable[[], Progress]) -> None:
+        self.ended = np.zeros(1, dtype=bool)
+        self._watch, self._so_far = watch, so_far
+
+    def ends(self) -> bool:
+        """Whether the search is to end."""
+        if self._watch is not None and not self.ended[0]:
+            self.ended[0] = bool(self._watch(self._so_far()))
+        return bool(self.ended[0])
+
+    def pay(self, work: Callable[..., _Result], *arguments: object) -> _Result:
+        """Do long compiled work, in a thread of its own where somebody watches, who is then asked meanwhile.
+
+        The work gets `ended` as its last argument, and stops when it is set.
+        """
+        if self._watch is None:
+            return work(*arguments, self.ended)
+        with ThreadPoolExecutor(1) as pool:
+            result = pool.submit(work, *arguments, self.ended)
+            try:
+                while not wait([result], SECONDS_UNWATCHED).done:
+                    self.ends()
+            except BaseException:
+                self.ended[0] = True  # what is thrown by `watch`, or by Ctrl-C, is not to wait for the work
+                raise
+            return result.result()
 
 
 class _Clock:
