@@ -12,6 +12,7 @@ import numpy as np
 
 from motionmind import rotations as rot
 from motionmind import survey
+from motionmind.account import account
 from motionmind.asked import culprits, restricted, restrictions
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
@@ -190,6 +191,7 @@ class Engine(Learned):
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,
+            account=account(certificate.path, model, goal, rules, self.grammar, self.space, lambda_),
             seconds={
                 "load": self.load_seconds,
                 "problem": posing + spent["problem"],

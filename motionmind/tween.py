@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind.account import Account
 from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Motion
@@ -48,6 +49,7 @@ class Source:
         corpus: the corpus that the clip comes from.
         mirrored: whether it was seen with left and right exchanged.
         reversed: whether it was seen played backwards: it leads to the posture before.
+        seconds: that posture's time in its recording.
     """
 
     clip: str
@@ -55,6 +57,7 @@ class Source:
     corpus: str = ""
     mirrored: bool = False
     reversed: bool = False
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +94,7 @@ class Tween:
         expansions: of A*.
         peak_nodes: the greatest number of nodes that A* held.
         node_budget: the number that it might hold.
+        account: what each joint's moves cost, and how likely they are.
         seconds: spent on "load", "problem", "bound", "search" and "realise"; measured, so it differs from run to run.
         posed: the problem that was solved.
         asked: what was asked for, as plain values.
@@ -113,6 +117,7 @@ class Tween:
     expansions: int
     peak_nodes: int
     node_budget: int
+    account: Account
     seconds: dict[str, float]
     posed: Posed
     asked: dict[str, Any]
@@ -128,7 +133,12 @@ class Tween:
         return 0.0 if self.cost <= self.lower_bound else (self.cost - self.lower_bound) / abs(self.cost)
 
     def report(self) -> dict[str, Any]:
-        """All but the movement itself, as plain values for JSON."""
+        """All but the movement itself, as plain values for JSON.
+
+        Lists of rows are by move or posture, then by joint. The `costs` add up to the cost: those of all joints' moves,
+        of how they coordinate, and `per_move` for each move.
+        """
+        account = self.account
         return {
             "asked": self.asked,
             "status": self.status,
@@ -157,6 +167,15 @@ class Tween:
                 for end, row in zip("AB", self.snap_degrees, strict=True)
             },
             "sources": [[None if source is None else asdict(source) for source in row] for row in self.sources],
+            "times": self.motion.insertions[0].times.tolist(),
+            "names": [list(row) for row in account.names],
+            "degrees": account.degrees.tolist(),
+            "likelihood": account.likelihood.tolist(),
+            "costs": {
+                "moves": account.moves.tolist(),
+                "coordination": account.coordination.tolist(),
+                "per_move": account.per_move,
+            },
         }
 
     def problem(self) -> str:
@@ -196,7 +215,14 @@ def explain(
 
 def _source(corpus: Corpus, posture: int, to: int) -> Source:
     clip = corpus.clip_of(posture)
-    return Source(clip.name, posture - clip.start, clip.corpus or corpus.name, clip.mirrored, to < posture)
+    return Source(
+        clip.name,
+        posture - clip.start,
+        clip.corpus or corpus.name,
+        clip.mirrored,
+        to < posture,
+        float(corpus.times[posture]),
+    )
 
 
 def diagnose(model: Model, grammar: Grammar, start: Ints, goal: Ints, rules: Rules, strict: bool) -> str:

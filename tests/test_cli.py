@@ -29,7 +29,8 @@ BALLET = Path(__file__).parent.parent / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
 REPORT = {
     *("status", "cost", "lower_bound", "gap", "moves", "expansions", "peak_nodes", "node_budget", "seconds", "joints"),
-    *("path", "attested", "bridges", "waits", "snap_degrees", "sources"),
+    *("path", "attested", "bridges", "waits", "snap_degrees", "sources", "times", "names", "degrees", "likelihood"),
+    "costs",
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 
@@ -81,7 +82,7 @@ EXAMPLES = [command.epilog.split("\n")[-1].strip() for command in COMMANDS.value
 def test_there_are_the_commands_that_the_documents_name() -> None:
     assert {" ".join(path) for path in COMMANDS} == {
         *("tween", "posture", "convert", "corpus", "corpus build", "corpus list", "corpus info", "corpus check"),
-        *("compose", "library", "sheet", "render"),
+        *("compose", "library", "sheet", "render", "explain"),
     }
 
 
@@ -102,7 +103,8 @@ def test_every_command_and_option_has_help(path: tuple[str, ...], run: Run) -> N
 def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", clip("plies"))
-    assert len(EXAMPLES) == 12
+    run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
+    assert len(EXAMPLES) == 13
     for line in EXAMPLES:
         program, *words = shlex.split(line)
         assert program == "motionmind"

@@ -235,6 +235,11 @@ REPORT = [
     "vias",
     "snap_degrees",
     "sources",
+    "times",
+    "names",
+    "degrees",
+    "likelihood",
+    "costs",
 ]
 
 

@@ -52,6 +52,15 @@ class Coordination:
     child_costs: Floats
     parent_costs: Floats
 
+    def cost(self, lane: int, above: int, state: int, starts: Ints) -> float:
+        """-log P(state | parent's state `above`) of one lane, nats."""
+        row = self.pair_starts[lane] + above
+        first, last = self.pair_ptr[row], self.pair_ptr[row + 1]
+        at = first + np.searchsorted(self.pair_states[first:last], state)
+        if at < last and self.pair_states[at] == state:
+            return float(self.pair_costs[at])
+        return float(self.child_costs[starts[lane] + state] + self.parent_costs[row])
+
     def table(self, lane: int, starts: Ints) -> Floats:
         """-log P(c | p) of one lane [states of the parent, states of the lane], nats."""
         rows = slice(self.pair_starts[lane], self.pair_starts[lane + 1])
