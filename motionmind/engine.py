@@ -41,6 +41,7 @@ DIVERSITY = 2.0  # nats
 MOST_MOVES = 10_000  # what is asked for beyond these is a slip of the keyboard, and more than memory holds
 MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
+MOST_GIVEN = 3  # states of the parent that a joint graph names beside a state
 SLOWEST = 0.01  # frames a second
 
 
@@ -191,7 +192,7 @@ class Engine(Learned):
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,
-            account=account(certificate.path, model, goal, rules, self.grammar, self.space, lambda_),
+            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, lambda_),
             seconds={
                 "load": self.load_seconds,
                 "problem": posing + spent["problem"],
@@ -273,21 +274,28 @@ class Engine(Learned):
     def joint_graph(self, joint: str) -> nx.DiGraph:
         """The joint graph of a joint (or "facing") as a networkx graph.
 
-        Nodes are states, with `orientation` (x, y, z, w), `visits` and `label`; edges are attested transitions, with
-        `count`, `weight` (-log P(next | state), nats) and `seconds`.
+        Nodes are states, with `orientation` (x, y, z, w), `visits`, `label` and `given`: the states of the parent joint
+        that make it likeliest, each with P(state | parent's state), of those seen with it. Edges are attested
+        transitions, with `count`, `weight` (-log P(next | state), nats) and `seconds`. The graph knows its `corpus`,
+        `joint` and `parent`, None where it has none.
         """
         import networkx as nx
 
         graph, lane = self.grammar.transitions, self.space.index(joint)
         first, last = graph.starts[lane], graph.starts[lane + 1]
         weights = graph.weights("conditional")
-        out = nx.DiGraph(joint=joint)
+        parent = int(self.grammar.coordination.parents[lane])
+        out = nx.DiGraph(
+            corpus=self.corpus.name, joint=joint, parent=self.corpus.lanes[parent] if parent >= 0 else None
+        )
+        given = self._given(lane, parent)
         for state, row in enumerate(range(first, last)):
             out.add_node(
                 state,
                 orientation=tuple(map(float, self.space.centres[row])),
                 visits=float(graph.visits[row]),
                 label=self.space.label(lane, state),
+                given=given[state],
             )
         for row in range(first, last):
             for edge in range(graph.indptr[row], graph.indptr[row + 1]):
@@ -299,6 +307,19 @@ class Engine(Learned):
                     seconds=float(graph.seconds[edge]),
                 )
         return out
+
+    def _given(self, lane: int, parent: int) -> list[tuple[tuple[str, float], ...]]:
+        """For each state of a lane the parent's states that it goes with best, each with P(state | parent's state)."""
+        if parent < 0:
+            return [()] * int(self.space.sizes[lane])
+        likely = np.exp(-self.grammar.coordination.table(lane, self.grammar.transitions.starts))
+        seen = np.zeros(likely.shape, dtype=bool)
+        seen[self.states[:, parent], self.states[:, lane]] = True
+        best = np.argsort(-np.where(seen, likely, 0.0), axis=0, kind="stable")[:MOST_GIVEN]
+        return [
+            tuple((self.space.label(parent, int(p)), float(likely[p, state])) for p in column if seen[p, state])
+            for state, column in enumerate(best.T)
+        ]
 
     def network(self) -> DiscreteBayesianNetwork:
         """The coordination net as a pgmpy network over the joints: what the search's costs were compiled from."""

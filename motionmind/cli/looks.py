@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 
 from motionmind.cli.commands import app
-from motionmind.cli.options import FILE, JSON, example
+from motionmind.cli.files import check_outputs
+from motionmind.cli.options import FILE, HOME, JSON, example
 
 
 @app.command(epilog=example("motionmind explain report.json"))
@@ -27,3 +28,30 @@ def explain(report: Path, as_json: bool) -> None:
         return
     for line in lines(found):
         click.echo(line)
+
+
+@app.command(epilog=example("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg"))
+@click.option("--corpus", required=True, metavar="NAME", help="Corpus, by name or folder.")
+@click.option("--joint", required=True, metavar="NAME", help="Whose graph; or facing, where that moves on its own.")
+@click.option(
+    "-o", "--output", type=FILE, required=True, help="Where it goes: a picture (.svg, .png), or .graphml, .gexf."
+)
+@HOME
+def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
+    """Draw what a corpus teaches of a joint: its states, and which follows which how likely.
+
+    Circles are the larger the more often they are visited, arrows the darker the likelier. In .svg the pointer tells
+    more, such as which states of the joint's parent go with a state. States that no move leads to or from are left out
+    of pictures.
+    """
+    from motionmind.engine import Engine
+    from motionmind.render.graph import GRAPHS, write_graph
+
+    check_outputs([(output, GRAPHS)], [])
+    found = Engine.load(corpus, home).joint_graph(joint)
+    write_graph(output, found)
+    alone = sum(not any(other != state for other in (*found.succ[state], *found.pred[state])) for state in found)
+    click.echo(
+        f"{output}: {joint}, {len(found)} states, {found.number_of_edges()} transitions; "
+        f"{alone} states that none joins to another"
+    )
