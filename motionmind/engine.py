@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from time import perf_counter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -21,11 +22,13 @@ from motionmind.grammar.transitions import Weights
 from motionmind.learned import Learned
 from motionmind.mapping import joint_mapping
 from motionmind.motion import FASTEST, Posture
+from motionmind.posturewise import diagnose_posturewise, nearest_posture
 from motionmind.realise.realise import realise
 from motionmind.realise.timing import usual
 from motionmind.retarget import to_human23
 from motionmind.search.astar import nodes_in
 from motionmind.search.costs import dearer, price, shared_moves
+from motionmind.search.posturewise import Bodies, find_bodies, solve_posturewise
 from motionmind.search.problem import Model
 from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
@@ -68,6 +71,7 @@ class Engine(Learned):
         unlike: Sequence[Tween] = (),
         diversity: float = DIVERSITY,
         strict: bool = False,
+        posturewise: bool = False,
         node_budget: int = NODE_BUDGET,
         memory: int | None = None,
         weights: Weights = "conditional",
@@ -95,6 +99,8 @@ class Engine(Learned):
             unlike: tweens that it is to differ from.
             diversity: nats for each move of a joint from one state to another that one of `unlike` makes, for each.
             strict: no bridges: every move of every joint is attested, or a wait at its goal.
+            posturewise: only whole postures of the corpus, in the order in which they followed, from the one nearest to
+                `a` to the one nearest to `b`: what the search of 1998 finds, at best, as a baseline.
             node_budget: nodes that the search may hold at once; it stops after as many expansions.
             memory: bytes that those nodes may take; instead of `node_budget`.
             weights: "conditional", -log P(next state | state), or "printed", as the papers print it.
@@ -113,6 +119,8 @@ class Engine(Learned):
             SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
             MotionMindError: an option is out of its range, or asks for what cannot be.
         """
+        if posturewise and (pin or hold or avoid or via or unlike):
+            raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via or unlike")
         least, most = _range(moves, max_moves)
         _check_options(node_budget, fps, weights, novelty, lambda_, beta, tau, bridge_price, diversity)
         if memory is not None:
@@ -124,7 +132,10 @@ class Engine(Learned):
         postures, at = self._vias(via)
         began = perf_counter()
         stops = self.corpus.to_lanes(np.stack([end.rotations for end in (a, *postures, b)]))
-        states = self.space.assign(stops)
+        states, near = self.space.assign(stops), None
+        if posturewise:
+            near = nearest_posture(self.corpus, a.rotations), nearest_posture(self.corpus, b.rotations)
+            states[:, : len(a.skeleton)] = self.states[list(near), : len(a.skeleton)]
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
         asked = restrictions(self.space, start, goal, pin, hold, avoid)
@@ -144,6 +155,10 @@ class Engine(Learned):
             certificate: Certificate | None = Certificate(
                 stay, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0}
             )
+        elif near is not None:
+            certificate = solve_posturewise(model, self._bodies, start, goal, posed.rules)
+            if certificate is None:
+                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
         else:
             certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
         if certificate is None:
@@ -258,6 +273,12 @@ class Engine(Learned):
             self._priced.clear()
             self._priced[asked] = price(self.grammar, *asked)
         return self._priced[asked]
+
+    @cached_property
+    def _bodies(self) -> Bodies:
+        """The corpus's whole postures, but for where they face."""
+        moves, joints = self.corpus.moves, len(self.corpus.skeleton)
+        return find_bodies(np.asarray(self.states[:, :joints]), moves.begins, moves.ends)
 
     def _on_skeleton(self, posture: Posture, which: str) -> Posture:
         """The posture on the corpus's joints; SkeletonError names the difference."""

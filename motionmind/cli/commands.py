@@ -89,6 +89,7 @@ def app(context: click.Context) -> None:
     "--diversity", type=NATS, default=2.0, help="Nats for each joint's move that an alternative shares with one before."
 )
 @click.option("--strict", is_flag=True, help="No bridges: every move attested, or exit code 3.")
+@click.option("--posturewise", is_flag=True, help="Only whole postures in the order of the corpus, as in 1998.")
 @click.option(
     "--node-budget", type=COUNT, metavar="N", help="Nodes that the search may hold at once  [default: 200000]"
 )
@@ -128,6 +129,8 @@ def tween(
     Ctrl-C ends the search: what it has found by then is written, with what is proven of it, and the exit code is 130.
     Exit code 3 says that nothing joins A and B under the rules that were asked for.
     """
+    if problem and options["posturewise"]:
+        raise click.UsageError("--problem is that of joints that move on their own; leave out --posturewise")
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
     from motionmind.engine import Engine
