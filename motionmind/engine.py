@@ -32,7 +32,7 @@ from motionmind.search.posturewise import Bodies, find_bodies, solve_posturewise
 from motionmind.search.problem import Model
 from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
-from motionmind.tween import Posed, Tween, diagnose, explain
+from motionmind.tween import Posed, Tween, explain
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -162,8 +162,13 @@ class Engine(Learned):
         else:
             certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
         if certificate is None:
-            faults = culprits(self.grammar.lanes, model, posed, asked)
-            raise NoPathError(faults or diagnose(model, self.grammar, start, goal, posed.rules, strict))
+            if faults := culprits(self.grammar.lanes, model, posed, asked):
+                raise NoPathError(faults, {"restrictions": faults})
+            # Imported here, for SciPy's graphs are slow to import.
+            from motionmind.diagnosis import diagnose
+
+            found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, posed.rules, strict)
+            raise NoPathError(str(found), found.plain())
         attested, bridges, waits, sources = explain(
             certificate,
             self.grammar,

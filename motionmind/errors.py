@@ -5,6 +5,8 @@ Every message says what was wrong, where (file, line, joint, frame) and what wou
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class MotionMindError(Exception):
     """Root of all errors that bad input can cause; the command line prints it in one line, exit code 2."""
@@ -27,7 +29,14 @@ class CorpusError(MotionMindError):
 
 
 class NoPathError(MotionMindError):
-    """No sequence of moves joins A to B under the rules that were asked for; the message is the diagnosis."""
+    """No sequence of moves joins A to B under the rules that were asked for; the message is the diagnosis.
+
+    `diagnosis` is the same as plain values for JSON, where joints move on their own.
+    """
+
+    def __init__(self, message: str, diagnosis: dict[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.diagnosis = diagnosis
 
 
 class MotionMindWarning(UserWarning):

@@ -223,36 +223,3 @@ def _source(corpus: Corpus, posture: int, to: int) -> Source:
         to < posture,
         float(corpus.times[posture]),
     )
-
-
-def diagnose(model: Model, grammar: Grammar, start: Ints, goal: Ints, rules: Rules, strict: bool) -> str:
-    """Why there is no path: for each lane at fault from where to where, and what comes nearest."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import breadth_first_order, shortest_path
-
-    lines = []
-    for lane, joint in enumerate(grammar.lanes):
-        first, last = model.starts[lane], model.starts[lane + 1]
-        rows = slice(model.indptr[first], model.indptr[last])
-        graph = csr_array(
-            (np.ones(rows.stop - rows.start), model.targets[rows], model.indptr[first : last + 1] - rows.start),
-            shape=(last - first, last - first),
-        )
-        a, b = int(start[lane]), int(goal[lane])
-        hops = shortest_path(graph, unweighted=True, indices=[a])[0, b]
-        if np.isfinite(hops):
-            if hops > rules.longest:
-                lines.append(f"{joint} needs {hops:.0f} moves from state {a} to state {b}")
-            continue
-        ahead = breadth_first_order(graph, a, return_predecessors=False)
-        back = breadth_first_order(graph.T.tocsr(), b, return_predecessors=False)
-        angle = np.abs(grammar.centres[first + ahead] @ grammar.centres[first + back].T)
-        i, k = np.unravel_index(int(angle.argmax()), angle.shape)
-        degrees = float(np.degrees(2.0 * np.arccos(min(1.0, angle[i, k]))))
-        lines.append(
-            f"{joint}: of the {len(ahead)} states that state {a} leads to and the {len(back)} that lead to state {b} "
-            f"none are the same; nearest are {ahead[i]} and {back[k]}, {degrees:.1f} degrees apart"
-        )
-    helps = "without strict, bridges may join them; so may a coarser tolerance" if strict else "allow more moves"
-    within = f"at most {rules.longest} move{'s' * (rules.longest != 1)}"
-    return "\n  ".join([f"no path from A to B in {within} ({helps}):", *lines])

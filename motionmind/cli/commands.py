@@ -30,7 +30,7 @@ from motionmind.cli.options import (
     reading,
 )
 from motionmind.cli.printing import Interruption, count, note, print_alternatives, print_tween, progress
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, NoPathError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -127,7 +127,8 @@ def tween(
     """Find the best movement from A to B, and prove how good it is.
 
     Ctrl-C ends the search: what it has found by then is written, with what is proven of it, and the exit code is 130.
-    Exit code 3 says that nothing joins A and B under the rules that were asked for.
+    Exit code 3 says that nothing joins A and B under the rules that were asked for;
+    --report then holds the diagnosis.
     """
     if problem and options["posturewise"]:
         raise click.UsageError("--problem is that of joints that move on their own; leave out --posturewise")
@@ -158,11 +159,19 @@ def tween(
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
     found: list[Tween] = []
-    with Interruption() as interruption:
-        for _ in numbers:
-            found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
-            if interruption.asked:
-                break
+    try:
+        with Interruption() as interruption:
+            for _ in numbers:
+                found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
+                if interruption.asked:
+                    break
+    except NoPathError as error:
+        text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
+        if alone:
+            click.echo(text)
+        elif report:
+            write_atomically(numbered(report, 1, alternatives), f"{text}\n".encode())
+        raise
     files = [numbered(path, number, alternatives) for number in numbers[: len(found)] for path, _ in wanted if path]
     with all_or_none(files):
         for number, result in zip(numbers, found, strict=False):
