@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,8 +129,7 @@ def tween(
     """Find the best movement from A to B, and prove how good it is.
 
     Ctrl-C ends the search: what it has found by then is written, with what is proven of it, and the exit code is 130.
-    Exit code 3 says that nothing joins A and B under the rules that were asked for;
-    --report then holds the diagnosis.
+    Exit code 3 says that nothing joins A and B under the rules that were asked for; --report then holds the diagnosis.
     """
     if problem and options["posturewise"]:
         raise click.UsageError("--problem is that of joints that move on their own; leave out --posturewise")
@@ -159,19 +160,11 @@ def tween(
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
     found: list[Tween] = []
-    try:
-        with Interruption() as interruption:
-            for _ in numbers:
-                found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
-                if interruption.asked:
-                    break
-    except NoPathError as error:
-        text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
-        if alone:
-            click.echo(text)
-        elif report:
-            write_atomically(numbered(report, 1, alternatives), f"{text}\n".encode())
-        raise
+    with _no_path_told(report and numbered(report, 1, alternatives)), Interruption() as interruption:
+        for _ in numbers:
+            found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
+            if interruption.asked:
+                break
     files = [numbered(path, number, alternatives) for number in numbers[: len(found)] for path, _ in wanted if path]
     with all_or_none(files):
         for number, result in zip(numbers, found, strict=False):
@@ -191,6 +184,22 @@ def tween(
         print_alternatives(found, files)
     if interruption.asked:
         click.get_current_context().exit(INTERRUPTED)
+
+
+@contextmanager
+def _no_path_told(report: Path | None) -> Iterator[None]:
+    """Where there is no path, the report is the diagnosis; - prints it."""
+    from motionmind.formats import write_atomically
+
+    try:
+        yield
+    except NoPathError as error:
+        text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
+        if report == Path("-"):
+            click.echo(text)
+        elif report:
+            write_atomically(report, f"{text}\n".encode())
+        raise
 
 
 @app.command(epilog=example("motionmind posture clip.bvh --frame 240 -o A.json"))
