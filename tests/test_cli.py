@@ -30,7 +30,7 @@ ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("ara
 REPORT = {
     *("status", "cost", "lower_bound", "gap", "moves", "expansions", "peak_nodes", "node_budget", "seconds", "joints"),
     *("path", "attested", "bridges", "waits", "snap_degrees", "sources", "times", "names", "degrees", "likelihood"),
-    "costs",
+    *("costs", "asked", "vias", "shared"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 
