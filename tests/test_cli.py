@@ -438,7 +438,7 @@ BAD = [
     ("convert clip.bvh t.amc", r"t\.amc: cannot be written: the name must end in one of \.bvh, \.json, \.txt"),
     ("convert clip.bvh nowhere/t.json", r"nowhere/t\.json: cannot be written: there is no folder"),
     # options
-    (f"{TWEEN} --moves 0", r"'--moves': 0 is not in the range x>=1"),
+    (f"{TWEEN} --moves 0", r"'--moves': '0' is no number of moves such as 8"),
     (f"{TWEEN} --max-moves 0", r"'--max-moves': 0 is not in the range x>=1"),
     (f"{TWEEN} --node-budget 0", r"'--node-budget': 0 is not in the range x>=1"),
     (f"{TWEEN} --lambda nan", r"'--lambda': nan is not a finite number"),
