@@ -172,9 +172,10 @@ class Learned:
         """
         began = perf_counter()
         folder = store.locate(name, home)
-        if store.read_manifest(folder)["format"] == store.BUILT:
-            return cls._open(folder, began)
-        manifest = parse_manifest(store.read_manifest(folder), SourceManifest, folder / store.MANIFEST)
+        found = store.read_manifest(folder)
+        if found["format"] == store.BUILT:
+            return cls._open(folder, began, found)
+        manifest = parse_manifest(found, SourceManifest, folder / store.MANIFEST)
         built = store.cache() / f"{folder.name}-{store.fingerprint(_files(folder, manifest))}"
         try:
             return cls._open(built, began)
@@ -185,8 +186,8 @@ class Learned:
         return replace(engine, load_seconds=perf_counter() - began)
 
     @classmethod
-    def _open(cls, folder: Path, began: float) -> Self:
-        saved, arrays = store.load(folder)
+    def _open(cls, folder: Path, began: float, found: dict[str, Any] | None = None) -> Self:
+        saved, arrays = store.load(folder, found)
         path = folder / store.MANIFEST
         manifest = parse_manifest(saved, BuiltManifest, path)
         missing = [name for name in _ARRAYS if name not in arrays]

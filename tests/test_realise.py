@@ -17,7 +17,7 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.motion import Motion, Posture
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
-from motionmind.realise.samples import MOST, choose_samples
+from motionmind.realise.samples import MOST, choose_samples, find_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
 from motionmind.skeleton import Skeleton, human23
@@ -121,6 +121,14 @@ def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: f
 # --- samples ----------------------------------------------------------------------------------------------------------
 
 
+def chosen_of(
+    path: NDArray[np.int32], states: NDArray[np.int32], orientations: Array, a: Array, b: Array
+) -> NDArray[np.int64]:
+    """Postures chosen of those with `states` and `orientations`."""
+    observed = find_samples(path, states)
+    return choose_samples(observed, orientations[observed, np.arange(path.shape[1])[:, None]], a, b)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_chosen_samples_are_the_smoothest_of_all(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -130,7 +138,7 @@ def test_chosen_samples_are_the_smoothest_of_all(seed: int) -> None:
     orientations = rot.normalise(rng.normal(size=(14, lanes, 4)))
     a, b = rot.normalise(rng.normal(size=(2, lanes, 4)))
     path = rng.integers(0, 3, (moves + 1, lanes)).astype(np.int32)
-    chosen = choose_samples(path, states, orientations, a, b)
+    chosen = chosen_of(path, states, orientations, a, b)
     assert chosen.shape == (moves - 1, lanes)
     for lane in range(lanes):
         layers = [np.flatnonzero(states[:, lane] == state) for state in path[1:-1, lane]]
@@ -146,7 +154,7 @@ def test_chosen_samples_are_the_smoothest_of_all(seed: int) -> None:
 def test_one_move_passes_through_nothing() -> None:
     path = np.zeros((2, 3), dtype=np.int32)
     ends = np.tile(rot.IDENTITY, (3, 1))
-    chosen = choose_samples(path, np.zeros((4, 3), dtype=np.int32), np.tile(rot.IDENTITY, (4, 3, 1)), ends, ends)
+    chosen = chosen_of(path, np.zeros((4, 3), dtype=np.int32), np.tile(rot.IDENTITY, (4, 3, 1)), ends, ends)
     assert chosen.shape == (0, 3)
 
 
@@ -154,7 +162,7 @@ def test_of_many_samples_even_ones_are_considered() -> None:
     angles = np.linspace(0.0, 1.0, 10 * MOST)
     states = np.zeros((len(angles), 1), dtype=np.int32)
     a, b = rot.about_vertical(np.zeros(1)), rot.about_vertical(np.ones(1))
-    chosen = choose_samples(np.zeros((3, 1), np.int32), states, rot.about_vertical(angles)[:, None], a, b)
+    chosen = chosen_of(np.zeros((3, 1), np.int32), states, rot.about_vertical(angles)[:, None], a, b)
     assert abs(angles[chosen[0, 0]] - 0.5) <= 0.5 / MOST
 
 

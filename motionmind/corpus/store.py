@@ -117,9 +117,12 @@ def _swap(new: Path, folder: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def load(folder: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """The manifest and the arrays of a folder, memory-mapped; FormatError where any is not as it was saved."""
-    manifest = read_manifest(folder)
+def load(folder: Path, manifest: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """The manifest and the arrays of a folder, memory-mapped; FormatError where any is not as it was saved.
+
+    The `manifest` is read if it has not been.
+    """
+    manifest = read_manifest(folder) if manifest is None else manifest
     shapes = manifest.get("arrays")
     if not isinstance(shapes, dict):
         raise FormatError("does not say which arrays there are; build the corpus again", path=folder / MANIFEST)

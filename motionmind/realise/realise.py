@@ -10,7 +10,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
 from motionmind.realise.root import Carriage, carry, lowest, stand
-from motionmind.realise.samples import choose_samples
+from motionmind.realise.samples import choose_samples, find_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
 
@@ -60,9 +60,11 @@ def realise(
     # The facing's states are steps of a circle, which the corpus need not show: its lane is not sampled but turned.
     joints = len(a.skeleton)
     first, last = corpus.to_lanes(a.rotations), corpus.to_lanes(b.rotations)
-    orientations = corpus.to_lanes(corpus.rotations)[:, :joints]
-    chosen = choose_samples(path[:, :joints], states, orientations, first[:joints], last[:joints])
-    inner = orientations[chosen, np.arange(joints)]
+    observed = find_samples(path[:, :joints], states)
+    orientations = corpus.rotations[observed, np.arange(joints)[:, None]]
+    orientations[:, 0] = corpus.to_lanes(orientations[:, 0, :, None])[..., 0, :]  # of the root without its facing
+    chosen = choose_samples(observed, orientations, first[:joints], last[:joints])
+    inner = corpus.to_lanes(corpus.rotations[chosen, np.arange(joints)])[:, :joints]
     between = rotation_spline(keys, np.concatenate([first[None, :joints], inner, last[None, :joints]]), times)
     if corpus.facing == "free":
         headings = _headings(path[:, -1], grammar, seconds, first[-1], last[-1])

@@ -13,29 +13,22 @@ Ints = NDArray[np.int64]
 MOST = 24  # observed orientations considered in each state
 
 
-def choose_samples(
-    path: NDArray[np.int32], states: NDArray[np.int32], orientations: Floats, a: Floats, b: Floats
-) -> Ints:
+def choose_samples(observed: Ints, keys: Floats, a: Floats, b: Floats) -> Ints:
     """Postures [T - 1, L] whose orientations a path's inner states take, lane by lane.
 
     In each lane the sequence from `a` through one observed orientation in each inner state to `b` for which the sum of
     squared angles between neighbours is least: of all ways to cover the distance, the one in the evenest steps. Found
-    exactly, by dynamic programming over at most `MOST` evenly spaced samples a state.
+    exactly, by dynamic programming over the samples of each state.
 
     Args:
-        path: states [T + 1, L].
-        states: of the corpus's postures [N, L]; every inner state occurs.
-        orientations: of the corpus's postures [N, L, 4].
+        observed: the postures to choose from [T - 1, L, M].
+        keys: their orientations in the lane [T - 1, L, M, 4].
         a: of the first posture [L, 4].
         b: of the last posture [L, 4].
     """
-    moves, lanes = len(path) - 1, path.shape[1]
-    if moves < 2:
+    lanes = observed.shape[1]
+    if len(observed) == 0:
         return np.zeros((0, lanes), dtype=np.int64)
-    observed = np.array(
-        [[_observed(states[:, lane], path[t, lane]) for lane in range(lanes)] for t in range(1, moves)]
-    )  # [T - 1, L, MOST]
-    keys = orientations[observed, np.arange(lanes)[:, None]]
     # cost[l, k]: the least sum of squared angles in lane l from `a` to its k-th sample; back: from which sample before.
     cost, back = _squared_angles(a[:, None], keys[0])[:, 0], []
     for before, after in pairwise(keys):
@@ -49,10 +42,18 @@ def choose_samples(
     return np.asarray(np.take_along_axis(observed, np.stack(picked[::-1])[..., None], axis=-1)[..., 0])
 
 
-def _observed(states: NDArray[np.int32], state: int) -> Ints:
-    """Postures in a state: `MOST` of them, thinned evenly, or some more than once where there are fewer."""
-    found = np.flatnonzero(states == state)
-    return found[np.arange(MOST) * len(found) // MOST]
+def find_samples(path: NDArray[np.int32], states: NDArray[np.int32]) -> Ints:
+    """Postures in the states of a path [T + 1, L] between its ends [T - 1, L, MOST], of a corpus's states [N, L].
+
+    `MOST` of each, thinned evenly, or some more than once where there are fewer; every inner state occurs.
+    """
+    out = np.empty((max(len(path) - 2, 0), path.shape[1], MOST), dtype=np.int64)
+    for lane in range(path.shape[1]):
+        column = np.ascontiguousarray(states[:, lane])  # a corpus may be large; it is looked through once a state
+        for state in np.unique(path[1:-1, lane]):
+            found = np.flatnonzero(column == state)
+            out[path[1:-1, lane] == state, lane] = found[np.arange(MOST) * len(found) // MOST]
+    return out
 
 
 def _squared_angles(a: Floats, b: Floats) -> Floats:
