@@ -20,7 +20,7 @@ from motionmind.corpus.gather import Gathering, gather
 from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Codebook, Discretization, StateSpace, from_spec
 from motionmind.discretize.library import library_path
-from motionmind.errors import FormatError, MotionMindError
+from motionmind.errors import CorpusError, FormatError, MotionMindError
 from motionmind.formats import read_motion
 from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
@@ -34,6 +34,7 @@ from motionmind.retarget import to_human23
 from motionmind.skeleton import Skeleton
 
 States = NDArray[np.int32]
+MOST_STATES = 10_000  # of a joint: its pairs take some 6 GB while they are learned
 _Movement = TypeVar("_Movement", Motion, Posture)
 _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
 
@@ -93,7 +94,8 @@ class Learned:
                 see `motionmind.corpus.gather.gather`.
 
         Raises:
-            CorpusError: nothing to learn from, clips on different joints, or no such corpus to mix.
+            CorpusError: nothing to learn from, clips on different joints, more states than can be held, or no such
+                corpus to mix.
             SkeletonError: the body cannot be mirrored.
         """
         others = [(cls.load(other, home).corpus, weight) for other, weight in (mix or {}).items()]
@@ -106,6 +108,7 @@ class Learned:
         joints = corpus.skeleton.names
         space = discretization.fit(joints, orientations[:, : len(joints)])
         space, states = _seen(space, space.assign(orientations[:, : len(joints)]))
+        _check_size(corpus, space)
         if corpus.facing == "free":
             space, facing = _with_facing(space, orientations[:, -1])
             states = np.concatenate([states, facing[:, None]], axis=1)
@@ -242,6 +245,16 @@ def _seen(space: StateSpace, states: States) -> tuple[StateSpace, States]:
     smaller = StateSpace.of_joints(space.names, centres, kind=space.kind, tolerances=space.tolerances, labels=labels)
     renamed = [np.searchsorted(seen, column) for seen, column in zip(kept, states.T, strict=True)]
     return smaller, np.stack(renamed, axis=1).astype(np.int32)
+
+
+def _check_size(corpus: Corpus, space: StateSpace) -> None:
+    """CorpusError where learning, which compares all pairs of a joint's states, would take too much memory."""
+    largest = int(np.argmax(space.sizes))
+    if space.sizes[largest] > MOST_STATES:
+        raise CorpusError(
+            f"corpus {corpus.name!r}: {space.names[largest]} has {space.sizes[largest]} states within "
+            f"{space.tolerances[largest]:g} degrees, and a joint can have {MOST_STATES}; give it a coarser tolerance"
+        )
 
 
 def _with_facing(space: StateSpace, turns: NDArray[np.float64]) -> tuple[StateSpace, States]:

@@ -204,6 +204,13 @@ def test_another_skeleton_is_refused_and_the_difference_named(six_legs: Engine, 
         Engine.fit([CLIPS[0], dance("one", 1)])
 
 
+def test_more_states_than_can_be_held_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionmind.learned.MOST_STATES", 12)
+    with pytest.raises(CorpusError, match=r"'many': \w+ has \d+ states within 0.5 degrees, and a joint can have 12"):
+        Engine.fit(CLIPS, name="many", discretization=Codebook(0.5))
+    Engine.fit(CLIPS, name="few", discretization=Codebook(25.0))
+
+
 def test_a_body_of_one_joint_is_a_body() -> None:
     pole = Skeleton("pole", ("pole",), (-1,), np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
     q = rot.from_axis_angle([0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 20))[:, None]
