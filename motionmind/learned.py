@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.corpus import store
-from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.corpus.corpus import FACING, Clip, Corpus
 from motionmind.corpus.gather import Gathering, gather
 from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Codebook, Discretization, StateSpace, from_spec
@@ -152,7 +152,7 @@ class Learned:
                 "offsets": skeleton.offsets.tolist(),
                 "tips": skeleton.tips.tolist(),
             },
-            "clips": [asdict(clip) for clip in corpus.clips],
+            "clips": [_saved(clip) for clip in corpus.clips],
             "faults": [asdict(fault) for fault in corpus.faults],
             "space": {
                 "kind": space.kind,
@@ -235,6 +235,12 @@ _ARRAYS = (
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
     return kind(**{field.name: arrays[f"{name}.{field.name}"] for field in fields(kind)})
+
+
+def _saved(clip: Clip) -> dict[str, Any]:
+    """A clip as the manifest has it: without what is as usual, for there may be thousands."""
+    values = {field.name: (getattr(clip, field.name), field.default) for field in fields(clip)}
+    return {name: value for name, (value, usual) in values.items() if value != usual}
 
 
 def _seen(space: StateSpace, states: States) -> tuple[StateSpace, States]:

@@ -656,7 +656,7 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
                 if source is None:
                     assert said is None
                     continue
-                assert set(said) == {"clip", "posture", "corpus", "mirrored", "reversed"}
+                assert set(said) == {"clip", "posture", "corpus", "mirrored", "reversed", "seconds"}
                 assert Source(**said) == source
                 assert_attested(everything, source, lane, before[lane], after[lane])
                 kinds.add((source.corpus, source.mirrored, source.reversed))
