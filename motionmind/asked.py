@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from motionmind.discretize import StateSpace
 from motionmind.errors import MotionMindError
 from motionmind.search.problem import Ints, Model, costs_to_go, with_waits
-from motionmind.search.solve import feasible
+from motionmind.search.solve import Via, feasible
 from motionmind.tween import Posed
+
+FARTHEST = 60  # moves by which a via is moved to see whether that helps
 
 
 class Restriction(NamedTuple):
@@ -85,7 +88,13 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
         feasible(restricted(model, [*asked[:i], *asked[i + 1 :]]), *ends, rules, vias) for i in range(len(asked))
     ] + [feasible(posed.model, *ends, rules, [*vias[:i], *vias[i + 1 :]]) for i in range(len(vias))]
     lines = [f"without {name} there is one" for name, helps in zip(names, alone, strict=True) if helps]
-    lines = lines or [f"without all of {', '.join(names)} there is one"]
+    for i, (states, wanted) in enumerate(vias):
+        if wanted is not None:
+            near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
+            nearest = sorted(near, key=lambda move: abs(move - wanted))
+            moved = ((move, [*vias[:i], Via(states, move), *vias[i + 1 :]]) for move in nearest)
+            helps = (move for move, others in moved if feasible(posed.model, *ends, rules, others))
+            lines += [f"with via {i + 1} at move {move} there is one" for move in islice(helps, 1)]
 
     held = with_waits(posed.model, posed.goal, rules.wait)
     stops = [posed.start, *(via.states for via in vias), posed.goal]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from motionmind.search.astar import nodes_in
 from motionmind.search.costs import dearer, price, shared_moves
 from motionmind.search.posturewise import Bodies, find_bodies, solve_posturewise
 from motionmind.search.problem import Model
+from motionmind.search.sample import drawn
 from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
 from motionmind.tween import Posed, Tween, explain
@@ -70,12 +71,15 @@ class Engine(Learned):
         via: Sequence[Posture | tuple[Posture, int]] = (),
         unlike: Sequence[Tween] = (),
         diversity: float = DIVERSITY,
+        sample: bool = False,
+        seed: int = 0,
         strict: bool = False,
         posturewise: bool = False,
         node_budget: int = NODE_BUDGET,
         memory: int | None = None,
         weights: Weights = "conditional",
         novelty: float = 0.0,
+        coordination: Literal["posture", "none"] = "posture",
         lambda_: float = 1.0,
         beta: float = 1.0,
         tau: float = 1.0,
@@ -98,6 +102,9 @@ class Engine(Learned):
             via: postures to pass through on the way, in this order; at any move, or as (posture, move) at that one.
             unlike: tweens that it is to differ from.
             diversity: nats for each move of a joint from one state to another that one of `unlike` makes, for each.
+            sample: draw a path at random instead of the best, with a probability of nearly exp(-cost) over the sum of
+                that, among those with as many moves as the best; `motionmind.search.sample` says how nearly.
+            seed: what it is drawn by: a whole number of at least 0.
             strict: no bridges: every move of every joint is attested, or a wait at its goal.
             posturewise: only whole postures of the corpus, in the order in which they followed, from the one nearest to
                 `a` to the one nearest to `b`: what the search of 1998 finds, at best, as a baseline.
@@ -106,6 +113,7 @@ class Engine(Learned):
             weights: "conditional", -log P(next state | state), or "printed", as the papers print it.
             novelty: from 0, where what is frequent in the corpus is cheap, to 1, where all moves that it attests from a
                 state cost the same.
+            coordination: "posture", or "none" for joints that move each on its own, as with a `lambda_` of 0.
             lambda_: factor of the network's -log P(joint's state | parent's state), summed over joints and postures.
             beta: nats for each move that a joint waits at its goal.
             tau: nats for each move.
@@ -127,6 +135,10 @@ class Engine(Learned):
             node_budget = _nodes(memory, len(self.space))
         if duration is not None:
             least, most = self._moves_in(duration, fps, moves, least, most)
+        if coordination not in ("posture", "none"):
+            raise MotionMindError(f"coordination must be 'posture' or 'none', not {coordination!r}")
+        if not (isinstance(seed, int | np.integer) and seed >= 0):
+            raise MotionMindError(f"seed must be a whole number of at least 0, not {seed}")
         fixed = moves is not None or duration is not None
         a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
         postures, at = self._vias(via)
@@ -139,7 +151,9 @@ class Engine(Learned):
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
         asked = restrictions(self.space, start, goal, pin, hold, avoid)
-        model = self._model(weights, lambda_, None if strict else bridge_price, novelty)
+        model = self._model(
+            weights, lambda_ if coordination == "posture" else 0.0, None if strict else bridge_price, novelty
+        )
         if unlike:
             model = dearer(model, [other.path for other in unlike], diversity)
         posed = Posed(
@@ -169,6 +183,8 @@ class Engine(Learned):
 
             found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, posed.rules, strict)
             raise NoPathError(str(found), found.plain())
+        if sample and len(certificate.path) > 1:
+            certificate = drawn(posed.model, start, goal, posed.rules, posed.vias, certificate, seed)
         attested, bridges, waits, sources = explain(
             certificate,
             self.grammar,
@@ -188,6 +204,7 @@ class Engine(Learned):
             self.carriage,
             fps,
             duration,
+            dict(zip(certificate.passed, postures, strict=True)),
         )
         spent = certificate.seconds
         (insertion,) = motion.insertions
@@ -231,11 +248,14 @@ class Engine(Learned):
                 "via": list(at),
                 "unlike": len(unlike),
                 "diversity": diversity,
+                "sample": sample,
+                "seed": seed,
                 "strict": strict,
                 "node_budget": node_budget,
                 "memory": memory,
                 "weights": weights,
                 "novelty": novelty,
+                "coordination": coordination,
                 "lambda": lambda_,
                 "beta": beta,
                 "tau": tau,

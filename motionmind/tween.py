@@ -80,7 +80,7 @@ class Tween:
         joints: the lanes [L]: the skeleton's joints, then "facing" where that is a lane of its own.
         path: states of the lanes [moves + 1, L].
         status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded", or "interrupted" if the search
-            was ended before its time.
+            was ended before its time, or "sampled" if the path was drawn at random.
         cost: of the path, nats.
         lower_bound: no path within the rules that were asked for costs less, nats.
         attested: share of the joints' moves that the corpus attests.

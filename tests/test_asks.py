@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from toys import Toy, random_toy
+from test_search import evaluate
+from toys import Toy, grid_of, random_toy
 
+from motionmind import rotations as rot
+from motionmind.cli.printing import Interruption
+from motionmind.corpus.bundled import bundled
+from motionmind.engine import Engine
+from motionmind.errors import MotionMindError, NoPathError
+from motionmind.formats import read_motion, read_posture
+from motionmind.motion import Posture
 from motionmind.search import astar
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import dearer, shared_moves
 from motionmind.search.problem import Grid
+from motionmind.search.sample import sample
 from motionmind.search.solve import PROVEN, Certificate, Progress, Via, solve
+from motionmind.tween import Tween
 
 MOVES = 5
+POSTURES = bundled("corpora") / "ballet" / "postures"
 
 
 # --- brute force ------------------------------------------------------------------------------------------------------
@@ -293,3 +308,324 @@ def test_nodes_take_no_more_memory_than_is_said(memory: int, lanes: int) -> None
     held = sum(array.nbytes for array in astar._root.py_func(grid, 0.0, budget))
     forgetting = budget * (4 + 8 + 1)
     assert 0.8 * memory < held + forgetting <= memory + 100
+
+
+# --- a path drawn at random -------------------------------------------------------------------------------------------
+
+
+def paths_of(toy: Toy, moves: int) -> dict[bytes, float]:
+    """Every path of so many moves, and its probability."""
+    joint = toy.joint_states()
+    ends = [joint[(joint == end).all(axis=1)] for end in (toy.start, toy.goal)]
+    weight = {}
+    for inner in product(joint, repeat=moves - 1):
+        path = np.array([*ends[0], *inner, *ends[1]], dtype=np.int32)
+        if (cost := toy.cost(path)) < np.inf:
+            weight[path.tobytes()] = np.exp(-cost)
+    return {path: w / sum(weight.values()) for path, w in weight.items()}
+
+
+def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
+    tried = 0
+    for seed in range(40):
+        toy = random_toy(seed, most=3, states=3, frustrated=seed % 2 == 0)
+        likely = paths_of(toy, 3)
+        if not 4 <= len(likely) <= 400:
+            continue
+        grid = grid_of(toy, 3)
+        first = np.frombuffer(next(iter(likely)), dtype=np.int32)
+        path = np.array(
+            [a + np.flatnonzero(grid.dom[a:b] == s)[0] for (a, b), s in zip(pairwise(grid.dom_ptr), first, strict=True)]
+        )
+        rng, draws, seen = np.random.default_rng(seed), 4000, dict.fromkeys(likely, 0)
+        for _ in range(draws):
+            cost = sample(grid, path, 1, rng)
+            states = grid.dom[path].reshape(4, -1)
+            seen[states.tobytes()] += 1
+        assert cost + 3 * toy.per_move == pytest.approx(toy.cost(states), abs=1e-9)
+        apart = 0.5 * sum(abs(seen[path] / draws - p) for path, p in likely.items())
+        # Independent draws would be apart by about this much, by chance alone.
+        chance = 0.5 * sum(np.sqrt(2.0 * p * (1.0 - p) / (np.pi * draws)) for p in likely.values())
+        assert apart < 2.5 * chance + 0.01, (seed, apart, chance)
+        tried += 1
+    assert tried >= 10
+
+
+# --- through the engine -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return Engine.load("ballet")
+
+
+def posture(name: str) -> Posture:
+    return read_posture(POSTURES / f"{name}.json")
+
+
+def join(engine: Engine, **asked: Any) -> Tween:
+    return engine.tween(posture("arabesque"), posture("fifth"), **asked)
+
+
+@pytest.fixture(scope="module")
+def plain(engine: Engine) -> Tween:
+    return join(engine)
+
+
+def lane_of(tween: Tween, joint: str) -> NDArray[np.int32]:
+    return tween.path[:, tween.joints.index(joint)]
+
+
+def test_a_range_of_moves_is_kept_and_its_best_is_the_best_of_its_numbers(engine: Engine, plain: Tween) -> None:
+    found = join(engine, moves=(6, 8))
+    assert found.cost == pytest.approx(min(join(engine, moves=moves).cost for moves in (6, 7, 8)), abs=1e-6)
+    assert 6 <= found.moves <= 8
+    assert join(engine, moves=(1, 60)).cost == pytest.approx(plain.cost, abs=1e-6)
+
+
+@pytest.mark.parametrize("duration", [1.6, 2.0, 2.719])
+def test_a_motion_lasts_as_long_as_is_asked_for(engine: Engine, duration: float) -> None:
+    found = join(engine, duration=duration)
+    assert found.motion.times[-1] == duration
+    assert found.motion.insertions[0].times[-1] == duration
+    usual = float(np.median(engine.grammar.transitions.seconds))
+    assert found.moves == round(duration / usual)
+    assert abs(len(found.motion) - 1 - 30.0 * duration) <= 0.5
+    slower = join(engine, duration=duration, moves=5)
+    assert (slower.motion.times[-1], slower.moves) == (duration, 5)
+
+
+def test_a_pinned_joint_is_in_the_state_of_its_end(engine: Engine, plain: Tween) -> None:
+    for joint in ("left_wrist", "right_elbow"):
+        at_a, at_b = join(engine, pin={joint: "A"}), join(engine, pin={joint: "B"})
+        assert set(lane_of(at_a, joint)[:-1]) == {lane_of(plain, joint)[0]}
+        assert set(lane_of(at_b, joint)[1:]) == {lane_of(plain, joint)[-1]}
+        assert min(at_a.cost, at_b.cost) >= plain.cost - 1e-6
+        assert {at_a.status, at_b.status} == {"optimal"}
+
+
+def test_a_held_joint_stays_and_one_that_cannot_is_refused(engine: Engine, plain: Tween) -> None:
+    alike = [joint for joint in plain.joints if lane_of(plain, joint)[0] == lane_of(plain, joint)[-1]]
+    found = join(engine, hold=alike[:3])
+    assert all(len(set(lane_of(found, joint))) == 1 for joint in alike[:3])
+    assert found.cost >= plain.cost - 1e-6
+    with pytest.raises(MotionMindError, match=r"hold left_ankle: A and B differ there, .* cannot be held"):
+        join(engine, hold=["left_ankle"])
+
+
+def test_an_avoided_state_is_not_on_the_way_by_number_or_by_name(engine: Engine, plain: Tween) -> None:
+    lane = plain.joints.index("left_knee")
+    state = int(plain.path[1, lane])
+    name = engine.space.label(lane, state)
+    by_number, by_name = (join(engine, avoid=[("left_knee", wanted)], moves=plain.moves) for wanted in (state, name))
+    assert state not in by_number.path[1:-1, lane]
+    np.testing.assert_array_equal(by_number.path, by_name.path)
+    assert by_number.cost > plain.cost
+
+
+def test_postures_are_passed_in_order_and_shown_as_they_are(engine: Engine, plain: Tween) -> None:
+    passe, plie = posture("passe"), posture("plie")
+    found = join(engine, via=[passe, plie])
+    assert 0 < found.passed[0] < found.passed[1] < found.moves
+    states = engine.space.assign(engine.corpus.to_lanes(np.stack([passe.rotations, plie.rotations])))
+    np.testing.assert_array_equal(found.path[list(found.passed)], states)
+    again = join(engine, via=[(passe, found.passed[0]), (plie, found.passed[1])], moves=found.moves)
+    assert again.cost == pytest.approx(found.cost, abs=1e-6)
+    exact = join(engine, via=[passe, plie], fps=1000.0)
+    times = exact.motion.insertions[0].times
+    for move, stop in zip(exact.passed, (passe, plie), strict=True):
+        frame = int(np.abs(exact.motion.times - times[move]).argmin())
+        assert np.degrees(rot.angle(exact.motion.rotations[frame, 1:], stop.rotations[1:])).max() < 0.5
+
+
+def test_novelty_0_is_the_default_exactly_and_1_weighs_all_that_is_attested_alike(engine: Engine, plain: Tween) -> None:
+    same = join(engine, novelty=0.0)
+    np.testing.assert_array_equal(same.path, plain.path)
+    assert same.cost == plain.cost
+    graph = engine.grammar.transitions
+    leaving = np.diff(graph.indptr)[graph.sources]
+    np.testing.assert_array_equal(graph.weights("conditional"), graph.weights("conditional", 0.0))
+    for scheme in ("conditional", "printed"):
+        np.testing.assert_allclose(graph.weights(scheme, 1.0), np.log(leaving), atol=1e-12)
+        half = 0.5 * (graph.weights(scheme) + np.log(leaving))
+        np.testing.assert_allclose(graph.weights(scheme, 0.5), half, atol=1e-12)
+    assert join(engine, novelty=1.0).status == "optimal"
+
+
+def test_alternatives_differ_and_are_ranked(engine: Engine, plain: Tween) -> None:
+    found = [plain]
+    for _ in range(3):
+        found.append(join(engine, unlike=found, diversity=3.0))
+    assert all(a.cost <= b.cost + 1e-6 for a, b in pairwise(found))
+    assert all(tween.status == "optimal" for tween in found)
+    assert len({tween.path.tobytes() for tween in found}) == 4
+    for k, tween in enumerate(found):
+        assert tween.cost - 3.0 * tween.shared >= plain.cost - 1e-6
+        assert tween.shared == shared_moves(tween.path, [other.path for other in found[:k]])
+
+
+def test_a_path_is_drawn_by_its_seed_under_all_that_was_asked(engine: Engine, plain: Tween) -> None:
+    asked = {"via": [posture("passe")], "pin": {"left_wrist": "A"}, "moves": 9}
+    best, *drawn = join(engine, **asked), *(join(engine, sample=True, seed=seed, **asked) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(drawn[0].path, drawn[1].path)
+    assert (drawn[0].path != drawn[2].path).any()
+    for tween in drawn:
+        assert tween.status == "sampled"
+        assert tween.lower_bound == best.lower_bound < tween.cost
+        assert tween.passed == best.passed
+        assert set(lane_of(tween, "left_wrist")[:-1]) == {lane_of(plain, "left_wrist")[0]}
+        np.testing.assert_array_equal(tween.path[tween.passed[0]], best.path[best.passed[0]])
+        assert evaluate(tween.problem(), tween.path, tween.joints) == pytest.approx(tween.cost, abs=1e-3)
+
+
+def test_without_coordination_joints_move_each_on_its_own(engine: Engine) -> None:
+    alone, free = join(engine, coordination="none"), join(engine, lambda_=0.0)
+    assert alone.cost == free.cost
+    assert alone.asked["coordination"] == "none"
+
+
+def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:
+    with pytest.raises(
+        NoPathError, match=r"without pin right_elbow=B there is one(.|\n)*right_elbow: no way from A to B"
+    ):
+        join(engine, pin={"left_knee": "A", "right_elbow": "B"}, strict=True)
+    with pytest.raises(NoPathError, match=r"without via 1 at move 3 there is one\n  with via 1 at move 4 there is one"):
+        join(engine, via=[(posture("passe"), 3)])
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"moves": (4, 3)}, "moves must be a range from the least to the greatest, not from 4 to 3"),
+        ({"moves": (0, 3)}, "moves must be a whole number from 1"),
+        ({"duration": 0.0}, "duration must be a number of seconds from a frame's"),
+        ({"duration": np.nan}, "duration must be"),
+        ({"duration": 1e9}, "duration must be"),
+        ({"pin": {"wing": "A"}}, "no joint 'wing'"),
+        ({"pin": {"left_hip": "C"}}, "pin left_hip=C: a joint is pinned to A or to B"),
+        ({"hold": ["wing"]}, "no joint 'wing'"),
+        ({"avoid": [("left_hip", 999)]}, "left_hip has states 0 to .*, no state 999"),
+        ({"avoid": [("left_knee", "bent")]}, "avoid left_knee=bent: a state is given by its number, 0 to .*: straight"),
+        ({"novelty": 1.5}, "novelty must be a number from 0 to 1, not 1.5"),
+        ({"novelty": np.nan}, "novelty must be"),
+        ({"diversity": -1.0}, "diversity must be a number of nats"),
+        ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
+        ({"coordination": "all"}, "coordination must be 'posture' or 'none', not 'all'"),
+        ({"memory": 10}, "memory of 10 bytes holds not one node"),
+        ({"memory": 0}, "memory must be a whole number"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(engine: Engine, asked: dict[str, Any], words: str) -> None:
+    with pytest.raises(MotionMindError, match=words):
+        join(engine, **asked)
+
+
+def test_a_via_is_on_the_corpus_skeleton_and_at_a_move(engine: Engine) -> None:
+    with pytest.raises(MotionMindError, match="via 1: the move must be a whole number from 1, not 0"):
+        join(engine, via=[(posture("passe"), 0)])
+
+
+def test_the_report_says_what_was_asked(engine: Engine) -> None:
+    found = join(engine, via=[(posture("passe"), 4)], avoid=[("left_knee", "passe 139")], novelty=0.25, memory=10**7)
+    asked = json.loads(json.dumps(found.report()))["asked"]
+    assert asked["via"] == [4]
+    assert asked["avoid"] == [["left_knee", "passe 139"]]
+    assert (asked["novelty"], asked["memory"], asked["moves"]) == (0.25, 10**7, None)
+    assert found.node_budget == astar.nodes_in(10**7, len(found.joints))
+
+
+# --- on the command line ----------------------------------------------------------------------------------------------
+
+A, B = POSTURES / "arabesque.json", POSTURES / "fifth.json"
+
+
+def test_everything_can_be_asked_on_the_command_line(run: Run, engine: Engine) -> None:
+    via = f"{POSTURES / 'passe.json'}@4"
+    asked = ["--moves", "6..9", "--pin", "left_wrist", "--pin", "right_wrist=B", "--avoid", "left_knee=plie 56"]
+    asked += ["--via", via, "--novelty", "0.5", "--memory", "5MB", "--duration", "2.5"]
+    ran = run("tween", A, B, "--corpus", "ballet", "--report", "-", *asked)
+    assert ran.code == 0, ran.err
+    found = join(
+        engine,
+        moves=(6, 9),
+        pin={"left_wrist": "A", "right_wrist": "B"},
+        avoid=[("left_knee", "plie 56")],
+        via=[(posture("passe"), 4)],
+        novelty=0.5,
+        memory=5_000_000,
+        duration=2.5,
+    )
+    assert ran.json["asked"] == json.loads(json.dumps(found.asked))
+    assert (ran.json["cost"], ran.json["path"]) == (found.cost, found.path.tolist())
+    assert ran.json["vias"][0]["move"] == 4
+    lively = run(
+        "tween", A, B, "--corpus", "ballet", "--report", "-", "--sample", "--seed", 3, "--coordination", "none"
+    )
+    drawn = join(engine, sample=True, seed=3, coordination="none")
+    assert lively.json["path"] == drawn.path.tolist()
+    table = run("tween", A, B, "--corpus", "ballet", *asked).out
+    assert "\nvia 1     at move 4, " in table
+
+
+def test_alternatives_go_to_files_of_their_own(run: Run) -> None:
+    ran = run("tween", A, B, "--corpus", "ballet", "--alternatives", 3, "-o", "out.json", "--report", "r.json")
+    assert ran.code == 0, ran.err
+    assert sorted(path.name for path in Path().iterdir()) == [
+        f"{name}-{k}.json" for name in ("out", "r") for k in (1, 2, 3)
+    ]
+    reports = [json.loads(Path(f"r-{k}.json").read_text()) for k in (1, 2, 3)]
+    assert [report["asked"]["unlike"] for report in reports] == [0, 1, 2]
+    assert reports[0]["cost"] < reports[1]["cost"] <= reports[2]["cost"]
+    together = run("tween", A, B, "--corpus", "ballet", "--alternatives", 3, "--report", "-").json
+    assert [report["path"] for report in together] == [report["path"] for report in reports]
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ("--moves 6..", "'6..' is no number of moves such as 8, and no range such as 6..10"),
+        ("--moves 6..4", "'6..4' ends before it begins"),
+        ("--moves 0", "'0' is no number of moves"),
+        ("--memory lots", "'lots' is no size such as 200MB"),
+        ("--memory 1MB --node-budget 5", "give one of them"),
+        ("--pin left_hip=C", "--pin left_hip=C: give JOINT or JOINT=A"),
+        ("--pin left_hip --pin left_hip=B", "left_hip is pinned to A and to B"),
+        ("--avoid left_hip", "--avoid left_hip: give JOINT=STATE"),
+        ("--via nowhere.json@2", "nowhere.json: cannot be read: there is no such file"),
+        ("--hold left_ankle", "hold left_ankle: A and B differ there"),
+        ("--novelty 2", "2.0 is not in the range 0<=x<=1"),
+    ],
+)
+def test_what_cannot_be_asked_is_one_line(run: Run, words: str, fault: str) -> None:
+    ran = run("tween", A, B, "--corpus", "ballet", *words.split())
+    assert ran.code == 2
+    assert fault in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_no_path_is_exit_code_3_and_names_what_was_asked(run: Run) -> None:
+    ran = run("tween", A, B, "--corpus", "ballet", "--via", f"{POSTURES / 'bow.json'}@1", "-o", "out.json")
+    assert ran.code == 3
+    assert "without via 1 at move 1 there is one" in ran.err
+    assert not Path("out.json").exists()
+
+
+def test_ctrl_c_writes_what_was_found(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The signal comes while the search is at its first piece of work."""
+    watched = Interruption.watch
+
+    def press(self: Interruption, so_far: Progress) -> bool:
+        if so_far.cost == np.inf:
+            os.kill(os.getpid(), signal.SIGINT)
+        return watched(self, so_far)
+
+    monkeypatch.setattr(Interruption, "watch", press)
+    before = signal.getsignal(signal.SIGINT)
+    ran = run("tween", A, B, "--corpus", "ballet", "-o", "out.json", "--report", "r.json", "--alternatives", 3)
+    assert ran.code == 130
+    assert sorted(path.name for path in Path().iterdir()) == ["out-1.json", "r-1.json"]
+    report = json.loads(Path("r-1.json").read_text())
+    assert report["status"] == "interrupted"
+    assert report["lower_bound"] < report["cost"]
+    assert len(read_motion("out-1.json")) > 2
+    assert signal.getsignal(signal.SIGINT) is before

@@ -375,7 +375,7 @@ def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Array) -
         turn = np.radians(356.0 + speed * keys)
         path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
         a, b = rot.about_vertical(turn[[0, -1]])
-        found = _headings(path, known, seconds, a, b)  # type: ignore[arg-type]
+        found = _headings(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
         np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
 
 
@@ -384,7 +384,7 @@ def test_headings_stay_in_their_states() -> None:
     for _ in range(20):
         path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
         a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
-        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), a, b)  # type: ignore[arg-type]
+        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
         off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
         assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
         assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9

@@ -90,6 +90,8 @@ def app(context: click.Context) -> None:
 @click.option(
     "--diversity", type=NATS, default=2.0, help="Nats for each joint's move that an alternative shares with one before."
 )
+@click.option("--sample", is_flag=True, help="Draw a path at random, the likelier the cheaper, instead of the best.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, help="What it is drawn by.")
 @click.option("--strict", is_flag=True, help="No bridges: every move attested, or exit code 3.")
 @click.option("--posturewise", is_flag=True, help="Only whole postures in the order of the corpus, as in 1998.")
 @click.option(
@@ -103,7 +105,10 @@ def app(context: click.Context) -> None:
 @click.option(
     "--novelty", type=Number(min=0, max=1), default=0.0, help="0: the frequent is cheap; 1: all that is attested alike."
 )
-@click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of how joints coordinate.")
+@click.option(
+    "--coordination", type=click.Choice(["posture", "none"]), default="posture", help="How joints coordinate."
+)
+@click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of what that costs.")
 @click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal.")
 @click.option("--tau", type=NATS, default=1.0, help="Nats for each move.")
 @click.option("--bridge-price", type=NATS, default=1.0, help="Nats for each degree of an unattested move.")

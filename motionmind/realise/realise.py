@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import pairwise
+from types import MappingProxyType
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,11 +31,13 @@ def realise(
     carriage: Carriage,
     fps: float,
     length: float | None = None,
+    through: Mapping[int, Posture] = MappingProxyType({}),
 ) -> Motion:
     """The motion of a path of states [T + 1, L] from posture `a` to posture `b`, on the body of `a`.
 
-    Its first and last frames are `a` and `b`, exactly. Between them each lane passes, at the times of the moves,
-    through orientations that the corpus shows in its states; a C2 spline joins them. The root travels as the corpus's
+    Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
+    are as in the postures there. Between them each lane passes, at the times of the moves, through orientations that
+    the corpus shows in its states; a C2 spline joins them. The root travels as the corpus's
     root does in these moves and ends where `b` stands. Its height keeps the lowest point of the body as far
     above the floor as the postures have it that the orientations come from; the floor is at 0, or lower under ends that
     are.
@@ -46,6 +52,7 @@ def realise(
         carriage: how its bodies travel and stand.
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: seconds that it lasts, to which frames are fitted; None for as long as the corpus takes.
+        through: postures on the way, by the number of moves that lead there, increasing.
     """
     if len(path) == 1:
         return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
@@ -55,39 +62,50 @@ def realise(
     seconds *= frames / fps / seconds.sum()
     keys = np.concatenate([[0.0], np.cumsum(seconds)])
     times = np.arange(frames + 1) / fps
+    times[-1] = length or times[-1]
     keys[-1] = times[-1]
 
     # The facing's states are steps of a circle, which the corpus need not show: its lane is not sampled but turned.
     joints = len(a.skeleton)
-    first, last = corpus.to_lanes(a.rotations), corpus.to_lanes(b.rotations)
-    observed = find_samples(path[:, :joints], states)
-    orientations = corpus.rotations[observed, np.arange(joints)[:, None]]
-    orientations[:, 0] = corpus.to_lanes(orientations[:, 0, :, None])[..., 0, :]  # of the root without its facing
-    chosen = choose_samples(observed, orientations, first[:joints], last[:joints])
-    inner = corpus.to_lanes(corpus.rotations[chosen, np.arange(joints)])[:, :joints]
-    between = rotation_spline(keys, np.concatenate([first[None, :joints], inner, last[None, :joints]]), times)
+    postures = {0: a, **through, len(path) - 1: b}
+    stops = {move: corpus.to_lanes(posture.rotations) for move, posture in postures.items()}
+    poses, heights = np.empty((len(path), joints, 4)), np.empty(len(path))
+    for start, end in pairwise(stops):
+        between = slice(start + 1, end)
+        ends = stops[start][:joints], stops[end][:joints]
+        observed = find_samples(path[start : end + 1, :joints], states)
+        orientations = corpus.rotations[observed, np.arange(joints)[:, None]]
+        orientations[:, 0] = corpus.to_lanes(orientations[:, 0, :, None])[..., 0, :]  # of the root without its facing
+        chosen = choose_samples(observed, orientations, *ends)
+        poses[between] = corpus.to_lanes(corpus.rotations[chosen, np.arange(joints)])[:, :joints]
+        heights[between] = np.median(carriage.clearance[chosen], axis=1)
+    for move, lanes in stops.items():
+        poses[move] = lanes[:joints]
+    rotations = rotation_spline(keys, poses, times)
     if corpus.facing == "free":
-        headings = _headings(path[:, -1], grammar, seconds, first[-1], last[-1])
+        headings = _headings(path[:, -1], grammar, seconds, {move: lanes[-1] for move, lanes in stops.items()})
         turn = rot.about_vertical(natural_spline(keys, headings, times))
-        between = np.concatenate([between, turn[:, None]], axis=1)
+        rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
-        headings = np.concatenate([[rot.heading(first[0])], rot.heading(inner[:, 0]), [rot.heading(last[0])]])
-    rotations = rot.normalise(corpus.from_lanes(between))
+        headings = rot.heading(poses[:, 0])
+    rotations = rot.normalise(corpus.from_lanes(rotations))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     places = carry(path, headings, seconds, carriage.travel, grammar.transitions, a.root, b.root)
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
-    low_a, low_b = (lowest(a.skeleton, end.rotations, end.root) for end in (a, b))
-    # Where they are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(keys[1:-1], keys[[0, -1]], np.minimum([low_a, low_b], 0.0))
-    heights = np.array([low_a, *(floor + np.median(carriage.clearance[chosen], axis=1)), low_b])
+    low = {move: lowest(a.skeleton, posture.rotations, posture.root) for move, posture in postures.items()}
+    # Where the ends are below 0 so is their floor: a recording's own zero is often off.
+    heights[1:-1] += np.interp(keys[1:-1], keys[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
+    heights[list(low)] = list(low.values())
     root = stand(a.skeleton, rotations, natural_spline(keys, places, times), _eased(keys, heights, times))
     root[0], root[-1] = a.root, b.root
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
 
 
-def _headings(path: NDArray[np.int32], grammar: Grammar, seconds: Floats, a: Floats, b: Floats) -> Floats:
-    """Headings in radians [T + 1] of a path through facing states, unwrapped, `a` and `b` [4] at its ends.
+def _headings(
+    path: NDArray[np.int32], grammar: Grammar, seconds: Floats, stops: Mapping[int, NDArray[np.float64]]
+) -> Floats:
+    """Headings in radians [T + 1] of a path through facing states, unwrapped, at `stops` those of their turns [4].
 
     Each move turns the short way between its states, as it was counted. A state is a step of the circle, and the body
     may face anywhere in it: of all headings in the path's states those that turn most evenly, so that steady turning
@@ -95,10 +113,12 @@ def _headings(path: NDArray[np.int32], grammar: Grammar, seconds: Floats, a: Flo
     """
     ring = grammar.centres[grammar.transitions.starts[-2] :]
     centres = np.unwrap(rot.heading(ring[path]))
-    off = rot.heading(np.stack([a, b])) - centres[[0, -1]]
-    ends = centres[[0, -1]] + off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))
     half = np.pi / len(ring)
-    return _evenest(ends, centres[1:-1] - half, centres[1:-1] + half, seconds)
+    low, high = centres - half, centres + half
+    for move, turn in stops.items():
+        off = rot.heading(turn) - centres[move]
+        low[move] = high[move] = centres[move] + off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))
+    return _evenest(low[[0, -1]], low[1:-1], high[1:-1], seconds)
 
 
 def _evenest(ends: Floats, low: Floats, high: Floats, seconds: Floats) -> Floats:

@@ -10,9 +10,7 @@ import json
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-import numpy as np
-
-from motionmind.search.problem import Ints, Model, build_grid, costs_to_go, with_waits
+from motionmind.search.problem import Ints, Model, leg_grids
 from motionmind.search.solve import Rules, Via
 
 DECIMALS = 6
@@ -26,17 +24,13 @@ def cfn(
     Variables are named lane_t and their values after the lane's states, such as "s12"; the optimum is the cost that a
     certificate states, the price of the moves themselves included. `vias` are passed at the moves that they name.
     """
-    held = with_waits(model, goal, rules.wait)
     stops = [(0, start), *((via.move or 0, via.states) for via in vias), (moves, goal)]
-    legs = [
-        (first, build_grid(held, leaving, last - first, costs_to_go(held, arriving, last - first), np.inf))
-        for (first, leaving), (last, arriving) in pairwise(stops)
-    ]
+    grids = leg_grids(model, goal, rules.wait, stops)
     variables: dict[str, list[str]] = {}
 
     def functions() -> Iterator[tuple[str, list[str], dict[str, object]]]:
         yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
-        for first, grid in legs:
+        for (first, _), grid in zip(stops, grids, strict=False):
             names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
             domains = [slice(*span) for span in pairwise(grid.dom_ptr)]
             for i, name in enumerate(names):

@@ -18,9 +18,9 @@ def path_cost(grid: Grid, path: Ints) -> float:
     """The cost in nats of a path [n] (positions); infinite where it takes an edge that is not there."""
     cost = 0.0
     for i in range(len(path)):
-        cost += grid.unary[path[i]] + _coupling(grid, path, i, path[i])
+        cost += grid.unary[path[i]] + coupling(grid, path, i, path[i])
         if i >= grid.lanes:
-            cost += _edge_cost(grid, path[i - grid.lanes], path[i])
+            cost += edge_cost(grid, path[i - grid.lanes], path[i])
     return cost
 
 
@@ -40,7 +40,7 @@ def polish(grid: Grid, path: Ints) -> float:
 
 
 @jit
-def _edge_cost(grid: Grid, p: int, x: int) -> float:
+def edge_cost(grid: Grid, p: int, x: int) -> float:
     """Cost of the edge from position p to x; infinite where there is none. Edges stand in order of where they lead."""
     low, high = grid.row_ptr[p], grid.row_ptr[p + 1]
     while low < high:
@@ -53,7 +53,7 @@ def _edge_cost(grid: Grid, p: int, x: int) -> float:
 
 
 @jit
-def _coupling(grid: Grid, path: Ints, i: int, x: int) -> float:
+def coupling(grid: Grid, path: Ints, i: int, x: int) -> float:
     """Discount of position x of variable i with its parent variable's place in the path."""
     if grid.up_ptr[i + 1] == grid.up_ptr[i]:
         return 0.0
@@ -72,7 +72,7 @@ def _best_lane(grid: Grid, path: Ints, lane: int) -> None:
             rest = 0.0 if t == grid.moves else np.inf
             for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
                 rest = min(rest, grid.row_cost[e] + value[grid.row_to[e]])
-            value[p] = rest + grid.unary[p] + _coupling(grid, path, i, p)
+            value[p] = rest + grid.unary[p] + coupling(grid, path, i, p)
             for child in range(lane + 1, lanes):
                 below = i - lane + child
                 if grid.parents[child] == lane and grid.up_ptr[below + 1] > grid.up_ptr[below]:
@@ -99,7 +99,7 @@ def _best_moment(grid: Grid, path: Ints, t: int) -> None:
         before, after = path[i - lanes], path[i + lanes]
         for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
             p = grid.row_to[e]
-            value[p - first] = grid.row_cost[e] + grid.unary[p] + _edge_cost(grid, p, after)
+            value[p - first] = grid.row_cost[e] + grid.unary[p] + edge_cost(grid, p, after)
             for child in range(lane + 1, lanes):
                 if grid.parents[child] == lane:
                     value[p - first] += _answer(grid, value, first, i - lane + child, p - grid.dom_ptr[i])[0]

@@ -8,6 +8,8 @@ coupled to its parent in the tree. The search knows nothing of bodies beyond thi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -111,6 +113,16 @@ def with_waits(model: Model, goal: Ints, wait: float) -> Model:
         targets=np.insert(model.targets, at[~held], goal[~held].astype(np.int32)),
         costs=np.insert(costs, at[~held], wait),
     )
+
+
+def leg_grids(model: Model, goal: Ints, wait: float, stops: Sequence[tuple[int, Ints]]) -> list[Grid]:
+    """The problems between stops, each the move at which it is passed and its states [L]; all that is allowed is in
+    their domains, and waits at `goal`."""
+    held = with_waits(model, goal, wait)
+    return [
+        build_grid(held, leaving, last - first, costs_to_go(held, arriving, last - first), np.inf)
+        for (first, leaving), (last, arriving) in pairwise(stops)
+    ]
 
 
 def _insertion(model: Model, row: int, state: int) -> int:

@@ -24,7 +24,7 @@ SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 _Result = TypeVar("_Result")
-Status = Literal["optimal", "bounded", "interrupted"]
+Status = Literal["optimal", "bounded", "interrupted", "sampled"]
 
 
 class Via(NamedTuple):
@@ -54,7 +54,8 @@ class Certificate:
         path: states [T + 1, L].
         cost: its cost in nats.
         lower_bound: no path within the rules costs less than this, in nats.
-        status: "optimal" where both agree to 1e-6 nats, else "interrupted" if it was, else "bounded".
+        status: "optimal" where both agree to 1e-6 nats, else "interrupted" if it was, else "bounded";
+            "sampled" where the path was drawn and not sought.
         expansions: nodes expanded by A*.
         peak_nodes: the greatest number of nodes held at once.
         seconds: of the parts "problem", "bound" and "search"; a measurement, and no part of the proof.
