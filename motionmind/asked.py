@@ -81,13 +81,23 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
         asked: the restrictions in it.
     """
     ends, rules, vias = (posed.start, posed.goal), posed.rules, posed.vias
-    if not feasible(model, *ends, rules, ()):
-        return ""
     names = [*(one.name for one in asked), *(_via(posed, i) for i in range(len(vias)))]
-    alone = [
-        feasible(restricted(model, [*asked[:i], *asked[i + 1 :]]), *ends, rules, vias) for i in range(len(asked))
-    ] + [feasible(posed.model, *ends, rules, [*vias[:i], *vias[i + 1 :]]) for i in range(len(vias))]
-    lines = [f"without {name} there is one" for name, helps in zip(names, alone, strict=True) if helps]
+
+    def possible(kept: Sequence[int]) -> bool:
+        restrictions = [one for i, one in enumerate(asked) if i in kept]
+        through = [via for i, via in enumerate(vias, start=len(asked)) if i in kept]
+        return feasible(restricted(model, restrictions), *ends, rules, through)
+
+    if not possible([]):
+        return ""
+    every = list(range(len(names)))
+    lines = [f"without {name} there is one" for i, name in enumerate(names) if possible([k for k in every if k != i])]
+    if not lines:
+        guilty = every
+        for i in every:
+            if not possible(others := [k for k in guilty if k != i]):
+                guilty = others
+        lines.append(f"{' and '.join(names[i] for i in guilty)} leave{'s' * (len(guilty) == 1)} none")
     for i, (states, wanted) in enumerate(vias):
         if wanted is not None:
             near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
@@ -105,7 +115,9 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
             here, there = ("A", *(_via(posed, i) for i in range(len(vias))), "B")[leg : leg + 2]
             lines.append(f"{', '.join(stuck)}: no way from {here} to {there}")
     number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
-    return "\n  ".join([f"no path from A to B in {number} moves under what was asked:", *lines])
+    return "\n  ".join(
+        [f"no path from A to B in {number} move{'s' * (rules.longest != 1)} under what was asked:", *lines]
+    )
 
 
 def _via(posed: Posed, i: int) -> str:

@@ -493,6 +493,17 @@ def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:
         join(engine, via=[(posture("passe"), 3)])
 
 
+def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(engine: Engine) -> None:
+    plain = join(engine)
+    lane = plain.joints.index("right_elbow")
+    every = [("right_elbow", state) for state in range(engine.space.sizes[lane])]
+    with pytest.raises(NoPathError, match=r"in 4 moves(.|\n)*right_elbow") as fault:
+        join(engine, avoid=[("left_hip", 1), *every], pin={"right_elbow": "B", "left_knee": "A"}, moves=4, strict=True)
+    assert "left_" not in str(fault.value)
+    with pytest.raises(NoPathError, match=r"in at most 1 move \(allow more moves\)"):  # not for what was asked
+        join(engine, pin={"left_knee": "A"}, moves=1)
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
