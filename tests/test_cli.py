@@ -28,6 +28,7 @@ from motionmind.motion import Motion
 BALLET = Path(__file__).parent.parent / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
 REPORT = {
+    *("asked", "shared", "vias"),
     *("status", "cost", "lower_bound", "gap", "moves", "expansions", "peak_nodes", "node_budget", "seconds", "joints"),
     *("path", "attested", "bridges", "waits", "snap_degrees", "sources", "times", "names", "degrees", "likelihood"),
     *("costs", "asked", "vias", "shared"),
