@@ -9,14 +9,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.search import astar, bound
+from motionmind.search import astar, bound, strips
 from motionmind.search.polish import polish
-from motionmind.search.probe import probe
 from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
-CASES = 1000  # that the bound is split into at most, for each number of moves
+STALLED = 0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to strips
+STRIP_SWEEPS = 100  # at most, for each number of moves
+STRIPS_STALLED = 0.98  # as STALLED; then A* takes over
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
+MOST_PAIRS = 1 << 23  # of states in strips, for each number of moves; 40 bytes each
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 
@@ -67,8 +69,8 @@ class Rules:
 def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
     """The best path from states `start` [L] to `goal` [L] over all numbers of moves; None where there is none.
 
-    Numbers of moves are looked at in the order of what the lanes cost on their own. Each is bounded, then searched, and
-    only as long as its bound is below the best path found; so the least bound of all proves the answer.
+    Numbers of moves are looked at in the order of what the lanes cost on their own, as long as that is below the best
+    path found, and bounded; those that this leaves undecided are searched. The least bound of all proves the answer.
     """
     if np.diff(model.starts).max() > MOST_STATES:
         raise ValueError(f"a lane has {np.diff(model.starts).max()} states; the search takes up to {MOST_STATES}")
@@ -80,30 +82,35 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
 
     best, path, expansions, peak = np.inf, np.zeros((0, len(start)), dtype=np.int32), 0, 0
     lower = np.where(np.arange(rules.longest + 1) >= rules.shortest, alone, np.inf)
-    for moves in np.argsort(lower, kind="stable"):
+    left: dict[int, tuple[Grid, strips.Strips]] = {}  # what is left to search
+    for moves in map(int, np.argsort(lower, kind="stable")):
         if not lower[moves] < best - PROVEN:
             break
-        toll = rules.per_move * int(moves)
-        grid = build_grid(held, start, int(moves), to_go, best - toll)
+        toll = rules.per_move * moves
+        known = _Known(build_grid(held, start, moves, to_go, best - toll), best - toll)
         clock.lap("problem")
-        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best - toll)
-        known = min(found, best - toll)
-        if found < best - toll:
-            best, path = found + toll, states
+        messages = _by_messages(known, rules.sweeps)
+        if not known.settled and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
+            cut = _by_strips(known, messages)
+            if not known.settled:
+                left[moves] = known.grid, cut
+        lower[moves] = max(lower[moves], known.proven + toll)
+        if known.cost < best - toll:
+            best, path = known.cost + toll, known.states
         clock.lap("bound")
-        if proven < known - PROVEN and expansions < rules.node_budget:
-            chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-            # f grows from what the messages prove by themselves; cases may have proven more.
-            found, searched, expanded, held_nodes = astar.search(
-                grid, messages, float(messages.constants.sum()), known, chosen, rules.node_budget,
-                rules.node_budget - expansions,
-            )  # fmt: skip
-            proven = max(proven, searched)
-            if found < known:
-                best, path = found + toll, _states(grid, chosen)
-            expansions, peak = expansions + expanded, max(peak, held_nodes)
-            clock.lap("search")
+    for moves in sorted(left, key=lambda moves: lower[moves]):
+        if expansions >= rules.node_budget:
+            break
+        toll, (grid, cut) = rules.per_move * moves, left.pop(moves)
+        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
+        cost, proven, expanded, held_nodes = astar.search(
+            grid, cut, strips.proven(cut), best - toll, chosen, rules.node_budget, rules.node_budget - expansions
+        )
+        if cost < best - toll:
+            best, path = cost + toll, _states(grid, chosen)
         lower[moves] = max(lower[moves], proven + toll)
+        expansions, peak = expansions + expanded, max(peak, held_nodes)
+        clock.lap("search")
     if not np.isfinite(best):
         return None
     least = min(float(lower.min()), best)
@@ -111,38 +118,81 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
     return Certificate(path, best, least, "optimal" if proven_best else "bounded", expansions, peak, clock.seconds)
 
 
-def _bound(grid: Grid, sweeps: int, below: float) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
-    """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
+class _Known:
+    """What is known of one number of moves.
 
-    Every few sweeps the path that they met, if better than those before, is polished, and positions that no better
-    path goes through are taken out of the grid; until both meet, or what separates them no longer shrinks.
+    Attributes:
+        grid: what is left of it: no path cheaper than `cost` lies outside.
+        cost: of the best path found, or what it has to be cheaper than.
+        states: the best path found [T + 1, L]; empty until then.
+        proven: no path that is cheaper than `cost` costs less than this.
     """
-    messages = bound.no_messages(grid)
-    proven, rough, cost, states = -np.inf, np.inf, np.inf, np.zeros((0, grid.lanes), dtype=np.int32)
-    for done in range(0, sweeps, SWEEPS_AT_ONCE):
-        gap, size = min(cost, below) - proven, len(grid.dom)
-        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        latest, met = bound.tighten(grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), min(cost, below))
-        proven = max(proven, latest)
-        if met < rough:
-            rough, found = met, polish(grid, chosen)
-            if found < cost:
-                cost, states = found, _states(grid, chosen)
-        known = min(cost, below)
-        if proven >= known - PROVEN:
-            break
-        grid, messages = bound.narrow(grid, messages, known - astar.SAME)
+
+    def __init__(self, grid: Grid, cost: float) -> None:
+        self.grid, self.cost, self.proven = grid, cost, -np.inf
+        self.states = np.zeros((0, grid.lanes), dtype=np.int32)
+
+    @property
+    def settled(self) -> bool:
+        """Whether bound and path meet, or nothing is left that a better path could go through."""
+        return self.proven >= self.cost - PROVEN
+
+    def learn(self, proven: float, chosen: Ints) -> None:
+        """A bound, and a path of positions [n], which is polished."""
+        self.proven = max(self.proven, proven)
+        cost = polish(self.grid, chosen)
+        if cost < self.cost:
+            self.cost, self.states = cost, _states(self.grid, chosen)
+        self.proven = min(self.proven, self.cost)
+
+    def narrow(self, grid: Grid) -> None:
+        """What is left of the grid: if a domain of it is empty, nothing."""
+        self.grid = grid
         if np.any(np.diff(grid.dom_ptr) == 0):
-            proven = known
+            self.proven = self.cost
+
+    def stalls(self, gap: float, size: int, share: float) -> bool:
+        """Whether more than a share is left of the gap and of the number of positions that there were."""
+        return self.cost - self.proven > share * gap and len(self.grid.dom) > share * size
+
+
+def _by_messages(known: _Known, sweeps: int) -> bound.Messages:
+    """Bound a number of moves by messages, of which the last are returned.
+
+    Every few sweeps the path that they met is polished, and positions that no better path goes through are taken out
+    of the grid; until bound and path meet, or what separates them hardly shrinks.
+    """
+    messages = bound.no_messages(known.grid)
+    for done in range(0, sweeps, SWEEPS_AT_ONCE):
+        gap, size = known.cost - known.proven, len(known.grid.dom)
+        chosen = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64)
+        proven, _ = bound.tighten(known.grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), known.cost)
+        known.learn(proven, chosen)
+        if known.settled:
             break
-        if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
+        grid, messages = bound.narrow(known.grid, messages, known.cost - astar.SAME)
+        known.narrow(grid)
+        if known.settled or (done and known.stalls(gap, size, STALLED)):
             break
-    if proven < min(cost, below) - PROVEN:
-        flat = states.ravel().copy()
-        fewest_first = np.argsort(np.diff(grid.dom_ptr), kind="stable")
-        proven, cost, grid, messages = probe(grid, messages, fewest_first, proven, cost, below, flat, CASES)
-        states = flat.reshape(-1, grid.lanes)
-    return min(proven, cost, below), cost, states, grid, messages
+    return messages
+
+
+def _by_strips(known: _Known, messages: bound.Messages) -> strips.Strips:
+    """Go on by strips, in the same way; the last are returned."""
+    cut = strips.cut(known.grid, messages)
+    for done in range(STRIP_SWEEPS):
+        gap, size = known.cost - known.proven, len(known.grid.dom)
+        chosen, through = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
+        proven = strips.sweep(known.grid, cut, through)
+        strips.descend(known.grid, cut, chosen)
+        known.learn(proven, chosen)
+        if known.settled:
+            break
+        grid, cut = strips.narrow(known.grid, cut, through, known.cost - astar.SAME)
+        known.narrow(grid)
+        if known.settled or (done and known.stalls(gap, size, STRIPS_STALLED)):
+            break
+    return cut
 
 
 def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
