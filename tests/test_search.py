@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -336,6 +337,42 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
     assert better > 0
 
 
+def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    expansions = {"apart": 0, "at once": 0}
+    for seed in range(60):
+        toy = random_toy(seed, most=3, frustrated=True)
+        one, two = answer(toy, toy.rules(MOVES, MOVES)), twice(toy)
+        if one is None or len(toy.sizes) == 1:
+            continue
+        for how, parts in (("apart", solve._parts), ("at once", lambda grid: np.zeros(grid.lanes, np.int64))):
+            with monkeypatch.context() as patch:
+                patch.setattr(solve, "_parts", parts)
+                found = answer(two, two.rules(MOVES, MOVES, sweeps=1))
+            assert found is not None
+            assert found.status == "optimal", seed
+            assert found.cost == pytest.approx(2 * one.cost - MOVES * toy.per_move, abs=PROVEN), seed
+            assert found.cost == pytest.approx(two.cost(found.path), abs=ROUNDING), seed
+            expansions[how] += found.expansions
+    assert 0 < expansions["apart"] < 0.8 * expansions["at once"]
+
+
+def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
+    toy = Toy(
+        parents=(-1, 0, 1, 1),
+        edges=tuple(np.ones((size, size)) for size in (2, 1, 2, 2)),
+        children=tuple(map(np.zeros, (2, 1, 2, 2))),
+        above=tuple(map(np.zeros, (0, 2, 1, 1))),
+        discounts=tuple(map(np.zeros, ((0, 2), (2, 1), (1, 2), (1, 2)))),
+        start=(0, 0, 0, 0),
+        goal=(1, 0, 1, 1),
+        wait=1.0,
+        per_move=0.5,
+    )
+    assert solve._parts(grid_of(toy, 3)).tolist() == [0, 1, 2, 3]
+    assert solve._parts(grid_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
+
+
 # --- edges of the problem --------------------------------------------------------------------------------------------
 
 
@@ -444,6 +481,21 @@ def test_the_written_problem_forbids_what_the_model_forbids() -> None:
 
 
 # --- helpers ---------------------------------------------------------------------------------------------------------
+
+
+def twice(toy: Toy) -> Toy:
+    """Two of a body side by side, as one."""
+    below = tuple(parent + len(toy.sizes) if parent >= 0 else -1 for parent in toy.parents)
+    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "discounts", "start", "goal")}
+    return replace(toy, parents=toy.parents + below, **doubled)
+
+
+def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:
+    """Tables of couplings of two states each, for the last two lanes."""
+    return {
+        "above": (*toy.above[:2], np.zeros(2), np.zeros(2)),
+        "discounts": (*toy.discounts[:2], np.zeros((2, 2)), np.zeros((2, 2))),
+    }
 
 
 def bodies(seeds: int, kind: dict[str, bool]) -> Iterator[tuple[Grid, float, int]]:

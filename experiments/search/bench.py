@@ -27,8 +27,14 @@ from motionmind.search.solve import Certificate, Rules
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
 EXPANSIONS = 200_000
 RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
-EFFORTS = (("messages", (0, 2)), ("messages", (0, 8)), ("messages", (0, 160))) + tuple(
-    ("strips", (sweeps, 160)) for sweeps in (1, 2, 4, 100)
+EFFORTS = (  # sweeps of strips and of messages
+    ("messages", (0, 2)),
+    ("messages", (0, 8)),
+    ("messages", (0, 160)),
+    ("strips", (1, 160)),
+    ("strips", (2, 160)),
+    ("strips", (4, 160)),
+    ("strips", (100, 160)),
 )
 
 Floats = NDArray[np.float64]
@@ -132,7 +138,7 @@ def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
             path = np.zeros(len(grid.dom_ptr) - 1, np.int64)
             root = strips.proven(estimate)
             best, lower, expanded, _ = astar.search(grid, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS)
-            rows.setdefault(name, []).append((1.0 - root / cost, expanded, lower > best - solve.PROVEN))
+            rows.setdefault(name, []).append((max(1.0 - root / cost, 0.0), expanded, lower > best - solve.PROVEN))
     print(f"A* alone, {len(few)} pairs:                   short of the best   expansions, median and most     proven")
     for name, row in rows.items():
         short, expanded, proved = zip(*row, strict=True)

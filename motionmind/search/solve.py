@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.search import astar, bound, strips
-from motionmind.search.polish import polish
+from motionmind.search.polish import path_cost, polish
 from motionmind.search.problem import Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
 STALLED = 0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to strips
 STRIP_SWEEPS = 100  # at most, for each number of moves
 STRIPS_STALLED = 0.98  # as STALLED; then A* takes over
+NEAR = 1.1  # a path that costs up to so many times the best is worth polishing
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
 MOST_PAIRS = 1 << 23  # of states in strips, for each number of moves; 40 bytes each
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
@@ -91,7 +92,7 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
         clock.lap("problem")
         messages = _by_messages(known, rules.sweeps)
         if not known.settled and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
-            cut = _by_strips(known, messages)
+            cut = _by_strips(known, strips.cut(known.grid, messages))
             if not known.settled:
                 left[moves] = known.grid, cut
         lower[moves] = max(lower[moves], known.proven + toll)
@@ -99,17 +100,12 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
             best, path = known.cost + toll, known.states
         clock.lap("bound")
     for moves in sorted(left, key=lambda moves: lower[moves]):
-        if expansions >= rules.node_budget:
-            break
-        toll, (grid, cut) = rules.per_move * moves, left.pop(moves)
-        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        cost, proven, expanded, held_nodes = astar.search(
-            grid, cut, strips.proven(cut), best - toll, chosen, rules.node_budget, rules.node_budget - expansions
-        )
-        if cost < best - toll:
-            best, path = cost + toll, _states(grid, chosen)
-        lower[moves] = max(lower[moves], proven + toll)
-        expansions, peak = expansions + expanded, max(peak, held_nodes)
+        toll, budget = rules.per_move * moves, rules.node_budget - expansions
+        found = _search(*left.pop(moves), best - toll, rules.node_budget, budget)
+        if found.cost < best - toll:
+            best, path = found.cost + toll, found.states
+        lower[moves] = max(lower[moves], found.proven + toll)
+        expansions, peak = expansions + found.expansions, max(peak, found.peak)
         clock.lap("search")
     if not np.isfinite(best):
         return None
@@ -138,12 +134,12 @@ class _Known:
         return self.proven >= self.cost - PROVEN
 
     def learn(self, proven: float, chosen: Ints) -> None:
-        """A bound, and a path of positions [n], which is polished."""
-        self.proven = max(self.proven, proven)
-        cost = polish(self.grid, chosen)
-        if cost < self.cost:
-            self.cost, self.states = cost, _states(self.grid, chosen)
-        self.proven = min(self.proven, self.cost)
+        """A bound, and a path of positions [n], which is polished if it is near the best."""
+        if path_cost(self.grid, chosen) <= NEAR * self.cost:
+            cost = polish(self.grid, chosen)
+            if cost < self.cost:
+                self.cost, self.states = cost, _states(self.grid, chosen)
+        self.proven = min(max(self.proven, proven), self.cost)
 
     def narrow(self, grid: Grid) -> None:
         """What is left of the grid: if a domain of it is empty, nothing."""
@@ -177,22 +173,84 @@ def _by_messages(known: _Known, sweeps: int) -> bound.Messages:
     return messages
 
 
-def _by_strips(known: _Known, messages: bound.Messages) -> strips.Strips:
+def _by_strips(known: _Known, cut: strips.Strips) -> strips.Strips:
     """Go on by strips, in the same way; the last are returned."""
-    cut = strips.cut(known.grid, messages)
+    known.proven = max(known.proven, min(strips.proven(cut), known.cost))
     for done in range(STRIP_SWEEPS):
+        if known.settled:
+            break
         gap, size = known.cost - known.proven, len(known.grid.dom)
         chosen, through = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
         proven = strips.sweep(known.grid, cut, through)
         strips.descend(known.grid, cut, chosen)
         known.learn(proven, chosen)
-        if known.settled:
-            break
-        grid, cut = strips.narrow(known.grid, cut, through, known.cost - astar.SAME)
-        known.narrow(grid)
-        if known.settled or (done and known.stalls(gap, size, STRIPS_STALLED)):
+        if not known.settled:
+            grid, cut = strips.narrow(known.grid, cut, through, known.cost - astar.SAME)
+            known.narrow(grid)
+        if done and known.stalls(gap, size, STRIPS_STALLED):
             break
     return cut
+
+
+class _Searched(NamedTuple):
+    """The best path that A* found, what it proved, and what it took."""
+
+    cost: float
+    states: NDArray[np.int32]
+    proven: float
+    expansions: int
+    peak: int
+
+
+def _search(grid: Grid, cut: strips.Strips, below: float, nodes: int, budget: int) -> _Searched:
+    """Search the parts of the body that nothing couples any more, each with the others on one path.
+
+    What a path costs more than that one, or less, is the sum of what it does so in each part. So what is proven of each
+    part adds up; and a part needs to be searched only up to what, with the best that the others may save, would come
+    below `below`. Searched all at once, every near-best way of one part would be tried with those of all others.
+    """
+    chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
+    strips.descend(grid, cut, chosen)
+    cost = polish(grid, chosen)
+    states = _states(grid, chosen)
+    part = _parts(grid)
+    part_of = np.repeat(np.resize(part, len(chosen)), np.diff(grid.dom_ptr))
+    on_path = np.isin(np.arange(len(part_of)), chosen)
+    alone = {}
+    for name in np.unique(part):
+        alone[name] = strips.narrow(grid, cut, np.where(on_path | (part_of == name), 0.0, np.inf), 1.0)
+    may_save = {name: max(cost - strips.proven(fewer), 0.0) for name, (_, fewer) in alone.items()}
+    saved, expansions, peak = 0.0, 0, 0
+    for name in sorted(may_save, key=lambda name: may_save[name]):
+        others = sum(may_save.values()) - may_save[name]
+        smaller, fewer = alone.pop(name)
+        known = _Known(smaller, min(cost, below + others))
+        fewer = _by_strips(known, fewer)
+        if not known.settled and expansions < budget:
+            chosen = np.zeros(len(chosen), dtype=np.int64)
+            found, proven, expanded, held = astar.search(
+                known.grid, fewer, strips.proven(fewer), known.cost, chosen, nodes, budget - expansions
+            )
+            if found < known.cost:
+                known.cost, known.states = found, _states(known.grid, chosen)
+            known.proven, expansions, peak = max(known.proven, proven), expansions + expanded, max(peak, held)
+        may_save[name] = cost - known.proven
+        if len(known.states) > 0:
+            saved += cost - known.cost
+            states[:, part == name] = known.states[:, part == name]
+    return _Searched(cost - saved, states, cost - sum(may_save.values()), expansions, peak)
+
+
+def _parts(grid: Grid) -> Ints:
+    """The first lane of the part that each lane belongs to [L].
+
+    A coupling joins two lanes only where there is a move at which both have more than one position left.
+    """
+    part, many = np.arange(grid.lanes), np.diff(grid.dom_ptr).reshape(-1, grid.lanes) > 1
+    for lane, parent in enumerate(grid.parents):
+        if parent >= 0 and np.any(many[:, lane] & many[:, parent]):
+            part[lane] = part[parent]
+    return part
 
 
 def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
