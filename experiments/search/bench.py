@@ -88,9 +88,12 @@ def warm_up(model: Model, states: NDArray[np.int32]) -> None:
         assert answer is not None
         moves = len(answer.path) - 1
         grid = pose(model, (start, goal), moves)
-        cut = strips.cut(grid, bound.no_messages(grid))
-        astar.search(grid, cut, strips.proven(cut), np.inf, np.zeros(len(grid.dom_ptr) - 1, np.int64), 100, 100)
-        strips.narrow(grid, cut, np.full(len(grid.dom), np.inf), np.inf)
+        cut, path = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom_ptr) - 1, np.int64)
+        through = np.zeros(len(grid.dom))
+        strips.sweep(grid, cut, through)
+        strips.descend(grid, cut, path)
+        strips.narrow(grid, cut, through, np.inf)
+        astar.search(grid, cut, strips.proven(cut), np.inf, path, 100, 100)
 
 
 # --- all pairs -------------------------------------------------------------------------------------------------------

@@ -17,9 +17,9 @@ SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on re
 STALLED = 0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to strips
 STRIP_SWEEPS = 100  # at most, for each number of moves
 STRIPS_STALLED = 0.98  # as STALLED; then A* takes over
-NEAR = 1.1  # a path that costs up to so many times the best is worth polishing
+NEAR = 0.1  # a path that costs no more than this share above the best is worth polishing
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
-MOST_PAIRS = 1 << 23  # of states in strips, for each number of moves; 40 bytes each
+MOST_PAIRS = 1 << 23  # of states in strips, 32 bytes each: more are not made, nor kept for A*
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 
@@ -56,7 +56,7 @@ class Rules:
         shortest: least number of moves.
         longest: greatest number of moves.
         node_budget: nodes that A* may hold at once; it stops after as many expansions.
-        sweeps: pairs of sweeps of the bound at most, for each number of moves; at least 1.
+        sweeps: pairs of sweeps of messages at most, for each number of moves; at least 1.
     """
 
     wait: float
@@ -84,6 +84,7 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
     best, path, expansions, peak = np.inf, np.zeros((0, len(start)), dtype=np.int32), 0, 0
     lower = np.where(np.arange(rules.longest + 1) >= rules.shortest, alone, np.inf)
     left: dict[int, tuple[Grid, strips.Strips]] = {}  # what is left to search
+    kept = 0  # pairs in it
     for moves in map(int, np.argsort(lower, kind="stable")):
         if not lower[moves] < best - PROVEN:
             break
@@ -93,13 +94,16 @@ def solve(model: Model, start: Ints, goal: Ints, rules: Rules) -> Certificate | 
         messages = _by_messages(known, rules.sweeps)
         if not known.settled and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
             cut = _by_strips(known, strips.cut(known.grid, messages))
-            if not known.settled:
+            if not known.settled and kept + len(cut.stand) <= MOST_PAIRS:
                 left[moves] = known.grid, cut
+                kept += len(cut.stand)
         lower[moves] = max(lower[moves], known.proven + toll)
         if known.cost < best - toll:
             best, path = known.cost + toll, known.states
         clock.lap("bound")
     for moves in sorted(left, key=lambda moves: lower[moves]):
+        if not lower[moves] < best - PROVEN:
+            break
         toll, budget = rules.per_move * moves, rules.node_budget - expansions
         found = _search(*left.pop(moves), best - toll, rules.node_budget, budget)
         if found.cost < best - toll:
@@ -135,7 +139,7 @@ class _Known:
 
     def learn(self, proven: float, chosen: Ints) -> None:
         """A bound, and a path of positions [n], which is polished if it is near the best."""
-        if path_cost(self.grid, chosen) <= NEAR * self.cost:
+        if path_cost(self.grid, chosen) <= self.cost + NEAR * abs(self.cost):
             cost = polish(self.grid, chosen)
             if cost < self.cost:
                 self.cost, self.states = cost, _states(self.grid, chosen)
