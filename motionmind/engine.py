@@ -14,7 +14,7 @@ import numpy as np
 from motionmind import rotations as rot
 from motionmind import survey
 from motionmind.account import account
-from motionmind.asked import culprits, restricted, restrictions
+from motionmind.asked import Restriction, culprits, restricted, restrictions
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
 from motionmind.grammar.coordination import fit_network
@@ -127,8 +127,8 @@ class Engine(Learned):
             SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
             MotionMindError: an option is out of its range, or asks for what cannot be.
         """
-        if posturewise and (pin or hold or avoid or via or unlike):
-            raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via or unlike")
+        if posturewise and (pin or hold or avoid or via or unlike or sample):
+            raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
         least, most = _range(moves, max_moves)
         _check_options(node_budget, fps, weights, novelty, lambda_, beta, tau, bridge_price, diversity)
         if memory is not None:
@@ -151,9 +151,8 @@ class Engine(Learned):
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
         asked = restrictions(self.space, start, goal, pin, hold, avoid)
-        model = self._model(
-            weights, lambda_ if coordination == "posture" else 0.0, None if strict else bridge_price, novelty
-        )
+        factor = lambda_ if coordination == "posture" else 0.0
+        model = self._model(weights, factor, None if strict else bridge_price, novelty)
         if unlike:
             model = dearer(model, [other.path for other in unlike], diversity)
         posed = Posed(
@@ -165,24 +164,12 @@ class Engine(Learned):
         )
         posing = perf_counter() - began
         if not fixed and not via and _same(a, b):
-            stay = states[:1]
-            certificate: Certificate | None = Certificate(
-                stay, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0}
-            )
+            spent = {"problem": 0.0, "bound": 0.0, "search": 0.0}
+            certificate = Certificate(states[:1], 0.0, 0.0, "optimal", 0, 0, spent)
         elif near is not None:
-            certificate = solve_posturewise(model, self._bodies, start, goal, posed.rules)
-            if certificate is None:
-                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
+            certificate = self._posturewise(posed, near)
         else:
-            certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
-        if certificate is None:
-            if faults := culprits(self.grammar.lanes, model, posed, asked):
-                raise NoPathError(faults, {"restrictions": faults})
-            # Imported here, for SciPy's graphs are slow to import.
-            from motionmind.diagnosis import diagnose
-
-            found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, posed.rules, strict)
-            raise NoPathError(str(found), found.plain())
+            certificate = self._certified(posed, model, asked, strict, watch)
         if sample and len(certificate.path) > 1:
             certificate = drawn(posed.model, start, goal, posed.rules, posed.vias, certificate, seed)
         attested, bridges, waits, sources = explain(
@@ -229,7 +216,7 @@ class Engine(Learned):
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,
-            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, lambda_),
+            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, factor),
             seconds={
                 "load": self.load_seconds,
                 "problem": posing + spent["problem"],
@@ -263,6 +250,29 @@ class Engine(Learned):
                 "fps": fps,
             },
         )
+
+    def _certified(
+        self, posed: Posed, model: Model, asked: Sequence[Restriction], strict: bool, watch: Watch | None
+    ) -> Certificate:
+        """The best path; NoPathError, with what is at fault, where there is none."""
+        certificate = solve(posed.model, posed.start, posed.goal, posed.rules, posed.vias, watch)
+        if certificate is not None:
+            return certificate
+        if faults := culprits(self.grammar.lanes, model, posed, asked):
+            raise NoPathError(faults, {"restrictions": faults})
+        # Imported here, for SciPy's graphs are slow to import.
+        from motionmind.diagnosis import diagnose
+
+        ends = posed.start, posed.goal
+        found = diagnose(model, self.grammar, self.corpus, self.space, *ends, posed.rules, strict)
+        raise NoPathError(str(found), found.plain())
+
+    def _posturewise(self, posed: Posed, near: tuple[int, int]) -> Certificate:
+        """The best path of whole postures between two of the corpus; NoPathError where there is none."""
+        certificate = solve_posturewise(posed.model, self._bodies, posed.start, posed.goal, posed.rules)
+        if certificate is None:
+            raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
+        return certificate
 
     def _vias(self, via: Sequence[Posture | tuple[Posture, int]]) -> tuple[list[Posture], list[int | None]]:
         """The postures to pass through, and the move at which each is, or None."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from toys import Toy, grid_of, noisy_messages, random_toy
 
-from motionmind.search import astar, bound, solve
+from motionmind.search import astar, bound, solve, strips
 from motionmind.search.cfn import cfn
 from motionmind.search.polish import path_cost, polish
-from motionmind.search.problem import Model, costs_to_go, with_waits
+from motionmind.search.problem import Grid, Model, costs_to_go, with_waits
 from motionmind.search.solve import Certificate, Rules
 
 MOVES = 6
 PROVEN = 2 * solve.PROVEN
+ON = np.zeros(1, dtype=bool)  # A* goes on as long as nobody sets it
 ROUNDING = 1e-9
 KINDS = {
     "plain": {},
@@ -88,12 +91,13 @@ def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) 
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, node_budget)
 
 
-@pytest.mark.parametrize("cases", [1, 5, solve.CASES])
+@pytest.mark.parametrize("pairs", [0, solve.MOST_PAIRS])
 @pytest.mark.parametrize("sweeps", [1, 2])
 def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
-    monkeypatch: pytest.MonkeyPatch, sweeps: int, cases: int
+    monkeypatch: pytest.MonkeyPatch, sweeps: int, pairs: int
 ) -> None:
-    monkeypatch.setattr(solve, "CASES", cases)
+    monkeypatch.setattr(solve, "MOST_PAIRS", pairs)
+    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
     monkeypatch.setattr(solve, "SWEEPS_AT_ONCE", sweeps)
     searched = bounded = 0
     for seed in range(60):
@@ -112,8 +116,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
                 assert found.expansions <= node_budget
                 searched += found.expansions > 0
                 bounded += found.status == "bounded"
-    assert searched > 0
-    assert bounded > 0 or cases == solve.CASES
+    assert searched > 0 if pairs else bounded > 0
 
 
 # --- what proves it --------------------------------------------------------------------------------------------------
@@ -177,6 +180,103 @@ def test_f_never_overestimates_along_an_optimal_path_whatever_the_forward_messag
         assert f == pytest.approx(optimum, abs=ROUNDING)
 
 
+def test_two_lanes_are_one_strip_and_its_bound_is_their_optimum(kind: dict[str, bool]) -> None:
+    for seed in range(100):
+        toy = random_toy(seed, most=2, **kind)
+        optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
+        if len(toy.sizes) == 2 and optimum < np.inf:
+            grid = grid_of(toy, MOVES)
+            cut, path = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros((MOVES + 1) * 2, np.int64)
+            assert strips.proven(cut) == pytest.approx(optimum, abs=ROUNDING), seed
+            strips.descend(grid, cut, path)
+            assert path_cost(grid, path) == pytest.approx(optimum, abs=ROUNDING), seed
+
+
+def test_every_sweep_of_strips_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
+    tighter = 0
+    for grid, optimum, seed in bodies(100, kind):
+        messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+        by_messages = bound.tighten(grid, messages, path, 50, np.inf)[0]
+        cut, through = strips.cut(grid, messages), np.zeros(len(grid.dom))
+        proven = [strips.proven(cut), *(strips.sweep(grid, cut, through) for _ in range(8))]
+        assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
+        assert proven[-1] <= optimum + ROUNDING, seed
+        assert proven[-1] == pytest.approx(strips.proven(cut), abs=ROUNDING), seed
+        tighter += proven[-1] > by_messages + 1e-3
+    assert tighter > 3 or not kind.get("frustrated")
+
+
+def test_shares_move_between_strips_but_add_up_to_what_a_path_costs(kind: dict[str, bool]) -> None:
+    for grid, _, seed in bodies(60, kind):
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+        for draw in range(3):
+            path = some_path(grid, seed + draw)
+            assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), (seed, draw)
+            strips.sweep(grid, cut, through)
+
+
+@pytest.mark.parametrize("sweeps", [0, 1, 3])
+def test_by_strips_f_grows_along_every_path_from_the_bound_to_its_cost(sweeps: int) -> None:
+    for grid, _, seed in bodies(60, {"frustrated": True}):
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros(len(grid.dom))
+        for _ in range(sweeps):
+            strips.sweep(grid, cut, through)
+        path = some_path(grid, seed)
+        f, frontier = strips.proven(cut), np.zeros(grid.lanes, np.uint16)
+        for i in range(grid.lanes, len(path)):
+            grown = strips.step(grid, cut, i, frontier, edge_between(grid, path[i - grid.lanes], path[i]))
+            assert grown >= -ROUNDING, (seed, i)
+            f += grown
+            frontier[i % grid.lanes] = path[i] - grid.dom_ptr[i]
+        assert f == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+
+
+def test_what_strips_bound_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+    moves = 4
+    for seed in range(60):
+        toy = random_toy(seed, **kind)
+        if len(toy.sizes) == 1 or not np.isfinite(toy.optima(moves)[moves]):
+            continue
+        grid, joint = grid_of(toy, moves), toy.joint_states()
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+        cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
+        for _ in range(3):
+            strips.sweep(grid, cut, through)
+            for i, (first, last) in enumerate(pairwise(grid.dom_ptr)):
+                for p in range(first, last):
+                    here = cheapest[i // grid.lanes, joint[:, i % grid.lanes] == grid.dom[p]].min()
+                    assert through[p] <= here + ROUNDING, (seed, i)
+
+
+@pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
+def test_narrowed_strips_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
+    taken_out = 0
+    for whole, optimum, seed in bodies(100, {"frustrated": True}):
+        grid, cut = whole, strips.cut(whole, bound.no_messages(whole))
+        for _ in range(3):
+            through = np.zeros(len(grid.dom))
+            proven = strips.sweep(grid, cut, through)
+            smaller, cut = strips.narrow(grid, cut, through, optimum + spare)
+            assert strips.proven(cut) >= proven - ROUNDING, seed
+            taken_out += len(grid.dom) - len(smaller.dom)
+            grid = smaller
+        path = some_path(grid, seed)
+        assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        assert cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+    assert taken_out > 0
+
+
+def test_strips_are_left_empty_where_nothing_is_cheap_enough() -> None:
+    for grid, optimum, _ in bodies(20, {"frustrated": True}):
+        cut, through = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom))
+        proven = strips.sweep(grid, cut, through)
+        assert proven <= optimum + ROUNDING
+        smaller, _ = strips.narrow(grid, cut, through, proven - 1.0)
+        assert len(smaller.dom) == 0
+
+
 def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
     moves = 4
     for seed in range(60):
@@ -209,8 +309,10 @@ def test_a_narrowed_grid_keeps_every_path_that_is_cheaper(spare: float) -> None:
             smaller, messages = bound.narrow(grid, messages, optimum + spare)
             taken_out += len(grid.dom) - len(smaller.dom)
             grid = smaller
-        proven, on = messages.constants.sum(), np.zeros(1, dtype=bool)
-        cost, lower, _, _ = astar.search(grid, messages, proven, np.inf, path, 50_000, 50_000, on)
+        if grid.lanes == 1:
+            continue
+        cut = strips.cut(grid, messages)
+        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -234,6 +336,42 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
         assert optimum - ROUNDING <= after <= before + ROUNDING, seed
         better += after < before - ROUNDING
     assert better > 0
+
+
+def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    expansions = {"apart": 0, "at once": 0}
+    for seed in range(60):
+        toy = random_toy(seed, most=3, frustrated=True)
+        one, two = answer(toy, toy.rules(MOVES, MOVES)), twice(toy)
+        if one is None or len(toy.sizes) == 1:
+            continue
+        for how, parts in (("apart", solve._parts), ("at once", lambda grid: np.zeros(grid.lanes, np.int64))):
+            with monkeypatch.context() as patch:
+                patch.setattr(solve, "_parts", parts)
+                found = answer(two, two.rules(MOVES, MOVES, sweeps=1))
+            assert found is not None
+            assert found.status == "optimal", seed
+            assert found.cost == pytest.approx(2 * one.cost - MOVES * toy.per_move, abs=PROVEN), seed
+            assert found.cost == pytest.approx(two.cost(found.path), abs=ROUNDING), seed
+            expansions[how] += found.expansions
+    assert 0 < expansions["apart"] < 0.8 * expansions["at once"]
+
+
+def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
+    toy = Toy(
+        parents=(-1, 0, 1, 1),
+        edges=tuple(np.ones((size, size)) for size in (2, 1, 2, 2)),
+        children=tuple(map(np.zeros, (2, 1, 2, 2))),
+        above=tuple(map(np.zeros, (0, 2, 1, 1))),
+        discounts=tuple(map(np.zeros, ((0, 2), (2, 1), (1, 2), (1, 2)))),
+        start=(0, 0, 0, 0),
+        goal=(1, 0, 1, 1),
+        wait=1.0,
+        per_move=0.5,
+    )
+    assert solve._parts(grid_of(toy, 3)).tolist() == [0, 1, 2, 3]
+    assert solve._parts(grid_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
 
 
 # --- edges of the problem --------------------------------------------------------------------------------------------
@@ -345,6 +483,57 @@ def test_the_written_problem_forbids_what_the_model_forbids() -> None:
 
 
 # --- helpers ---------------------------------------------------------------------------------------------------------
+
+
+def twice(toy: Toy) -> Toy:
+    """Two of a body side by side, as one."""
+    below = tuple(parent + len(toy.sizes) if parent >= 0 else -1 for parent in toy.parents)
+    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "discounts", "start", "goal")}
+    return replace(toy, parents=toy.parents + below, **doubled)
+
+
+def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:
+    """Tables of couplings of two states each, for the last two lanes."""
+    return {
+        "above": (*toy.above[:2], np.zeros(2), np.zeros(2)),
+        "discounts": (*toy.discounts[:2], np.zeros((2, 2)), np.zeros((2, 2))),
+    }
+
+
+def bodies(seeds: int, kind: dict[str, bool]) -> Iterator[tuple[Grid, float, int]]:
+    """Grids of MOVES moves of toys with at least two lanes, and their optima without tau."""
+    for seed in range(seeds):
+        toy = random_toy(seed, **kind)
+        optimum = float(toy.optima(MOVES)[MOVES] - MOVES * toy.per_move)
+        if len(toy.sizes) > 1 and optimum < np.inf:
+            yield grid_of(toy, MOVES), optimum, seed
+
+
+def some_path(grid: Grid, seed: int) -> np.ndarray:
+    """A path of positions [n], each edge drawn at random."""
+    rng, path = np.random.default_rng(seed), np.zeros(len(grid.dom_ptr) - 1, np.int64)
+    path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
+    for i in range(grid.lanes, len(path)):
+        before = path[i - grid.lanes]
+        path[i] = rng.choice(grid.row_to[grid.row_ptr[before] : grid.row_ptr[before + 1]])
+    return path
+
+
+def shares(grid: Grid, cut: strips.Strips, path: np.ndarray) -> float:
+    """What the strips cost on a path [n], each by its own shares."""
+    total = 0.0
+    for i, p in enumerate(path):
+        lane = i % grid.lanes
+        if lane == 0:
+            continue
+        a = i - lane + cut.above[lane]
+        size = grid.dom_ptr[i + 1] - grid.dom_ptr[i]
+        total += cut.stand[cut.pair_ptr[i] + (path[a] - grid.dom_ptr[a]) * size + p - grid.dom_ptr[i]]
+        if i + grid.lanes < len(path):
+            total += cut.own[edge_between(grid, p, path[i + grid.lanes])]
+            e = edge_between(grid, path[a], path[a + grid.lanes])
+            total += cut.led[cut.led_ptr[i] + e - grid.row_ptr[grid.dom_ptr[a]]]
+    return float(total)
 
 
 def positions(grid: object, states: np.ndarray) -> np.ndarray:

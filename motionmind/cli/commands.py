@@ -165,7 +165,10 @@ def tween(
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
     found: list[Tween] = []
-    with _no_path_told(report if alone else report and numbered(report, 1, alternatives)), Interruption() as interruption:
+    with (
+        _no_path_told(report if alone else report and numbered(report, 1, alternatives)),
+        Interruption() as interruption,
+    ):
         for _ in numbers:
             found.append(engine.tween(*ends, **options, unlike=found, watch=interruption.watch))
             if interruption.asked:

@@ -1,7 +1,7 @@
 """Memory-bounded A* over the variables of a grid, one at a time (operator decomposition).
 
 A node fixes the variables up to one; its *frontier* is the last position chosen in each lane, which is all that the
-rest depends on, so nodes with the same variable and frontier are the same node. f grows by `bound.step`.
+rest depends on, so nodes with the same variable and frontier are the same node. f grows by `strips.step`.
 
 When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
 backed up into it; it is opened again with that f, so nothing is lost from the proof. Leaves are forgotten by halves
@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.jit import jit
-from motionmind.search.bound import Messages, step
 from motionmind.search.problem import Floats, Grid, Ints
+from motionmind.search.strips import Strips, step
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
@@ -49,7 +49,7 @@ class _Nodes(NamedTuple):
 @jit
 def search(
     grid: Grid,
-    m: Messages,
+    s: Strips,
     bound: float,
     cost: float,
     path: Ints,
@@ -60,7 +60,7 @@ def search(
     """Search for a path that costs less than `cost`; write the best to `path` [n] (positions).
 
     Returns its cost (or `cost`), a lower bound on the cost of every path, the number of expansions (at most
-    `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `m` proves from the start.
+    `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `s` proves from the start.
     It stops when `ended` [1] is set, from another thread.
     """
     nodes = _root(grid, bound, budget)
@@ -74,7 +74,7 @@ def search(
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(grid, m, nodes, node, cost, path)
+        cost, complete = _expand(grid, s, nodes, node, cost, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -83,18 +83,16 @@ def search(
 
 
 @jit
-def _expand(grid: Grid, m: Messages, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
+def _expand(grid: Grid, s: Strips, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`; the cost then known, and whether all found room."""
     lanes = grid.lanes
     i = nodes.var[node] + 1
     lane = i % lanes
-    parent = grid.parents[lane]
     before = grid.dom_ptr[i - lanes] + nodes.frontier[node, lane]
-    above = grid.dom_ptr[i - lane + parent] + nodes.frontier[node, parent] if parent >= 0 else -1
     floor = nodes.key[node]  # forgetting may back a greater key up into the node before its last child has come
     for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
         x = grid.row_to[e]
-        f = nodes.f[node] + step(grid, m, i, before, above, e)
+        f = nodes.f[node] + step(grid, s, i, nodes.frontier[node], e)
         key = max(f, floor)
         if key >= cost - SAME:
             continue

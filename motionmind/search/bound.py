@@ -291,43 +291,67 @@ def narrow(grid: Grid, m: Messages, below: float) -> tuple[Grid, Messages]:
 
     A domain is left empty where there is no such path at all.
     """
-    lanes, variables = grid.lanes, len(grid.dom_ptr) - 1
-    kept = m.through < below
-    for i in range(variables - lanes - 1, -1, -1):  # what leads nowhere
+    kept = worth(grid, m.through, below)
+    held = np.flatnonzero(kept)
+    rows = _coupled(grid, kept)
+    return subset(grid, kept), Messages(
+        m.down_row[held], m.up_row[held], m.down_col[held], m.up_col[rows],
+        m.constants.copy(), m.before.copy(), m.ahead[held], m.through[held],
+    )  # fmt: skip
+
+
+@jit
+def worth(grid: Grid, through: Floats, below: float) -> NDArray[np.bool_]:
+    """The positions [P] that a path cheaper than `below` may go through, each of which leads on and is led to.
+
+    `through` [P] is a lower bound on the cost of all paths through each.
+    """
+    kept = through < below
+    for i in range(len(grid.dom_ptr) - 2 - grid.lanes, -1, -1):  # what leads nowhere
         for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
             leads = False
             for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
                 leads = leads or kept[grid.row_to[e]]
             kept[p] = kept[p] and leads
     led_to = np.zeros(len(kept), np.bool_)
-    led_to[: grid.dom_ptr[lanes]] = True
+    led_to[: grid.dom_ptr[grid.lanes]] = True
     for p in range(len(kept)):  # what nothing leads to
         kept[p] = kept[p] and led_to[p]
         if kept[p]:
             led_to[grid.row_to[grid.row_ptr[p] : grid.row_ptr[p + 1]]] = True
+    return kept
 
+
+@jit
+def _coupled(grid: Grid, kept: NDArray[np.bool_]) -> Ints:
+    """The coupling rows of the positions that are kept."""
+    coupled = np.zeros(grid.up_ptr[-1], np.bool_)
+    for i in range(len(grid.dom_ptr) - 1):
+        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
+            above = i - i % grid.lanes + grid.parents[i % grid.lanes]
+            coupled[grid.up_ptr[i] : grid.up_ptr[i + 1]] = kept[grid.dom_ptr[above] : grid.dom_ptr[above + 1]]
+    return np.flatnonzero(coupled)
+
+
+@jit
+def subset(grid: Grid, kept: NDArray[np.bool_]) -> Grid:
+    """The grid of the positions that are kept."""
+    lanes, variables = grid.lanes, len(grid.dom_ptr) - 1
     number = np.cumsum(kept).astype(np.int32) - 1  # of each kept position among them
-    held = np.flatnonzero(kept)
+    held, rows = np.flatnonzero(kept), _coupled(grid, kept)
     dom_ptr = np.zeros(variables + 1, np.int64)
     up_ptr = np.zeros(variables + 1, np.int64)
-    coupled = np.zeros(grid.up_ptr[-1], np.bool_)
     for i in range(variables):
         dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[grid.dom_ptr[i] : grid.dom_ptr[i + 1]])
         up_ptr[i + 1] = up_ptr[i]
         if grid.up_ptr[i + 1] > grid.up_ptr[i]:
             above = i - i % lanes + grid.parents[i % lanes]
-            coupled[grid.up_ptr[i] : grid.up_ptr[i + 1]] = kept[grid.dom_ptr[above] : grid.dom_ptr[above + 1]]
             up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
-    rows = np.flatnonzero(coupled)
     row_ptr, row_to, row_cost = _subset(held, grid.row_ptr, grid.row_to, grid.row_cost, kept, number)
     col_ptr, col_to, col_cost = _subset(rows, grid.col_ptr, grid.col_to, grid.col_cost, kept, number)
-    smaller = Grid(
+    return Grid(
         lanes, grid.moves, grid.parents, dom_ptr, grid.dom[held], grid.unary[held],
         row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,
-    )  # fmt: skip
-    return smaller, Messages(
-        m.down_row[held], m.up_row[held], m.down_col[held], m.up_col[rows],
-        m.constants.copy(), m.before.copy(), m.ahead[held], m.through[held],
     )  # fmt: skip
 
 

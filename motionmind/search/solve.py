@@ -11,16 +11,19 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.search import astar, bound
+from motionmind.search import astar, bound, strips
 from motionmind.search.legs import Legs
-from motionmind.search.polish import polish
-from motionmind.search.probe import probe
+from motionmind.search.polish import path_cost, polish
 from motionmind.search.problem import Floats, Grid, Ints, Model, build_grid, costs_to_go, with_waits
 
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
-CASES = 1000  # that the bound is split into at most, for each number of moves
+STALLED = 0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to strips
+STRIP_SWEEPS = 100  # at most, for each number of moves
+STRIPS_STALLED = 0.98  # as STALLED; then A* takes over
+NEAR = 0.1  # a path that costs no more than this share above the best is worth polishing
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
 SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
+MOST_PAIRS = 1 << 23  # of states in strips, 32 bytes each: more are not made, nor kept for A*
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 _Result = TypeVar("_Result")
@@ -119,31 +122,36 @@ def solve(
 
     expansions, peak = 0, 0
     attention = _Attention(watch, lambda: Progress(legs.best, legs.lower_bound(), expansions))
+    unseen, undecided = np.isfinite(legs.lower), np.zeros(legs.lower.shape, dtype=bool)
+    left: dict[tuple[int, int], tuple[_Known, strips.Strips]] = {}  # what is left to search
+    kept = 0  # pairs in it
     while True:
-        leg, moves, least, below = legs.most_promising()
+        leg, moves, least, below = legs.most_promising(unseen)
         if not least < legs.best - PROVEN or (attention.ends() and np.isfinite(legs.best)):
             break
-        toll = rules.per_move * moves
-        best, path = below - toll, np.zeros((0, len(start)), dtype=np.int32)
-        grid = build_grid(held, stops[leg], moves, to_go[leg], best)
+        toll, unseen[leg, moves] = rules.per_move * moves, False
+        known = _Known(build_grid(held, stops[leg], moves, to_go[leg], below - toll), below - toll)
         clock.lap("problem")
-        proven, found, states, grid, messages = _bound(grid, rules.sweeps, best, attention)
-        if found < best:
-            best, path = found, states
+        messages = _by_messages(known, rules.sweeps, attention)
+        if not known.settled and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
+            cut = _by_strips(known, strips.cut(known.grid, messages), attention)
+            if not known.settled and kept + len(cut.stand) <= MOST_PAIRS:
+                left[leg, moves], undecided[leg, moves] = (known, cut), True
+                kept += len(cut.stand)
+        legs.learn(leg, moves, known.proven + toll, known.cost + toll, known.states)
         clock.lap("bound")
-        if proven < best - PROVEN and expansions < rules.node_budget and not attention.ends():
-            chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-            # f grows from what the messages prove by themselves; cases may have proven more.
-            found, searched, expanded, held_nodes = attention.pay(
-                astar.search, grid, messages, float(messages.constants.sum()), best, chosen, rules.node_budget,
-                rules.node_budget - expansions,
-            )  # fmt: skip
-            proven = max(proven, searched)
-            if found < best:
-                best, path = found, _states(grid, chosen)
-            expansions, peak = expansions + expanded, max(peak, held_nodes)
-            clock.lap("search")
-        legs.learn(leg, moves, proven + toll, best + toll if len(path) else np.inf, path)
+    while not attention.ends():
+        leg, moves, least, below = legs.most_promising(undecided)
+        if not least < legs.best - PROVEN:
+            break
+        toll, undecided[leg, moves] = rules.per_move * moves, False
+        known, cut = left.pop((leg, moves))
+        limit = min(known.cost, below - toll)  # what costs no less is no longer in the grid, or not sought
+        found = _search(known.grid, cut, limit, rules.node_budget, rules.node_budget - expansions, attention)
+        better = found.states if found.cost < limit else known.states
+        legs.learn(leg, moves, min(found.proven, limit) + toll, min(found.cost, limit) + toll, better)
+        expansions, peak = expansions + found.expansions, max(peak, found.peak)
+        clock.lap("search")
     if not np.isfinite(legs.best):
         return None
     lower, (path, passed) = legs.lower_bound(), legs.path()
@@ -180,44 +188,143 @@ def alone(held: Model, stops: Sequence[Ints], to_go: Sequence[Floats], rules: Ru
     return out
 
 
-def _bound(
-    grid: Grid, sweeps: int, below: float, attention: _Attention
-) -> tuple[float, float, NDArray[np.int32], Grid, bound.Messages]:
-    """A lower bound on all paths cheaper than `below`, the best path found meanwhile, and what is left to search.
+class _Known:
+    """What is known of one number of moves.
 
-    Every few sweeps the path that they met, if better than those before, is polished, and positions that no better
-    path goes through are taken out of the grid; until both meet, or what separates them no longer shrinks.
+    Attributes:
+        grid: what is left of it: no path cheaper than `cost` lies outside.
+        cost: of the best path found, or what it has to be cheaper than.
+        states: the best path found [T + 1, L]; empty until then.
+        proven: no path that is cheaper than `cost` costs less than this.
     """
-    messages = bound.no_messages(grid)
-    proven, rough, cost, states = -np.inf, np.inf, np.inf, np.zeros((0, grid.lanes), dtype=np.int32)
-    for done in range(0, sweeps, SWEEPS_AT_ONCE):
-        gap, size = min(cost, below) - proven, len(grid.dom)
-        chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
-        latest, met = bound.tighten(grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), min(cost, below))
-        proven = max(proven, latest)
-        if met < rough:
-            rough, found = met, polish(grid, chosen)
-            if found < cost:
-                cost, states = found, _states(grid, chosen)
-        known = min(cost, below)
-        if proven >= known - PROVEN:
-            break
-        grid, messages = bound.narrow(grid, messages, known - astar.SAME)
+
+    def __init__(self, grid: Grid, cost: float) -> None:
+        self.grid, self.cost, self.proven = grid, cost, -np.inf
+        self.states = np.zeros((0, grid.lanes), dtype=np.int32)
+
+    @property
+    def settled(self) -> bool:
+        """Whether bound and path meet, or nothing is left that a better path could go through."""
+        return self.proven >= self.cost - PROVEN
+
+    def learn(self, proven: float, chosen: Ints) -> None:
+        """A bound, and a path of positions [n], which is polished if it is near the best."""
+        if path_cost(self.grid, chosen) <= self.cost + NEAR * abs(self.cost):
+            cost = polish(self.grid, chosen)
+            if cost < self.cost:
+                self.cost, self.states = cost, _states(self.grid, chosen)
+        self.proven = min(max(self.proven, proven), self.cost)
+
+    def narrow(self, grid: Grid) -> None:
+        """What is left of the grid: if a domain of it is empty, nothing."""
+        self.grid = grid
         if np.any(np.diff(grid.dom_ptr) == 0):
-            proven = known
+            self.proven = self.cost
+
+    def stalls(self, gap: float, size: int, share: float) -> bool:
+        """Whether more than a share is left of the gap and of the number of positions that there were."""
+        return self.cost - self.proven > share * gap and len(self.grid.dom) > share * size
+
+
+def _by_messages(known: _Known, sweeps: int, attention: _Attention) -> bound.Messages:
+    """Bound a number of moves by messages, of which the last are returned.
+
+    Every few sweeps the path that they met is polished, and positions that no better path goes through are taken out
+    of the grid; until bound and path meet, or what separates them hardly shrinks.
+    """
+    messages = bound.no_messages(known.grid)
+    for done in range(0, sweeps, SWEEPS_AT_ONCE):
+        gap, size = known.cost - known.proven, len(known.grid.dom)
+        chosen = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64)
+        proven, _ = bound.tighten(known.grid, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), known.cost)
+        known.learn(proven, chosen)
+        if known.settled:
             break
-        if attention.ends():
-            return min(proven, known), cost, states, grid, messages
-        if done and known - proven > 0.98 * gap and len(grid.dom) > 0.98 * size:
+        grid, messages = bound.narrow(known.grid, messages, known.cost - astar.SAME)
+        known.narrow(grid)
+        if known.settled or (done and known.stalls(gap, size, STALLED)) or attention.ends():
             break
-    if proven < min(cost, below) - PROVEN:
-        flat = states.ravel().copy()
-        fewest_first = np.argsort(np.diff(grid.dom_ptr), kind="stable")
-        proven, cost, grid, messages = attention.pay(
-            probe, grid, messages, fewest_first, proven, cost, below, flat, CASES
-        )
-        states = flat.reshape(-1, grid.lanes)
-    return min(proven, cost, below), cost, states, grid, messages
+    return messages
+
+
+def _by_strips(known: _Known, cut: strips.Strips, attention: _Attention) -> strips.Strips:
+    """Go on by strips, in the same way; the last are returned."""
+    known.proven = max(known.proven, min(strips.proven(cut), known.cost))
+    for done in range(STRIP_SWEEPS):
+        if known.settled or attention.ends():
+            break
+        gap, size = known.cost - known.proven, len(known.grid.dom)
+        chosen, through = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
+        proven = strips.sweep(known.grid, cut, through)
+        strips.descend(known.grid, cut, chosen)
+        known.learn(proven, chosen)
+        if not known.settled:
+            grid, cut = strips.narrow(known.grid, cut, through, known.cost - astar.SAME)
+            known.narrow(grid)
+        if done and known.stalls(gap, size, STRIPS_STALLED):
+            break
+    return cut
+
+
+class _Searched(NamedTuple):
+    """The best path that A* found, what it proved, and what it took."""
+
+    cost: float
+    states: NDArray[np.int32]
+    proven: float
+    expansions: int
+    peak: int
+
+
+def _search(grid: Grid, cut: strips.Strips, below: float, nodes: int, budget: int, attention: _Attention) -> _Searched:
+    """Search the parts of the body that nothing couples any more, each with the others on one path.
+
+    What a path costs more than that one, or less, is the sum of what it does so in each part. So what is proven of each
+    part adds up; and a part needs to be searched only up to what, with the best that the others may save, would come
+    below `below`. Searched all at once, every near-best way of one part would be tried with those of all others.
+    """
+    chosen = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64)
+    strips.descend(grid, cut, chosen)
+    cost = polish(grid, chosen)
+    states = _states(grid, chosen)
+    part = _parts(grid)
+    part_of = np.repeat(np.resize(part, len(chosen)), np.diff(grid.dom_ptr))
+    on_path = np.isin(np.arange(len(part_of)), chosen)
+    alone = {}
+    for name in np.unique(part):
+        alone[name] = strips.narrow(grid, cut, np.where(on_path | (part_of == name), 0.0, np.inf), 1.0)
+    may_save = {name: max(cost - strips.proven(fewer), 0.0) for name, (_, fewer) in alone.items()}
+    saved, expansions, peak = 0.0, 0, 0
+    for name in sorted(may_save, key=lambda name: may_save[name]):
+        others = sum(may_save.values()) - may_save[name]
+        smaller, fewer = alone.pop(name)
+        known = _Known(smaller, min(cost, below + others))
+        fewer = _by_strips(known, fewer, attention)
+        if not known.settled and expansions < budget and not attention.ends():
+            chosen = np.zeros(len(chosen), dtype=np.int64)
+            found, proven, expanded, held = attention.pay(
+                astar.search, known.grid, fewer, strips.proven(fewer), known.cost, chosen, nodes, budget - expansions
+            )
+            if found < known.cost:
+                known.cost, known.states = found, _states(known.grid, chosen)
+            known.proven, expansions, peak = max(known.proven, proven), expansions + expanded, max(peak, held)
+        may_save[name] = cost - known.proven
+        if len(known.states) > 0:
+            saved += cost - known.cost
+            states[:, part == name] = known.states[:, part == name]
+    return _Searched(cost - saved, states, cost - sum(may_save.values()), expansions, peak)
+
+
+def _parts(grid: Grid) -> Ints:
+    """The first lane of the part that each lane belongs to [L].
+
+    A coupling joins two lanes only where there is a move at which both have more than one position left.
+    """
+    part, many = np.arange(grid.lanes), np.diff(grid.dom_ptr).reshape(-1, grid.lanes) > 1
+    for lane, parent in enumerate(grid.parents):
+        if parent >= 0 and np.any(many[:, lane] & many[:, parent]):
+            part[lane] = part[parent]
+    return part
 
 
 def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:

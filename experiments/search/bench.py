@@ -1,0 +1,343 @@
+"""What the search proves, how fast, and what each bound is worth, on random pairs of postures of one corpus.
+
+python experiments/search/bench.py PATH/TO/cmu-05 --pairs 100 --setting 10,5 [--seed 0] [--few 8] [--plot gap.svg]
+
+A setting is postures a second and degrees. Four parts: all pairs, after loading; the bounds, by what A* has to expand
+under each; gaps against time as less effort is allowed; and the same problems solved by toulbar2. The last three look
+at the first few pairs.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pytoulbar2
+from numpy.typing import NDArray
+
+from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind.search import astar, bound, solve, strips
+from motionmind.search.cfn import cfn
+from motionmind.search.costs import price
+from motionmind.search.problem import Grid, Model, build_grid, costs_to_go, with_waits
+from motionmind.search.solve import Certificate, Rules
+
+TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
+EXPANSIONS = 200_000
+ON = np.zeros(1, dtype=bool)  # A* goes on as long as nobody sets it
+RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
+EFFORTS = (  # sweeps of strips and of messages
+    ("messages", (0, 2)),
+    ("messages", (0, 8)),
+    ("messages", (0, 160)),
+    ("strips", (1, 160)),
+    ("strips", (2, 160)),
+    ("strips", (4, 160)),
+    ("strips", (100, 160)),
+)
+
+Floats = NDArray[np.float64]
+Ends = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--setting", default="5,15")
+    parser.add_argument("--pairs", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--few", type=int, default=8)
+    parser.add_argument("--plot", type=Path)
+    options = parser.parse_args()
+    rate, tolerance = map(float, options.setting.split(","))
+    engine = Engine.fit(
+        (own_skeleton(read_motion(file)) for file in sorted(options.folder.glob("*.bvh"))),
+        name="bench",
+        rate=rate,
+        skip=1,
+        discretization=make_discretization("codebook", tolerance),
+    )
+    model = price(engine.grammar, "conditional", 1.0, 1.0)
+    size = f"{len(engine.states)} postures, largest joint {engine.space.sizes.max()} states"
+    print(f"{rate:g} postures a second, {tolerance:g} degrees: {size}")
+    warm_up(model, np.asarray(engine.states))
+    pairs = list(joinable(model, np.asarray(engine.states), options.pairs, options.seed))
+    found = prove(model, pairs)
+    few = list(zip(pairs[: options.few], found, strict=False))
+    compare_bounds(model, few)
+    trade(model, [ends for ends, _ in few], options.plot)
+    compare_solvers(model, few, engine.grammar.lanes)
+
+
+def joinable(model: Model, states: NDArray[np.int32], count: int, seed: int) -> Iterator[Ends]:
+    """Random pairs of postures that some path of at most RULES.longest moves joins."""
+    rng = np.random.default_rng(seed)
+    while count > 0:
+        start, goal = states[rng.integers(len(states), size=2)].astype(np.int64)
+        alone = costs_to_go(with_waits(model, goal, RULES.wait), goal, RULES.longest)[1:, model.starts[:-1] + start]
+        if np.isfinite(alone).all(axis=1).any():
+            count -= 1
+            yield start, goal
+
+
+def warm_up(model: Model, states: NDArray[np.int32]) -> None:
+    """Compile, or load, all that is measured."""
+    for start, goal in joinable(model, states, 3, 1):
+        answer = solve.solve(model, start, goal, RULES)
+        assert answer is not None
+        moves = len(answer.path) - 1
+        grid = pose(model, (start, goal), moves)
+        cut, path = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom_ptr) - 1, np.int64)
+        through = np.zeros(len(grid.dom))
+        strips.sweep(grid, cut, through)
+        strips.descend(grid, cut, path)
+        strips.narrow(grid, cut, through, np.inf)
+        astar.search(grid, cut, strips.proven(cut), np.inf, path, 100, 100, ON)
+
+
+# --- all pairs -------------------------------------------------------------------------------------------------------
+
+
+def prove(model: Model, pairs: list[Ends]) -> list[Certificate]:
+    """Answer all, and print what is proven and how long it took."""
+    found, seconds = [], []
+    for start, goal in pairs:
+        began = perf_counter()
+        answer = solve.solve(model, start, goal, RULES)
+        seconds.append(perf_counter() - began)
+        assert answer is not None
+        found.append(answer)
+    gaps = [gap(answer) for answer in found if answer.status != "optimal"]
+    rest = f"; gap of the rest: median {np.median(gaps):.2%}, worst {max(gaps):.2%}" if gaps else ""
+    ms = 1e3 * np.array(seconds)
+    shares = {part: sum(answer.seconds[part] for answer in found) / sum(seconds) for part in found[0].seconds}
+    print(f"proven optimal: {len(pairs) - len(gaps)} of {len(pairs)}{rest}")
+    print(f"median {np.median(ms):.0f} ms, 95th percentile {np.percentile(ms, 95):.0f} ms, longest {ms.max():.0f} ms")
+    print("of it " + ", ".join(f"{part} {share:.0%}" for part, share in shares.items()), end="; ")
+    print(f"expansions in all {sum(answer.expansions for answer in found)}")
+    print(f"moves: {min(map(moves_of, found))} to {max(map(moves_of, found))}")
+    return found
+
+
+def gap(answer: Certificate) -> float:
+    return (answer.cost - answer.lower_bound) / answer.cost if answer.cost else 0.0
+
+
+def moves_of(answer: Certificate) -> int:
+    return len(answer.path) - 1
+
+
+# --- bounds ----------------------------------------------------------------------------------------------------------
+
+
+def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
+    """A* under each bound on the same grids, in as many moves as were found, nothing known and nothing fixed before."""
+    rows: dict[str, list[tuple[float, int, bool]]] = {}
+    for ends, answer in few:
+        grid = pose(model, ends, moves_of(answer))
+        cost = answer.cost - RULES.per_move * grid.moves
+        for name, estimate in estimates(grid):
+            path = np.zeros(len(grid.dom_ptr) - 1, np.int64)
+            root = strips.proven(estimate)
+            best, lower, expanded, _ = astar.search(grid, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS, ON)
+            rows.setdefault(name, []).append((max(1.0 - root / cost, 0.0), expanded, lower > best - solve.PROVEN))
+    print(f"A* alone, {len(few)} pairs:                   short of the best   expansions, median and most     proven")
+    for name, row in rows.items():
+        short, expanded, proved = zip(*row, strict=True)
+        print(f"{name:45}{np.median(short):14.2%}{np.median(expanded):19.0f}{max(expanded):12}{sum(proved):13}")
+
+
+def estimates(grid: Grid) -> Iterator[tuple[str, strips.Strips]]:
+    """Bounds of the cost to go, each as tables of strips that A* reads."""
+    back = np.zeros(grid.up_ptr[-1])  # the most that a position can save in the coupling to a kid
+    for u in range(len(back)):
+        back[u] = grid.col_cost[grid.col_ptr[u] : grid.col_ptr[u + 1]].min(initial=0.0)
+    yield "each joint alone, in any number of moves", tables(grid, alone(grid, back, ends_at_goal=True), back)
+    yield "each joint alone, in the moves that are left", tables(grid, alone(grid, back, ends_at_goal=False), back)
+    messages = bound.no_messages(grid)
+    bound.tighten(grid, messages, np.zeros(len(grid.dom_ptr) - 1, np.int64), 160, np.inf)
+    yield "messages", tables(grid, messages.up_row, messages.up_col, messages.constants)
+    cut, through = strips.cut(grid, messages), np.zeros(len(grid.dom))
+    for _ in range(10):
+        strips.sweep(grid, cut, through)
+    yield "strips, 10 sweeps", cut
+
+
+def alone(grid: Grid, back: Floats, ends_at_goal: bool) -> Floats:
+    """What each position's lane costs from there on its own [P], couplings at the least that they can cost it."""
+    cost, least = grid.unary.copy(), np.full(len(grid.dom), np.inf)
+    for i in range(grid.lanes, len(grid.dom_ptr) - 1):
+        here = slice(grid.dom_ptr[i], grid.dom_ptr[i + 1])
+        if grid.up_ptr[i + 1] == grid.up_ptr[i]:
+            least[here] = 0.0
+            continue
+        a = grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
+        for k, u in enumerate(range(grid.up_ptr[i], grid.up_ptr[i + 1])):
+            cost[a + k] += back[u]
+            paid = np.full(here.stop - here.start, -back[u])
+            pairs = slice(grid.col_ptr[u], grid.col_ptr[u + 1])
+            paid[grid.col_to[pairs] - here.start] += grid.col_cost[pairs]
+            least[here] = np.minimum(least[here], paid)
+    goal = grid.dom[grid.dom_ptr[-grid.lanes - 1 : -1]]
+    rest = np.zeros(len(grid.dom))
+    for i in range(len(grid.dom_ptr) - 2 - grid.lanes, -1, -1):
+        for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
+            edges = slice(grid.row_ptr[p], grid.row_ptr[p + 1])
+            to = grid.row_to[edges]
+            rest[p] = (grid.row_cost[edges] + cost[to] + least[to] + rest[to]).min()
+            if ends_at_goal and grid.dom[p] == goal[i % grid.lanes]:
+                rest[p] = min(rest[p], 0.0)
+    return rest
+
+
+def tables(grid: Grid, rest: Floats, back: Floats, constants: Floats | None = None) -> strips.Strips:
+    """The estimate `rest` by position [P] plus `back` by coupling row where only the parent has moved, in A*'s form.
+
+    `constants` [n] is what it counts besides for each variable to come.
+    """
+    taken = np.zeros(len(grid.dom_ptr) - 1) if constants is None else constants
+    stand = grid.unary - np.repeat(taken, np.diff(grid.dom_ptr))
+    s = strips.cut(grid, bound.no_messages(grid))
+    s.own[:], s.led[:] = grid.row_cost, 0.0
+    for i in range(len(taken)):
+        lane = i % grid.lanes
+        if lane == 0:
+            continue
+        a = i - lane + s.above[lane]
+        here, above = (slice(grid.dom_ptr[k], grid.dom_ptr[k + 1]) for k in (i, a))
+        paid = np.zeros((above.stop - above.start, here.stop - here.start)) + stand[here]
+        to_go = np.zeros(paid.shape) + rest[here]
+        pending = np.zeros(len(paid))
+        for k, u in enumerate(range(grid.up_ptr[i], grid.up_ptr[i + 1])):
+            pairs = slice(grid.col_ptr[u], grid.col_ptr[u + 1])
+            paid[k, grid.col_to[pairs] - here.start] += grid.col_cost[pairs]
+            pending[k] = back[u]
+        if lane == 1:  # whose strip bears all that the first lane costs
+            edges = slice(grid.row_ptr[above.start], grid.row_ptr[above.stop])
+            s.led[s.led_ptr[i] : s.led_ptr[i + 1]] = grid.row_cost[edges]
+            paid += stand[above, None]
+            to_go += rest[above, None]
+            pending += stand[above] + rest[above]
+        s.stand[s.pair_ptr[i] : s.pair_ptr[i + 1]] = paid.ravel()
+        s.to_go[s.pair_ptr[i] : s.pair_ptr[i + 1]] = to_go.ravel()
+        if i >= grid.lanes:
+            before = slice(grid.dom_ptr[i - grid.lanes], grid.dom_ptr[i - grid.lanes + 1])
+            s.half[s.half_ptr[i] : s.half_ptr[i + 1]] = (pending[:, None] + rest[before]).ravel()
+    s.stand[s.pair_ptr[1]] += taken.sum()  # which f begins with
+    return s
+
+
+def pose(model: Model, ends: Ends, moves: int) -> Grid:
+    start, goal = ends
+    held = with_waits(model, goal, RULES.wait)
+    return build_grid(held, start, moves, costs_to_go(held, goal, moves), np.inf)
+
+
+# --- gaps against time -----------------------------------------------------------------------------------------------
+
+
+def trade(model: Model, few: list[Ends], plot: Path | None) -> None:
+    """Gaps and times of the same pairs as less effort is allowed; no A* but in the last row."""
+    rows = [(name, *spend(model, few, *effort, node_budget=1)) for name, effort in EFFORTS]
+    rows.append(("and A*", *spend(model, few, *EFFORTS[-1][1], node_budget=RULES.node_budget)))
+    print("effort: sweeps of strips, of messages           median ms   gap: median     worst")
+    for (name, seconds, gaps), effort in zip(rows, [*(effort for _, effort in EFFORTS), ("all", "all")], strict=True):
+        print(f"{name:12}{effort[0]!s:>8}{effort[1]!s:>8}", end="")
+        print(f"{1e3 * np.median(seconds):29.1f}{np.median(gaps):14.2%}{max(gaps):10.2%}")
+    if plot:
+        plot.write_text(drawing([(name, float(np.median(s)), np.array(gaps)) for name, s, gaps in rows]))
+
+
+def spend(
+    model: Model, few: list[Ends], strip_sweeps: int, sweeps: int, node_budget: int
+) -> tuple[list[float], list[float]]:
+    """Seconds and gaps with so many sweeps of messages and of strips, and nodes of A*."""
+    seconds, gaps = [], []
+    most = solve.STRIP_SWEEPS, solve.MOST_PAIRS
+    solve.STRIP_SWEEPS, solve.MOST_PAIRS = strip_sweeps, most[1] if strip_sweeps else 0
+    rules = Rules(RULES.wait, RULES.per_move, RULES.shortest, RULES.longest, node_budget, sweeps)
+    for start, goal in few:
+        began = perf_counter()
+        answer = solve.solve(model, start, goal, rules)
+        seconds.append(perf_counter() - began)
+        assert answer is not None
+        gaps.append(gap(answer))
+    solve.STRIP_SWEEPS, solve.MOST_PAIRS = most
+    return seconds, gaps
+
+
+def drawing(rows: list[tuple[str, float, Floats]]) -> str:
+    """An SVG: the median gap (line) and all gaps (dots), in percent, over the median time, on a logarithmic axis."""
+    width, height, left, bottom = 520, 300, 50, 40
+    times = np.array([seconds for _, seconds, _ in rows])
+    low, high = np.floor(np.log10(times.min())), np.ceil(np.log10(times.max()))
+    most = max(gaps.max() for _, _, gaps in rows) or 1.0
+
+    def at(seconds: float, share: float) -> tuple[float, float]:
+        x = left + (np.log10(seconds) - low) / (high - low) * (width - left - 20)
+        return round(float(x), 1), round(float(height - bottom - share / most * (height - bottom - 20)), 1)
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" '
+        'font-size="11">',
+        f'<rect width="{width}" height="{height}" fill="#fff"/>',
+    ]
+    for power in range(int(low), int(high) + 1):
+        x, y = at(10.0**power, 0.0)
+        parts.append(f'<path d="M{x} 20V{y}" stroke="#ddd"/><text x="{x}" y="{y + 16}">{10.0**power:g} s</text>')
+    for share in np.linspace(0.0, most, 5):
+        x, y = at(10.0**low, share)
+        parts.append(f'<path d="M{x} {y}H{width - 20}" stroke="#ddd"/><text x="4" y="{y + 4}">{share:.1%}</text>')
+    for name, colour in (("messages", "#8a8a8a"), ("strips", "#c0392b"), ("and A*", "#2471a3")):
+        mine = [(seconds, gaps) for kind, seconds, gaps in rows if kind == name]
+        line = " ".join("{},{}".format(*at(seconds, float(np.median(gaps)))) for seconds, gaps in mine)
+        parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        dots = (at(seconds, share) for seconds, gaps in mine for share in gaps)
+        parts += [f'<circle cx="{x}" cy="{y}" r="2.5" fill="{colour}" fill-opacity="0.6"/>' for x, y in dots]
+        x, y = at(mine[0][0], float(np.median(mine[0][1])))
+        parts.append(f'<text x="{x + 6}" y="{y - 6}" fill="{colour}">{name}</text>')
+    return "\n".join([*parts, "</svg>\n"])
+
+
+# --- another solver --------------------------------------------------------------------------------------------------
+
+
+def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], lanes: tuple[str, ...]) -> None:
+    """The problem of as many moves as were found, solved here and by toulbar2."""
+    ours, theirs, agree, disagree = [], [], 0, 0
+    for (start, goal), answer in few:
+        moves = moves_of(answer)
+        rules = Rules(RULES.wait, RULES.per_move, moves, moves, RULES.node_budget)
+        began = perf_counter()
+        again = solve.solve(model, start, goal, rules)
+        ours.append(perf_counter() - began)
+        assert again is not None
+        seconds, optimum = toulbar2(cfn(model, start, goal, rules, moves, lanes))
+        theirs.append(seconds)
+        agree += optimum is not None and abs(optimum - again.cost) < 1e-3
+        disagree += optimum is not None and (optimum < again.lower_bound - 1e-3 or optimum > again.cost + 1e-3)
+    ratios = np.array(theirs) / np.array(ours)
+    print(f"toulbar2 (limit {TIME_LIMIT} s) in as many moves: the same optimum {agree}, another {disagree},", end=" ")
+    print(f"none in time {len(few) - agree - disagree} of {len(few)}")
+    print(f"median {1e3 * np.median(ours):.0f} ms here, {1e3 * np.median(theirs):.0f} ms toulbar2 (solving);", end=" ")
+    print(f"toulbar2 / here: median {np.median(ratios):.1f}, in all {sum(theirs) / sum(ours):.1f}")
+
+
+def toulbar2(problem: str) -> tuple[float, float | None]:
+    """Seconds that toulbar2 takes to solve a problem, once read, and its optimum, if it proves one in time."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "problem.cfn"
+        path.write_text(problem)
+        network = pytoulbar2.CFN(verbose=-1)
+        network.Read(str(path))
+        network.CFN.timer(TIME_LIMIT)
+        began = perf_counter()
+        found = network.Solve()
+        seconds = perf_counter() - began
+        return seconds, found[1] if found and seconds < TIME_LIMIT else None
+
+
+if __name__ == "__main__":
+    main()
