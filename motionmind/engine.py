@@ -14,7 +14,7 @@ import numpy as np
 from motionmind import rotations as rot
 from motionmind import survey
 from motionmind.account import account
-from motionmind.asked import Restriction, culprits, restricted, restrictions
+from motionmind.asked import culprits, restricted, restrictions
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
 from motionmind.grammar.coordination import fit_network
@@ -130,15 +130,13 @@ class Engine(Learned):
         if posturewise and (pin or hold or avoid or via or unlike or sample):
             raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
         least, most = _range(moves, max_moves)
-        _check_options(node_budget, fps, weights, novelty, lambda_, beta, tau, bridge_price, diversity)
+        _check_options(
+            node_budget, fps, weights, coordination, novelty, seed, lambda_, beta, tau, bridge_price, diversity
+        )
         if memory is not None:
             node_budget = _nodes(memory, len(self.space))
         if duration is not None:
             least, most = self._moves_in(duration, fps, moves, least, most)
-        if coordination not in ("posture", "none"):
-            raise MotionMindError(f"coordination must be 'posture' or 'none', not {coordination!r}")
-        if not (isinstance(seed, int | np.integer) and seed >= 0):
-            raise MotionMindError(f"seed must be a whole number of at least 0, not {seed}")
         fixed = moves is not None or duration is not None
         a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
         postures, at = self._vias(via)
@@ -151,8 +149,8 @@ class Engine(Learned):
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
         asked = restrictions(self.space, start, goal, pin, hold, avoid)
-        factor = lambda_ if coordination == "posture" else 0.0
-        model = self._model(weights, factor, None if strict else bridge_price, novelty)
+        coupled = lambda_ if coordination == "posture" else 0.0
+        model = self._model(weights, coupled, None if strict else bridge_price, novelty)
         if unlike:
             model = dearer(model, [other.path for other in unlike], diversity)
         posed = Posed(
@@ -164,12 +162,24 @@ class Engine(Learned):
         )
         posing = perf_counter() - began
         if not fixed and not via and _same(a, b):
-            spent = {"problem": 0.0, "bound": 0.0, "search": 0.0}
-            certificate = Certificate(states[:1], 0.0, 0.0, "optimal", 0, 0, spent)
+            stay = states[:1]
+            certificate: Certificate | None = Certificate(
+                stay, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0}
+            )
         elif near is not None:
-            certificate = self._posturewise(posed, near)
+            certificate = solve_posturewise(model, self._bodies, start, goal, posed.rules)
+            if certificate is None:
+                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
         else:
-            certificate = self._certified(posed, model, asked, strict, watch)
+            certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
+        if certificate is None:
+            if faults := culprits(self.grammar.lanes, model, posed, asked):
+                raise NoPathError(faults, {"restrictions": faults})
+            # Imported here, for SciPy's graphs are slow to import.
+            from motionmind.diagnosis import diagnose
+
+            found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, posed.rules, strict)
+            raise NoPathError(str(found), found.plain())
         if sample and len(certificate.path) > 1:
             certificate = drawn(posed.model, start, goal, posed.rules, posed.vias, certificate, seed)
         attested, bridges, waits, sources = explain(
@@ -193,7 +203,6 @@ class Engine(Learned):
             duration,
             dict(zip(certificate.passed, postures, strict=True)),
         )
-        spent = certificate.seconds
         (insertion,) = motion.insertions
         # A facing that is bridged shows at the root, which turns with it.
         named = ((a.skeleton.names[0] if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
@@ -216,12 +225,12 @@ class Engine(Learned):
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,
-            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, factor),
+            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, coupled),
             seconds={
                 "load": self.load_seconds,
-                "problem": posing + spent["problem"],
-                "bound": spent["bound"],
-                "search": spent["search"],
+                "problem": posing + certificate.seconds["problem"],
+                "bound": certificate.seconds["bound"],
+                "search": certificate.seconds["search"],
                 "realise": perf_counter() - began,
             },
             posed=posed,
@@ -250,29 +259,6 @@ class Engine(Learned):
                 "fps": fps,
             },
         )
-
-    def _certified(
-        self, posed: Posed, model: Model, asked: Sequence[Restriction], strict: bool, watch: Watch | None
-    ) -> Certificate:
-        """The best path; NoPathError, with what is at fault, where there is none."""
-        certificate = solve(posed.model, posed.start, posed.goal, posed.rules, posed.vias, watch)
-        if certificate is not None:
-            return certificate
-        if faults := culprits(self.grammar.lanes, model, posed, asked):
-            raise NoPathError(faults, {"restrictions": faults})
-        # Imported here, for SciPy's graphs are slow to import.
-        from motionmind.diagnosis import diagnose
-
-        ends = posed.start, posed.goal
-        found = diagnose(model, self.grammar, self.corpus, self.space, *ends, posed.rules, strict)
-        raise NoPathError(str(found), found.plain())
-
-    def _posturewise(self, posed: Posed, near: tuple[int, int]) -> Certificate:
-        """The best path of whole postures between two of the corpus; NoPathError where there is none."""
-        certificate = solve_posturewise(posed.model, self._bodies, posed.start, posed.goal, posed.rules)
-        if certificate is None:
-            raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
-        return certificate
 
     def _vias(self, via: Sequence[Posture | tuple[Posture, int]]) -> tuple[list[Posture], list[int | None]]:
         """The postures to pass through, and the move at which each is, or None."""
@@ -425,8 +411,14 @@ def _check_count(name: str, value: int, most: int) -> None:
         raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
 
 
-def _check_options(node_budget: int, fps: float, weights: str, novelty: float, *prices: float) -> None:
+def _check_options(
+    node_budget: int, fps: float, weights: str, coordination: str, novelty: float, seed: int, *prices: float
+) -> None:
     _check_count("node_budget", node_budget, MOST_NODES)
+    if coordination not in ("posture", "none"):
+        raise MotionMindError(f"coordination must be 'posture' or 'none', not {coordination!r}")
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        raise MotionMindError(f"seed must be a whole number of at least 0, not {seed}")
     if not SLOWEST <= fps <= FASTEST:
         raise MotionMindError(f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {fps}")
     if weights not in ("conditional", "printed"):

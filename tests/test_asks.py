@@ -242,6 +242,31 @@ def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
         assert mine.cost == pytest.approx(theirs.cost, abs=2 * PROVEN)
 
 
+@settings(max_examples=60)
+@given(st.integers(0, 10_000))
+def test_lanes_in_another_order_cost_the_same(seed: int) -> None:
+    toy = random_toy(seed)
+    rng = np.random.default_rng(seed)
+    order: list[int] = []  # any in which parents come first
+    while len(order) < len(toy.sizes):
+        ready = [lane for lane, parent in enumerate(toy.parents) if lane not in order and parent in (-1, *order)]
+        order.append(int(rng.choice(ready)))
+    moved = {
+        name: tuple(getattr(toy, name)[lane] for lane in order)
+        for name in ("edges", "children", "above", "discounts", "start", "goal")
+    }
+    parents = tuple(order.index(toy.parents[lane]) if toy.parents[lane] >= 0 else -1 for lane in order)
+    other = replace(toy, parents=parents, **moved)
+    allowed = [rng.random(size) > 0.2 for size in toy.sizes]
+    via = rng.integers(toy.sizes)
+    costs = []
+    for body, lanes in ((toy, range(len(order))), (other, order)):
+        model = body.model()._replace(allowed=np.concatenate([allowed[lane] for lane in lanes]))
+        found = solve(model, *body.ends(), body.rules(1, MOVES), [Via(via[list(lanes)])])
+        costs.append(np.inf if found is None else found.cost)
+    assert costs[0] == pytest.approx(costs[1], abs=2 * PROVEN)
+
+
 def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:
     pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver")
     checked = 0
@@ -482,6 +507,18 @@ def test_without_coordination_joints_move_each_on_its_own(engine: Engine) -> Non
     alone, free = join(engine, coordination="none"), join(engine, lambda_=0.0)
     assert alone.cost == free.cost
     assert alone.asked["coordination"] == "none"
+
+
+def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine, plain: Tween) -> None:
+    for asked in (
+        {"novelty": 0.7, "pin": {"left_wrist": "B"}},
+        {"unlike": [plain], "diversity": 3.0},
+        {"via": [posture("passe")]},
+        {"sample": True, "seed": 2},
+        {"coordination": "none"},
+    ):
+        found = join(engine, **asked)
+        assert found.account.total == pytest.approx(found.cost, abs=1e-6)
 
 
 def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:

@@ -19,8 +19,8 @@ from motionmind.search.solve import Certificate, Rules
 
 MOVES = 6
 PROVEN = 2 * solve.PROVEN
-ON = np.zeros(1, dtype=bool)  # A* goes on as long as nobody sets it
 ROUNDING = 1e-9
+ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 KINDS = {
     "plain": {},
     "frustrated": {"frustrated": True},

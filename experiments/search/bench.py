@@ -26,7 +26,7 @@ from motionmind.search.solve import Certificate, Rules
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
 EXPANSIONS = 200_000
-ON = np.zeros(1, dtype=bool)  # A* goes on as long as nobody sets it
+ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
 EFFORTS = (  # sweeps of strips and of messages
     ("messages", (0, 2)),

@@ -6,7 +6,7 @@ costs in n_k moves, with n_1 + ... + n_K = N. Least costs of all splits are min-
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,28 +38,37 @@ class Legs:
         self._at = [np.zeros(len(moves)) if move is None else np.where(moves == move, 0.0, np.inf) for move in at]
         self._cost = np.full_like(lower, np.inf)
         self._paths: dict[tuple[int, int], States] = {}
+        self._unseen = np.isfinite(lower)
 
     def lower_bound(self) -> float:
         """No whole path costs less."""
         return min(float((self.lower + self._others(self.lower)).min()), self.best)
 
-    def most_promising(self, among: NDArray[np.bool_]) -> tuple[int, int, float, float]:
-        """The leg and its number of moves, of some [K, N + 1], that may be part of the cheapest path.
+    def most_promising(self) -> tuple[int, int, float, float]:
+        """Of what has not been looked at the leg and its number of moves that may be part of the cheapest path.
 
-        With it come the least that such a path may cost, and the cost below which the leg is part of a better path than
-        the best known.
+        With it come the least that such a path may cost, and the cost below which the leg is better than it is known to
+        be and part of a better path than the best known.
         """
         others = self._others(self.lower)
-        through = np.where(among, self.lower + others, np.inf)
+        through = np.where(self._unseen, self.lower + others, np.inf)
         leg, moves = map(int, np.unravel_index(through.argmin(), through.shape))
-        return leg, moves, float(through[leg, moves]), self.best - float(others[leg, moves])
+        below = min(self.best - float(others[leg, moves]), float(self._cost[leg, moves]))
+        return leg, moves, float(through[leg, moves]), below
+
+    def reopen(self, left: Iterable[tuple[int, int]]) -> None:
+        """Have just these legs and numbers of moves looked at, again."""
+        self._unseen[:] = False
+        for leg, moves in left:
+            self._unseen[leg, moves] = True
 
     def learn(self, leg: int, moves: int, lower: float, cost: float, path: States) -> None:
-        """Take in what looking at a leg gave: a bound, and a path with its cost, or an empty one."""
+        """Take in what looking at a leg gave: a bound, and a path [n + 1, L] with its cost, or an empty one."""
+        self._unseen[leg, moves] = False
         self.lower[leg, moves] = max(self.lower[leg, moves], lower)
-        if len(path) and cost < self._cost[leg, moves]:
+        if len(path) > 0 and cost < self._cost[leg, moves]:
             self._cost[leg, moves], self._paths[leg, moves] = cost, path
-        self.best = min(self.best, float((self._cost + self._others(self._cost)).min()))
+            self.best = min(self.best, float((self._cost + self._others(self._cost)).min()))
 
     def path(self) -> tuple[States, tuple[int, ...]]:
         """The best path [N + 1, L], and the moves at which it passes its stops."""

@@ -22,8 +22,8 @@ STRIP_SWEEPS = 100  # at most, for each number of moves
 STRIPS_STALLED = 0.98  # as STALLED; then A* takes over
 NEAR = 0.1  # a path that costs no more than this share above the best is worth polishing
 MOST_STATES = 1 << 16  # of a lane: A* numbers them in 16 bits
-SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
 MOST_PAIRS = 1 << 23  # of states in strips, 32 bytes each: more are not made, nor kept for A*
+SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
 PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
 
 _Result = TypeVar("_Result")
@@ -85,7 +85,7 @@ class Rules:
         shortest: least number of moves.
         longest: greatest number of moves.
         node_budget: nodes that A* may hold at once; it stops after as many expansions.
-        sweeps: pairs of sweeps of the bound at most, for each number of moves; at least 1.
+        sweeps: pairs of sweeps of messages at most, for each number of moves; at least 1.
     """
 
     wait: float
@@ -101,8 +101,8 @@ def solve(
 ) -> Certificate | None:
     """The best path from states `start` [L] to `goal` [L] over all numbers of moves; None where there is none.
 
-    Numbers of moves are looked at in the order of what the lanes cost on their own. Each is bounded, then searched, and
-    only as long as its bound is below the best path found; so the least bound of all proves the answer.
+    Numbers of moves are looked at in the order of what the lanes cost on their own, as long as that is below the best
+    path found, and bounded; those that this leaves undecided are searched. The least bound of all proves the answer.
 
     It passes through `vias` in their order, which divide it into legs of at least one move; with vias it is numbers of
     moves of a leg that are looked at, each below what the best path leaves when the other legs cost as little as is
@@ -122,34 +122,31 @@ def solve(
 
     expansions, peak = 0, 0
     attention = _Attention(watch, lambda: Progress(legs.best, legs.lower_bound(), expansions))
-    unseen, undecided = np.isfinite(legs.lower), np.zeros(legs.lower.shape, dtype=bool)
-    left: dict[tuple[int, int], tuple[_Known, strips.Strips]] = {}  # what is left to search
+    left: dict[tuple[int, int], tuple[Grid, strips.Strips]] = {}  # what is left to search
     kept = 0  # pairs in it
     while True:
-        leg, moves, least, below = legs.most_promising(unseen)
+        leg, moves, least, below = legs.most_promising()
         if not least < legs.best - PROVEN or (attention.ends() and np.isfinite(legs.best)):
             break
-        toll, unseen[leg, moves] = rules.per_move * moves, False
+        toll = rules.per_move * moves
         known = _Known(build_grid(held, stops[leg], moves, to_go[leg], below - toll), below - toll)
         clock.lap("problem")
         messages = _by_messages(known, rules.sweeps, attention)
-        if not known.settled and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
+        if not (known.settled or attention.ends()) and len(start) > 1 and strips.pairs(known.grid) <= MOST_PAIRS:
             cut = _by_strips(known, strips.cut(known.grid, messages), attention)
             if not known.settled and kept + len(cut.stand) <= MOST_PAIRS:
-                left[leg, moves], undecided[leg, moves] = (known, cut), True
+                left[leg, moves] = known.grid, cut
                 kept += len(cut.stand)
         legs.learn(leg, moves, known.proven + toll, known.cost + toll, known.states)
         clock.lap("bound")
-    while not attention.ends():
-        leg, moves, least, below = legs.most_promising(undecided)
-        if not least < legs.best - PROVEN:
+    legs.reopen(left)
+    while True:
+        leg, moves, least, below = legs.most_promising()
+        if not least < legs.best - PROVEN or attention.ends():
             break
-        toll, undecided[leg, moves] = rules.per_move * moves, False
-        known, cut = left.pop((leg, moves))
-        limit = min(known.cost, below - toll)  # what costs no less is no longer in the grid, or not sought
-        found = _search(known.grid, cut, limit, rules.node_budget, rules.node_budget - expansions, attention)
-        better = found.states if found.cost < limit else known.states
-        legs.learn(leg, moves, min(found.proven, limit) + toll, min(found.cost, limit) + toll, better)
+        toll, budget = rules.per_move * moves, rules.node_budget - expansions
+        found = _search(*left.pop((leg, moves)), below - toll, rules.node_budget, budget, attention)
+        legs.learn(leg, moves, found.proven + toll, found.cost + toll, found.states)
         expansions, peak = expansions + found.expansions, max(peak, found.peak)
         clock.lap("search")
     if not np.isfinite(legs.best):
@@ -230,7 +227,7 @@ def _by_messages(known: _Known, sweeps: int, attention: _Attention) -> bound.Mes
     """Bound a number of moves by messages, of which the last are returned.
 
     Every few sweeps the path that they met is polished, and positions that no better path goes through are taken out
-    of the grid; until bound and path meet, or what separates them hardly shrinks.
+    of the grid; until bound and path meet, or what separates them hardly shrinks, or it is to end.
     """
     messages = bound.no_messages(known.grid)
     for done in range(0, sweeps, SWEEPS_AT_ONCE):
@@ -242,7 +239,7 @@ def _by_messages(known: _Known, sweeps: int, attention: _Attention) -> bound.Mes
             break
         grid, messages = bound.narrow(known.grid, messages, known.cost - astar.SAME)
         known.narrow(grid)
-        if known.settled or (done and known.stalls(gap, size, STALLED)) or attention.ends():
+        if known.settled or attention.ends() or (done and known.stalls(gap, size, STALLED)):
             break
     return messages
 
@@ -251,7 +248,7 @@ def _by_strips(known: _Known, cut: strips.Strips, attention: _Attention) -> stri
     """Go on by strips, in the same way; the last are returned."""
     known.proven = max(known.proven, min(strips.proven(cut), known.cost))
     for done in range(STRIP_SWEEPS):
-        if known.settled or attention.ends():
+        if known.settled:
             break
         gap, size = known.cost - known.proven, len(known.grid.dom)
         chosen, through = np.zeros(len(known.grid.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
@@ -261,7 +258,7 @@ def _by_strips(known: _Known, cut: strips.Strips, attention: _Attention) -> stri
         if not known.settled:
             grid, cut = strips.narrow(known.grid, cut, through, known.cost - astar.SAME)
             known.narrow(grid)
-        if done and known.stalls(gap, size, STRIPS_STALLED):
+        if attention.ends() or (done and known.stalls(gap, size, STRIPS_STALLED)):
             break
     return cut
 
