@@ -1,0 +1,64 @@
+"""What A* holds in memory against what a budget of nodes is reckoned at.
+
+    python experiments/search/memory.py PATH/TO/cmu-05
+
+One pair of postures at 10 a second and 5 degrees, under a bound that is made poor, so that A* fills its budget; each
+budget in a process of its own. Growth is of the resident memory, from after a first search that loads all code.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind.search import astar, bound, strips
+from motionmind.search.costs import price
+from motionmind.search.problem import build_grid, costs_to_go, with_waits
+
+BUDGETS = (1_000, 10_000, 100_000, 1_000_000)
+MOVES = 12
+
+
+def grown(folder: Path, budget: int) -> tuple[int, int]:
+    """Nodes held at most, and bytes by which the process grew."""
+    clips = (own_skeleton(read_motion(file)) for file in sorted(folder.glob("*.bvh")))
+    engine = Engine.fit(clips, name="memory", rate=10.0, skip=1, discretization=make_discretization("codebook", 5.0))
+    model = price(engine.grammar, "conditional", 1.0, 1.0)
+    start, goal = engine.states[[100, 900]].astype(np.int64)
+    held = with_waits(model, goal, 1.0)
+    grid = build_grid(held, start, MOVES, costs_to_go(held, goal, MOVES), np.inf)
+    cut = strips.cut(grid, bound.no_messages(grid))  # shares as they come, with nothing evened out
+
+    def search(nodes: int) -> int:
+        path, on = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
+        return astar.search(grid, cut, strips.proven(cut), np.inf, path, nodes, 2 * nodes, on)[3]
+
+    search(100)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    most = search(budget)
+    return most, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--budget", type=int, help="this one alone, in this process")
+    options = parser.parse_args()
+    if options.budget:
+        print(*grown(options.folder, options.budget))
+        return
+    a_node = 1e6 / astar.nodes_in(1_000_000, 24)
+    print("| budget, nodes | held at most | reckoned | grown | grown / reckoned |\n|---|---|---|---|---|")
+    for budget in BUDGETS:
+        command = [sys.executable, __file__, str(options.folder), "--budget", str(budget)]
+        most, size = map(int, subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+        reckoned = budget * a_node
+        print(f"| {budget:,} | {most:,} | {reckoned / 1e6:.1f} MB | {size / 1e6:.1f} MB | {size / reckoned:.2f} |")
+
+
+if __name__ == "__main__":
+    main()
