@@ -365,3 +365,19 @@ def test_any_bytes(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> Non
     path.write_bytes(b"PK" + data)
     with pytest.raises(FormatError):
         read_npz(path)
+
+
+def test_small_numbers_do_not_swell_on_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = arrays(frames=100)
+    found["poses"] = np.zeros((100, 156), dtype=np.uint8)
+    monkeypatch.setattr(npz, "_LARGEST_ARRAY", 8 * found["poses"].size - 1)
+    assert fails(saved(tmp_path / "a.npz", found)) == "'poses' is larger than movement is"
+
+
+def test_no_rate_is_written_that_could_not_be_read(tmp_path: Path) -> None:
+    body = human23()
+    still = np.tile(rot.IDENTITY, (3, len(body), 1))
+    fast = Motion(body, still, np.zeros((3, 3)), np.arange(3) * 1e-5)
+    with pytest.raises(MotionMindError, match="100000 frames a second are more than 10000"):
+        write_npz(tmp_path / "a.npz", fast)
+    assert not list(tmp_path.iterdir())

@@ -899,3 +899,16 @@ def test_of_sheets_that_cannot_all_be_written_none_is_left(
 def test_other_commands_do_not_pay_for_pictures() -> None:
     code = "import sys, motionmind, motionmind.cli; sys.exit(any(name.startswith('PIL') for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("options", [{"columns": 0}, {"columns": -3}, {"side": "top"}])
+def test_a_sheet_has_columns_and_two_sides(options: dict[str, object]) -> None:
+    with pytest.raises(MotionMindError, match="one column at least, and is seen from the right or left"):
+        contact_sheet(clip(2), **options)  # type: ignore[arg-type]
+
+
+def test_a_body_far_under_or_over_the_floor_keeps_its_colours() -> None:
+    for height in (-30.0, 30.0):
+        pixels = np.asarray(contact_sheet(moved(standing().as_motion(), 0.0, height, 0.0))).astype(int)
+        assert (np.abs(pixels - sheets._SUNK).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
+        assert (pixels[..., 0] - pixels[..., 2] > 60).sum() > 500
