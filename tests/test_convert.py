@@ -46,7 +46,7 @@ def taller(skeleton: Skeleton) -> Skeleton:
 
 @pytest.mark.parametrize("source", SUFFIXES)
 @pytest.mark.parametrize("target", [*SUFFIXES, "glb"])
-def test_a_body_of_known_size_moves_alike_in_all(source: str, target: str, convert) -> None:  # type: ignore[no-untyped-def]
+def test_a_body_of_known_size_moves_alike_in_all(source: str, target: str, convert: Run) -> None:
     motion = moving(human23())
     write_motion(f"in.{source}", motion)
     ran = convert(f"in.{source}", f"out.{target}", "--source-fps", 20)
@@ -60,7 +60,7 @@ def test_a_body_of_known_size_moves_alike_in_all(source: str, target: str, conve
 
 
 @pytest.mark.parametrize("target", ["json", "bvh", "npz"])
-def test_frames_a_second(target: str, convert) -> None:  # type: ignore[no-untyped-def]
+def test_frames_a_second(target: str, convert: Run) -> None:
     write_motion("in.json", replace(moving(human23()), times=np.array([0, 0.1, 0.15, 0.3, 0.4, 0.5, 0.6, 0.7])))
     if target != "json":
         refused = convert("in.json", f"out.{target}")
@@ -72,7 +72,7 @@ def test_frames_a_second(target: str, convert) -> None:  # type: ignore[no-untyp
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("in", 0.0254), ("0.5", 0.5), (None, 0.01)])
-def test_units(unit: str | None, metres: float, convert) -> None:  # type: ignore[no-untyped-def]
+def test_units(unit: str | None, metres: float, convert: Run) -> None:
     motion = moving(human23())
     write_motion("in.json", motion)
     assert convert("in.json", "a.bvh", *(["--out-unit", unit] if unit else [])).err == ""
@@ -81,7 +81,7 @@ def test_units(unit: str | None, metres: float, convert) -> None:  # type: ignor
     np.testing.assert_allclose(read_bvh("b.bvh", unit=1.0).root * 0.001, motion.root, atol=1e-6)
 
 
-def test_units_that_cannot_be(convert) -> None:  # type: ignore[no-untyped-def]
+def test_units_that_cannot_be(convert: Run) -> None:
     write_motion("in.json", moving(human23()))
     assert "--out-unit mm: only BVH has no unit of its own" in convert("in.json", "a.glb", "--out-unit", "mm").err
     assert "unit 'furlong' is unknown" in convert("in.json", "a.bvh", "--out-unit", "furlong").err
@@ -172,7 +172,7 @@ def test_joints_that_smpl_lacks() -> None:
     assert re.fullmatch(r"the turns of joints that SMPL does not have \(left_toes_middle, .* and 2 more\)", said)
 
 
-def test_the_command_says_it(convert, shared_data: Path) -> None:  # type: ignore[no-untyped-def]
+def test_the_command_says_it(convert: Run, shared_data: Path) -> None:
     write_motion("in.json", inserted(moving(human23())))
     said = "the marks of frames that the engine made (3); the marks of joints that it bridged (left_hip, right_knee)\n"
     assert convert("in.json", "a.bvh").err == f"note: a.bvh: no place for {said}"
