@@ -14,12 +14,13 @@ import numpy as np
 from motionmind import rotations as rot
 from motionmind import survey
 from motionmind.account import account
-from motionmind.asked import culprits, restricted, restrictions
+from motionmind.asked import Restriction, culprits, restricted, restrictions
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError, NoPathError, SkeletonError
-from motionmind.grammar.coordination import fit_network
+from motionmind.grammar.coordination import Coordination, fit_network
+from motionmind.grammar.progression import fit_progression
 from motionmind.grammar.transitions import Weights
-from motionmind.learned import Learned
+from motionmind.learned import Learned, States
 from motionmind.mapping import joint_mapping
 from motionmind.motion import FASTEST, Posture
 from motionmind.posturewise import diagnose_posturewise, nearest_posture
@@ -29,7 +30,8 @@ from motionmind.retarget import to_human23
 from motionmind.search.astar import nodes_in
 from motionmind.search.costs import dearer, price, shared_moves
 from motionmind.search.posturewise import Bodies, find_bodies, solve_posturewise
-from motionmind.search.problem import Model
+from motionmind.search.problem import Model, places, with_waits
+from motionmind.search.progression import of_moves
 from motionmind.search.sample import drawn
 from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
@@ -47,6 +49,7 @@ MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
 MOST_GIVEN = 3  # states of the parent that a joint graph names beside a state
 SLOWEST = 0.01  # frames a second
+Scheme = Literal["posture", "progression", "none"]  # of coordination
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,7 @@ class Engine(Learned):
         memory: int | None = None,
         weights: Weights = "conditional",
         novelty: float = 0.0,
-        coordination: Literal["posture", "none"] = "posture",
+        coordination: Scheme = "posture",
         lambda_: float = 1.0,
         beta: float = 1.0,
         tau: float = 1.0,
@@ -113,8 +116,10 @@ class Engine(Learned):
             weights: "conditional", -log P(next state | state), or "printed", as the papers print it.
             novelty: from 0, where what is frequent in the corpus is cheap, to 1, where all moves that it attests from a
                 state cost the same.
-            coordination: "posture", or "none" for joints that move each on its own, as with a `lambda_` of 0.
-            lambda_: factor of the network's -log P(joint's state | parent's state), summed over joints and postures.
+            coordination: what a joint goes with: "posture", P(joint's state | parent's state); "progression",
+                P(joint's next state | its state, parent's state and next state), as in [C98]; or "none", for joints
+                that move each on its own, as with a `lambda_` of 0.
+            lambda_: factor of the -log P of that, summed over joints and postures.
             beta: nats for each move that a joint waits at its goal.
             tau: nats for each move.
             bridge_price: nats for each degree of an unattested move.
@@ -129,6 +134,8 @@ class Engine(Learned):
         """
         if posturewise and (pin or hold or avoid or via or unlike or sample):
             raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
+        if posturewise and coordination == "progression":
+            raise MotionMindError("posturewise: coordination can be posture or none, not progression")
         least, most = _range(moves, max_moves)
         _check_options(
             node_budget, fps, weights, coordination, novelty, seed, lambda_, beta, tau, bridge_price, diversity
@@ -149,8 +156,9 @@ class Engine(Learned):
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
         asked = restrictions(self.space, start, goal, pin, hold, avoid)
-        coupled = lambda_ if coordination == "posture" else 0.0
-        model = self._model(weights, coupled, None if strict else bridge_price, novelty)
+        factor = 0.0 if coordination == "none" else lambda_
+        of_postures = 0.0 if coordination == "progression" else factor
+        model = self._model(weights, of_postures, None if strict else bridge_price, novelty)
         if unlike:
             model = dearer(model, [other.path for other in unlike], diversity)
         posed = Posed(
@@ -160,28 +168,18 @@ class Engine(Learned):
             Rules(beta, tau, least, most, node_budget),
             tuple(Via(through, move) for through, move in zip(passing, at, strict=True)),
         )
+        searched, net = posed, self.grammar.coordination
+        if coordination == "progression":
+            searched, net = self._of_moves(posed, factor)
         posing = perf_counter() - began
         if not fixed and not via and _same(a, b):
-            stay = states[:1]
-            certificate: Certificate | None = Certificate(
-                stay, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0}
-            )
-        elif near is not None:
-            certificate = solve_posturewise(model, self._bodies, start, goal, posed.rules)
-            if certificate is None:
-                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, posed.rules))
+            certificate = _stay(states[:1])
         else:
-            certificate = solve(posed.model, start, goal, posed.rules, posed.vias, watch)
-        if certificate is None:
-            if faults := culprits(self.grammar.lanes, model, posed, asked):
-                raise NoPathError(faults, {"restrictions": faults})
-            # Imported here, for SciPy's graphs are slow to import.
-            from motionmind.diagnosis import diagnose
-
-            found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, posed.rules, strict)
-            raise NoPathError(str(found), found.plain())
+            certificate = self._answer(model, posed, searched, near, asked, strict, watch)
         if sample and len(certificate.path) > 1:
-            certificate = drawn(posed.model, start, goal, posed.rules, posed.vias, certificate, seed)
+            certificate = drawn(searched.model, start, goal, searched.rules, posed.vias, certificate, seed)
+        spent = account(certificate.path, searched.model, goal, searched.rules, self.grammar, self.space, net, factor)
+        certificate = replace(certificate, path=places(searched.model, certificate.path))
         attested, bridges, waits, sources = explain(
             certificate,
             self.grammar,
@@ -225,7 +223,7 @@ class Engine(Learned):
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,
-            account=account(certificate.path, posed.model, goal, posed.rules, self.grammar, self.space, coupled),
+            account=spent,
             seconds={
                 "load": self.load_seconds,
                 "problem": posing + certificate.seconds["problem"],
@@ -233,7 +231,7 @@ class Engine(Learned):
                 "search": certificate.seconds["search"],
                 "realise": perf_counter() - began,
             },
-            posed=posed,
+            posed=searched,
             asked={
                 "moves": list(moves) if isinstance(moves, tuple) else moves,
                 "max_moves": max_moves,
@@ -259,6 +257,38 @@ class Engine(Learned):
                 "fps": fps,
             },
         )
+
+    def _answer(
+        self,
+        model: Model,
+        posed: Posed,
+        searched: Posed,
+        near: tuple[int, int] | None,
+        asked: Sequence[Restriction],
+        strict: bool,
+        watch: Watch | None,
+    ) -> Certificate:
+        """The best path of a problem, which is searched as `searched`; NoPathError says why there is none.
+
+        `model` has the costs before any restriction in `asked`, and `near` the corpus's postures that a search of whole
+        postures leads between.
+        """
+        start, goal, rules = posed.start, posed.goal, posed.rules
+        if near is not None:
+            whole = solve_posturewise(model, self._bodies, start, goal, rules)
+            if whole is None:
+                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, rules))
+            return whole
+        certificate = solve(searched.model, start, goal, searched.rules, posed.vias, watch)
+        if certificate is None:
+            if faults := culprits(self.grammar.lanes, model, posed, asked):
+                raise NoPathError(faults, {"restrictions": faults})
+            # Imported here, for SciPy's graphs are slow to import.
+            from motionmind.diagnosis import diagnose
+
+            found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, rules, strict)
+            raise NoPathError(str(found), found.plain())
+        return certificate
 
     def _vias(self, via: Sequence[Posture | tuple[Posture, int]]) -> tuple[list[Posture], list[int | None]]:
         """The postures to pass through, and the move at which each is, or None."""
@@ -294,6 +324,23 @@ class Engine(Learned):
             self._priced.clear()
             self._priced[asked] = price(self.grammar, *asked)
         return self._priced[asked]
+
+    def _of_moves(self, posed: Posed, lambda_: float) -> tuple[Posed, Coordination]:
+        """The same problem with moves for states, and how these go together."""
+        held = with_waits(posed.model, posed.goal, posed.rules.wait)
+        moves = self.corpus.moves
+        net = fit_progression(
+            self.grammar.coordination.parents,
+            held.starts,
+            held.indptr,
+            held.targets,
+            self.states,
+            moves.begins,
+            moves.ends,
+            moves.weights,
+        )
+        rules = replace(posed.rules, wait=np.inf)  # those at the goal are moves by now
+        return replace(posed, model=of_moves(held, net, lambda_), rules=rules), net
 
     @cached_property
     def _bodies(self) -> Bodies:
@@ -379,6 +426,11 @@ class Engine(Learned):
         return survey.check(self.corpus, self.grammar, self.states, pairs, seed)
 
 
+def _stay(path: States) -> Certificate:
+    """That no move at all is best, with a path of one posture [1, L]."""
+    return Certificate(path, 0.0, 0.0, "optimal", 0, 0, {"problem": 0.0, "bound": 0.0, "search": 0.0})
+
+
 def _same(a: Posture, b: Posture) -> bool:
     """Whether two postures are one, to within rounding."""
     return bool(np.all(rot.angle(a.rotations, b.rotations) < 1e-6) and np.all(np.abs(a.root - b.root) < 1e-6))
@@ -415,8 +467,8 @@ def _check_options(
     node_budget: int, fps: float, weights: str, coordination: str, novelty: float, seed: int, *prices: float
 ) -> None:
     _check_count("node_budget", node_budget, MOST_NODES)
-    if coordination not in ("posture", "none"):
-        raise MotionMindError(f"coordination must be 'posture' or 'none', not {coordination!r}")
+    if coordination not in ("posture", "progression", "none"):
+        raise MotionMindError(f"coordination must be 'posture', 'progression' or 'none', not {coordination!r}")
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise MotionMindError(f"seed must be a whole number of at least 0, not {seed}")
     if not SLOWEST <= fps <= FASTEST:

@@ -218,9 +218,9 @@ def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
         above=tuple(
             row[new[parent]] if parent >= 0 else row for row, parent in zip(toy.above, toy.parents, strict=True)
         ),
-        discounts=tuple(
+        corrections=tuple(
             table[np.ix_(new[parent], p)] if parent >= 0 else table
-            for table, p, parent in zip(toy.discounts, new, toy.parents, strict=True)
+            for table, p, parent in zip(toy.corrections, new, toy.parents, strict=True)
         ),
         start=tuple(int(np.flatnonzero(p == s)[0]) for p, s in zip(new, toy.start, strict=True)),
         goal=tuple(int(np.flatnonzero(p == s)[0]) for p, s in zip(new, toy.goal, strict=True)),
@@ -253,7 +253,7 @@ def test_lanes_in_another_order_cost_the_same(seed: int) -> None:
         order.append(int(rng.choice(ready)))
     moved = {
         name: tuple(getattr(toy, name)[lane] for lane in order)
-        for name in ("edges", "children", "above", "discounts", "start", "goal")
+        for name in ("edges", "children", "above", "corrections", "start", "goal")
     }
     parents = tuple(order.index(toy.parents[lane]) if toy.parents[lane] >= 0 else -1 for lane in order)
     other = replace(toy, parents=parents, **moved)
@@ -353,7 +353,7 @@ def paths_of(toy: Toy, moves: int) -> dict[bytes, float]:
 def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
     tried = 0
     for seed in range(40):
-        toy = random_toy(seed, most=3, states=3, frustrated=seed % 2 == 0)
+        toy = random_toy(seed, most=3, states=3, frustrated=seed % 2 == 0, dear=seed % 3 == 0)
         likely = paths_of(toy, 3)
         if not 4 <= len(likely) <= 400:
             continue

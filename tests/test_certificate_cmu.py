@@ -11,14 +11,18 @@ from toys import random_toy
 from motionmind.discretize import Codebook
 from motionmind.engine import Engine
 from motionmind.formats import read_motion
+from motionmind.grammar.progression import fit_progression
 from motionmind.learned import own_skeleton
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import price
+from motionmind.search.problem import with_waits
+from motionmind.search.progression import of_moves
 from motionmind.search.solve import Rules, solve
 
 pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
 
 PAIRS = 50
+FEW = 10
 SECONDS = 100  # that toulbar2 may take for one problem
 SAME = 1e-3  # nats; the written costs are rounded to 1e-6 each
 
@@ -56,6 +60,26 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
         assert ours.lower_bound <= ours.cost
         optimal += ours.status == "optimal"
     assert optimal >= 0.95 * PAIRS
+
+
+def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
+    """Between postures that lie close in time, for toulbar2 takes minutes for others."""
+    model, moves = price(cmu05.grammar, "conditional", 0.0, 1.0), cmu05.corpus.moves
+    rng = np.random.default_rng(11)
+    for pair in range(FEW):
+        begin = int(rng.integers(len(cmu05.states) - 4))
+        start, goal = cmu05.states[[begin, begin + 4]].astype(np.int64)
+        held = with_waits(model, goal, 1.0)
+        lists, seen = (held.starts, held.indptr, held.targets), (moves.begins, moves.ends, moves.weights)
+        net = fit_progression(cmu05.grammar.coordination.parents, *lists, np.asarray(cmu05.states), *seen)
+        of_these = of_moves(held, net, 1.0)
+        rules = Rules(wait=np.inf, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
+        ours = solve(of_these, start, goal, rules)
+        assert ours is not None
+        assert ours.status == "optimal"
+        text = cfn(of_these, start, goal, rules, len(ours.path) - 1, cmu05.grammar.lanes)
+        (tmp_path / "problem.cfn").write_text(text)
+        assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
 
 
 def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:

@@ -56,12 +56,12 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
     rng, toy = np.random.default_rng(seed), random_toy(seed, most=4)
     states, begins = walk(toy, rng, 60)
     # Every pair of states that stands together is listed, as in what is learned from these postures.
-    listed = [table.copy() for table in toy.discounts]
+    listed = [table.copy() for table in toy.corrections]
     for lane, parent in enumerate(toy.parents):
         for body in states:
             if parent >= 0 and listed[lane][body[parent], body[lane]] == 0.0:
                 listed[lane][body[parent], body[lane]] = -1e-3
-    toy = replace(toy, discounts=tuple(listed), goal=tuple(map(int, states[rng.integers(60)])))
+    toy = replace(toy, corrections=tuple(listed), goal=tuple(map(int, states[rng.integers(60)])))
     start, goal = toy.ends()
     bodies = find_bodies(states, begins, begins + 1)
     graph = nx.DiGraph((tuple(map(int, states[i])), tuple(map(int, states[i + 1]))) for i in begins)

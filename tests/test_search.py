@@ -26,6 +26,8 @@ KINDS = {
     "frustrated": {"frustrated": True},
     "even": {"even": True},
     "frustrated and even": {"frustrated": True, "even": True},
+    "dear": {"dear": True},
+    "frustrated and dear": {"frustrated": True, "dear": True},
 }
 
 
@@ -45,7 +47,7 @@ def a_body(**changes: object) -> Toy:
         edges=(np.ones((2, 2)), np.ones((2, 2))),
         children=(np.zeros(2), np.zeros(2)),
         above=(np.zeros(0), np.zeros(2)),
-        discounts=(np.zeros((0, 2)), np.zeros((2, 2))),
+        corrections=(np.zeros((0, 2)), np.zeros((2, 2))),
         start=(0, 0),
         goal=(1, 1),
         wait=1.0,
@@ -364,7 +366,7 @@ def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
         edges=tuple(np.ones((size, size)) for size in (2, 1, 2, 2)),
         children=tuple(map(np.zeros, (2, 1, 2, 2))),
         above=tuple(map(np.zeros, (0, 2, 1, 1))),
-        discounts=tuple(map(np.zeros, ((0, 2), (2, 1), (1, 2), (1, 2)))),
+        corrections=tuple(map(np.zeros, ((0, 2), (2, 1), (1, 2), (1, 2)))),
         start=(0, 0, 0, 0),
         goal=(1, 0, 1, 1),
         wait=1.0,
@@ -454,6 +456,7 @@ def test_more_states_than_a_node_can_number_are_refused() -> None:
         pair_states=np.zeros(0, np.int32),
         pair_costs=np.zeros(0),
         allowed=np.ones(states, dtype=bool),
+        place=every.astype(np.int32),
     )
     with pytest.raises(ValueError, match="70000"):
         solve.solve(model, np.array([0]), np.array([2]), Rules(1.0, 1.0, 1, 3, 100))
@@ -488,7 +491,7 @@ def test_the_written_problem_forbids_what_the_model_forbids() -> None:
 def twice(toy: Toy) -> Toy:
     """Two of a body side by side, as one."""
     below = tuple(parent + len(toy.sizes) if parent >= 0 else -1 for parent in toy.parents)
-    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "discounts", "start", "goal")}
+    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "corrections", "start", "goal")}
     return replace(toy, parents=toy.parents + below, **doubled)
 
 
@@ -496,7 +499,7 @@ def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:
     """Tables of couplings of two states each, for the last two lanes."""
     return {
         "above": (*toy.above[:2], np.zeros(2), np.zeros(2)),
-        "discounts": (*toy.discounts[:2], np.zeros((2, 2)), np.zeros((2, 2))),
+        "corrections": (*toy.corrections[:2], np.zeros((2, 2)), np.zeros((2, 2))),
     }
 
 

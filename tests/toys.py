@@ -27,7 +27,7 @@ class Toy:
         parents: parent lane [L], or -1.
         edges: cost of a move of each lane, infinity where there is none, L arrays of [S, S].
         children, above: the parts of a coupling that separate, of the lane's state and of its parent's.
-        discounts: what is taken off for pairs, 0 or below, L arrays of [states of the parent, S].
+        corrections: what pairs cost beyond that, most often less, L arrays of [states of the parent, S].
         start, goal: states [L].
         wait, per_move: beta and tau.
     """
@@ -36,7 +36,7 @@ class Toy:
     edges: tuple[Floats, ...]
     children: tuple[Floats, ...]
     above: tuple[Floats, ...]
-    discounts: tuple[Floats, ...]
+    corrections: tuple[Floats, ...]
     start: tuple[int, ...]
     goal: tuple[int, ...]
     wait: float
@@ -48,7 +48,7 @@ class Toy:
 
     def coupling(self, lane: int) -> Floats:
         """Cost of standing together [states of the parent, states of the lane]."""
-        return self.above[lane][:, None] + self.children[lane][None, :] + self.discounts[lane]
+        return self.above[lane][:, None] + self.children[lane][None, :] + self.corrections[lane]
 
     def moves(self, lane: int) -> Floats:
         """Cost of a lane's moves, waiting at the goal among them [S, S]."""
@@ -62,15 +62,15 @@ class Toy:
         rows = [np.flatnonzero(np.isfinite(row)) for table in self.edges for row in table]
         costs = [row[np.isfinite(row)] for table in self.edges for row in table]
         unary, alone = np.zeros(starts[-1]), np.zeros(starts[-1])
-        pair_starts, pairs, discounts = [0], [], []
+        pair_starts, pairs, corrections = [0], [], []
         for lane, parent in enumerate(self.parents):
             mine = slice(starts[lane], starts[lane + 1])
             if parent >= 0:
                 unary[mine] += self.children[lane]
                 unary[starts[parent] : starts[parent + 1]] += self.above[lane]
                 alone[mine] = self.coupling(lane).min(axis=0)
-                pairs += [np.flatnonzero(row) for row in self.discounts[lane]]
-                discounts += [row[row != 0.0] for row in self.discounts[lane]]
+                pairs += [np.flatnonzero(row) for row in self.corrections[lane]]
+                corrections += [row[row != 0.0] for row in self.corrections[lane]]
             pair_starts.append(len(pairs))
         return Model(
             starts,
@@ -83,8 +83,9 @@ class Toy:
             np.array(pair_starts, dtype=np.int64),
             _pointer(pairs),
             np.concatenate([*pairs, []]).astype(np.int32),
-            np.concatenate([*discounts, []]).astype(np.float64),
+            np.concatenate([*corrections, []]).astype(np.float64),
             np.ones(starts[-1], dtype=bool),
+            np.concatenate([np.arange(size) for size in self.sizes]).astype(np.int32),
         )
 
     def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -152,13 +153,15 @@ class Toy:
             edges=times(self.edges),
             children=times(self.children),
             above=times(self.above),
-            discounts=times(self.discounts),
+            corrections=times(self.corrections),
             wait=self.wait * factor,
             per_move=self.per_move * factor,
         )
 
 
-def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False) -> Toy:
+def random_toy(
+    seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False, dear: bool = False
+) -> Toy:
     """A random body of 1 to `most` lanes: any forest, sparse moves with dead ends, couplings with discounts.
 
     Args:
@@ -167,6 +170,7 @@ def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = 
         states: states a lane at most.
         frustrated: couplings far stronger than moves, which leaves a gap between bound and optimum.
         even: all costs multiples of a tenth, so that many paths cost the same but for rounding.
+        dear: of the pairs that couplings list many cost more than others.
     """
     rng = np.random.default_rng(seed)
     lanes = int(rng.integers(1, most + 1))
@@ -178,7 +182,7 @@ def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = 
     def draw(high: float, shape: tuple[int, ...] | int) -> Floats:
         return rng.integers(0, 6, shape) * (high / 5.0) if even else rng.uniform(0.0, high, shape)
 
-    edges, children, above, discounts = [], [], [], []
+    edges, children, above, corrections = [], [], [], []
     for size, parent in zip(sizes, parents, strict=True):
         table = draw(2.0, (size, size))
         table[rng.random((size, size)) > (0.85 if frustrated else rng.uniform(0.4, 0.9))] = np.inf
@@ -187,13 +191,15 @@ def random_toy(seed: int, *, most: int = 5, states: int = 4, frustrated: bool = 
         strength = 6.0 if frustrated else 2.0
         children.append(draw(1.0, size))
         above.append(draw(1.0, size_above))
-        discounts.append(-draw(strength, (size_above, size)) * (rng.random((size_above, size)) < rng.uniform(0.3, 0.7)))
+        listed = rng.random((size_above, size)) < rng.uniform(0.3, 0.7)
+        sign = rng.choice([-1.0, 1.0], (size_above, size)) if dear else -1.0
+        corrections.append(sign * draw(strength, (size_above, size)) * listed)
     return Toy(
         parents,
         tuple(edges),
         tuple(children),
         tuple(above),
-        tuple(discounts),
+        tuple(corrections),
         tuple(int(rng.integers(size)) for size in sizes),
         tuple(int(rng.integers(size)) for size in sizes),
         wait=float(draw(1.5, 1)[0]),

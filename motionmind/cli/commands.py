@@ -106,7 +106,10 @@ def app(context: click.Context) -> None:
     "--novelty", type=Number(min=0, max=1), default=0.0, help="0: the frequent is cheap; 1: all that is attested alike."
 )
 @click.option(
-    "--coordination", type=click.Choice(["posture", "none"]), default="posture", help="How joints coordinate."
+    "--coordination",
+    type=click.Choice(["posture", "progression", "none"]),
+    default="posture",
+    help="How joints coordinate.",
 )
 @click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of what that costs.")
 @click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal.")

@@ -144,16 +144,23 @@ def forward(grid: Grid, m: Messages) -> None:
                 if grid.parents[child] == lane:
                     below = i - lane + child
                     begin, end, base = grid.dom_ptr[below], grid.dom_ptr[below + 1], grid.up_ptr[below]
-                    least = np.inf
+                    values = theta - m.up_col[base : base + last - first]
+                    best = np.argmin(values)
+                    m.down_col[begin:end] = values[best]
+                    order = np.empty(0, np.int64)
+                    for q in range(grid.col_ptr[base + best], grid.col_ptr[base + best + 1]):
+                        if grid.col_cost[q] > 0.0:  # the best of all costs more here: go on to those that may do better
+                            x = grid.col_to[q]
+                            order = np.argsort(values) if len(order) == 0 else order
+                            m.down_col[x] = np.inf
+                            for other in order:
+                                if values[other] >= m.down_col[x]:
+                                    break
+                                m.down_col[x] = min(m.down_col[x], values[other] + correction(grid, base + other, x))
                     for k in range(last - first):
-                        least = min(least, theta[k] - m.up_col[base + k])
-                    for x in range(begin, end):
-                        m.down_col[x] = least
-                    for k in range(last - first):
-                        value = theta[k] - m.up_col[base + k]
                         for q in range(grid.col_ptr[base + k], grid.col_ptr[base + k + 1]):
                             x = grid.col_to[q]
-                            m.down_col[x] = min(m.down_col[x], value + grid.col_cost[q])
+                            m.down_col[x] = min(m.down_col[x], values[k] + grid.col_cost[q])
                     m.before[i] += _settle(m.down_col, begin, end)
 
 
@@ -184,14 +191,19 @@ def backward(grid: Grid, m: Messages) -> float:
             m.constants[i] += settled
             sent[before] += settled
             if grid.parents[lane] >= 0:
-                least = np.inf
-                for x in range(first, last):
-                    least = min(least, theta[x - first] - m.down_col[x])
+                values = theta - m.down_col[first:last]
+                best, order = np.argmin(values), np.empty(0, np.int64)
                 for u in range(grid.up_ptr[i], grid.up_ptr[i + 1]):
-                    value = least
+                    value = values[best]
+                    if correction(grid, u, first + best) > 0.0:
+                        order = np.argsort(values) if len(order) == 0 else order
+                        value = np.inf
+                        for other in order:
+                            if values[other] >= value:
+                                break
+                            value = min(value, values[other] + correction(grid, u, first + other))
                     for q in range(grid.col_ptr[u], grid.col_ptr[u + 1]):
-                        x = grid.col_to[q]
-                        value = min(value, grid.col_cost[q] + theta[x - first] - m.down_col[x])
+                        value = min(value, values[grid.col_to[q] - first] + grid.col_cost[q])
                     m.up_col[u] = value
                 settled = _settle(m.up_col, grid.up_ptr[i], grid.up_ptr[i + 1])
                 m.constants[i] += settled
@@ -214,8 +226,8 @@ def _settle(message: Floats, begin: int, end: int) -> float:
 
 
 @jit
-def discount(grid: Grid, u: int, x: int) -> float:
-    """The discount for position `x` in coupling row `u`; 0 for a pair that is not listed."""
+def correction(grid: Grid, u: int, x: int) -> float:
+    """What the coupling of position `x` in coupling row `u` is listed with; 0 for a pair that is not listed."""
     low, high = grid.col_ptr[u], grid.col_ptr[u + 1]
     while low < high:
         middle = (low + high) // 2
@@ -238,7 +250,7 @@ def step(grid: Grid, m: Messages, i: int, before: int, above: int, e: int) -> fl
     grown = float(grid.row_cost[e] + m.ahead[x] - m.up_row[before])
     if above >= 0:
         u = grid.up_ptr[i] + above - grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
-        grown += discount(grid, u, x) - m.up_col[u]
+        grown += correction(grid, u, x) - m.up_col[u]
     return grown
 
 

@@ -21,8 +21,10 @@ def cfn(
 ) -> str:
     """The problem of exactly `moves` moves from states `start` [L] to `goal` [L], with the costs that are searched.
 
-    Variables are named lane_t and their values after the lane's states, such as "s12"; the optimum is the cost that a
-    certificate states, the price of the moves themselves included. `vias` are passed at the moves that they name.
+    Variables are named lane_t and their values after the lane's states, such as "s12", or, where moves are searched,
+    after the number of the move and the state that it leads to, "m40_s12". The optimum is the cost that a certificate
+    states, the price of the moves themselves included. `vias` are passed at the moves that they name; lanes go on from
+    there as variables lane_t_on.
     """
     stops = [(0, start), *((via.move or 0, via.states) for via in vias), (moves, goal)]
     grids = leg_grids(model, goal, rules.wait, stops)
@@ -32,12 +34,13 @@ def cfn(
         yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
         for (first, _), grid in zip(stops, grids, strict=False):
             names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
+            if first > 0:  # where a leg starts is where the one before ends
+                names[: grid.lanes] = [f"{name}_on" for name in names[: grid.lanes]]
             domains = [slice(*span) for span in pairwise(grid.dom_ptr)]
             for i, name in enumerate(names):
                 lane = i % grid.lanes
-                if name not in variables:  # what a leg starts with, the leg before has paid for
-                    variables[name] = [f"s{s}" for s in grid.dom[domains[i]]]
-                    yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
+                variables[name] = [_value(model, lane, int(s)) for s in grid.dom[domains[i]]]
+                yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
                 if i + grid.lanes < len(names):
                     after = i + grid.lanes
                     rows = range(domains[i].start, domains[i].stop)
@@ -72,6 +75,11 @@ def cfn(
         + ",\n".join(lines)
         + "\n}}\n"
     )
+
+
+def _value(model: Model, lane: int, state: int) -> str:
+    place = model.place[model.starts[lane] + state]
+    return f"s{state}" if place == state else f"m{state}_s{place}"
 
 
 def _flat(listed: list[tuple[int, int, float]]) -> list[float]:

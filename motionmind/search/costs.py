@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Weights
-from motionmind.search.problem import Model
+from motionmind.search.problem import Floats, Indices, Ints, Model
 
 
 def price(
@@ -35,40 +37,48 @@ def price(
         rows, targets, costs = rows[order], targets[order], costs[order]
     indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(graph.visits)))]).astype(np.int64)
 
-    unary, alone = coordination * net.child_costs, np.zeros(len(graph.visits))
-    discounts = np.zeros(len(net.pair_costs))
+    return Model(
+        starts=np.array(graph.starts),  # a copy, for what was loaded is mapped read-only: another type to compile for
+        **couplings(net, graph.starts, coordination)._asdict(),
+        indptr=indptr,
+        targets=targets,
+        costs=costs,
+        allowed=np.ones(len(graph.visits), dtype=bool),
+        place=np.concatenate([np.arange(size) for size in graph.sizes()]).astype(np.int32),
+    )
+
+
+class Couplings(NamedTuple):
+    """How the lanes of a Model are coupled; attributes as there."""
+
+    parents: Ints
+    unary: Floats
+    alone: Floats
+    pair_starts: Ints
+    pair_ptr: Ints
+    pair_states: Indices
+    pair_costs: Floats
+
+
+def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
+    """The costs of a network with a factor; lane j has the rows `starts[j]` to `starts[j + 1]` of its states."""
+    unary, alone = factor * net.child_costs, np.zeros(starts[-1])
+    corrections = np.zeros(len(net.pair_costs))
     for lane, parent in enumerate(net.parents):
         if parent < 0:
             continue
-        mine = slice(graph.starts[lane], graph.starts[lane + 1])
-        above = slice(graph.starts[parent], graph.starts[parent + 1])
-        pair_rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
-        unary[above] += coordination * net.parent_costs[pair_rows]
-        pairs = slice(net.pair_ptr[pair_rows.start], net.pair_ptr[pair_rows.stop])
-        row_of_pair = np.repeat(
-            net.parent_costs[pair_rows], np.diff(net.pair_ptr[pair_rows.start : pair_rows.stop + 1])
-        )
+        mine, above = (slice(starts[k], starts[k + 1]) for k in (lane, parent))
+        rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
+        unary[above] += factor * net.parent_costs[rows]
+        pairs = slice(net.pair_ptr[rows.start], net.pair_ptr[rows.stop])
+        row_of_pair = np.repeat(net.parent_costs[rows], np.diff(net.pair_ptr[rows.start : rows.stop + 1]))
         separable = net.child_costs[mine][net.pair_states[pairs]] + row_of_pair
-        discounts[pairs] = coordination * np.minimum(net.pair_costs[pairs] - separable, 0.0)
-        least = net.child_costs[mine] + net.parent_costs[pair_rows].min()
+        corrections[pairs] = factor * (net.pair_costs[pairs] - separable)
+        least = net.child_costs[mine] + net.parent_costs[rows].min()
         np.minimum.at(least, net.pair_states[pairs], net.pair_costs[pairs])
-        alone[mine] = coordination * least
-    # Copies, for what was loaded is mapped read-only, and that would be another type to compile for.
-    starts, parents, pair_starts, pair_ptr = map(np.array, (graph.starts, net.parents, net.pair_starts, net.pair_ptr))
-    return Model(
-        starts,
-        parents,
-        indptr,
-        targets,
-        costs,
-        unary,
-        alone,
-        pair_starts,
-        pair_ptr,
-        np.array(net.pair_states),
-        discounts,
-        np.ones(len(graph.visits), dtype=bool),
-    )
+        alone[mine] = factor * least
+    pair_starts, pair_ptr, parents = (np.array(part) for part in (net.pair_starts, net.pair_ptr, net.parents))
+    return Couplings(parents, unary, alone, pair_starts, pair_ptr, np.array(net.pair_states), corrections)
 
 
 def changes(path: NDArray[np.int32]) -> list[tuple[int, int, int]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind.jit import jit
-from motionmind.search.bound import discount
+from motionmind.search.bound import correction
 from motionmind.search.problem import Floats, Grid, Ints
 
 
@@ -31,7 +31,7 @@ def polish(grid: Grid, path: Ints) -> float:
     while True:
         for lane in range(grid.lanes):
             _best_lane(grid, path, lane)
-        for t in range(1, grid.moves):
+        for t in range(1, grid.moves + 1):
             _best_moment(grid, path, t)
         better = path_cost(grid, path)
         if not better < cost - 1e-9:
@@ -54,11 +54,11 @@ def edge_cost(grid: Grid, p: int, x: int) -> float:
 
 @jit
 def coupling(grid: Grid, path: Ints, i: int, x: int) -> float:
-    """Discount of position x of variable i with its parent variable's place in the path."""
+    """Correction for position x of variable i with its parent variable's place in the path."""
     if grid.up_ptr[i + 1] == grid.up_ptr[i]:
         return 0.0
     above = i - i % grid.lanes + grid.parents[i % grid.lanes]
-    return discount(grid, grid.up_ptr[i] + path[above] - grid.dom_ptr[above], x)
+    return correction(grid, grid.up_ptr[i] + path[above] - grid.dom_ptr[above], x)
 
 
 @jit
@@ -76,7 +76,7 @@ def _best_lane(grid: Grid, path: Ints, lane: int) -> None:
             for child in range(lane + 1, lanes):
                 below = i - lane + child
                 if grid.parents[child] == lane and grid.up_ptr[below + 1] > grid.up_ptr[below]:
-                    value[p] += discount(grid, grid.up_ptr[below] + p - grid.dom_ptr[i], path[below])
+                    value[p] += correction(grid, grid.up_ptr[below] + p - grid.dom_ptr[i], path[below])
     for i in range(lane + lanes, len(path), lanes):
         before, least = path[i - lanes], np.inf
         for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
@@ -87,19 +87,18 @@ def _best_lane(grid: Grid, path: Ints, lane: int) -> None:
 
 @jit
 def _best_moment(grid: Grid, path: Ints, t: int) -> None:
-    """value[p]: the least that a lane and the lanes below it in the tree cost at move t with p, to and from the path.
-
-    A child's best answer to a position of its parent is its best of all, or its best among the pairs listed there.
-    """
+    """value[p]: the least that a lane and the lanes below it cost at move t with position p, to and from the path."""
     lanes = grid.lanes
     first = grid.dom_ptr[t * lanes]
     value = np.full(grid.dom_ptr[(t + 1) * lanes] - first, np.inf)
     for lane in range(lanes - 1, -1, -1):
         i = t * lanes + lane
-        before, after = path[i - lanes], path[i + lanes]
+        before = path[i - lanes]
         for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
             p = grid.row_to[e]
-            value[p - first] = grid.row_cost[e] + grid.unary[p] + edge_cost(grid, p, after)
+            value[p - first] = grid.row_cost[e] + grid.unary[p]
+            if t < grid.moves:
+                value[p - first] += edge_cost(grid, p, path[i + lanes])
             for child in range(lane + 1, lanes):
                 if grid.parents[child] == lane:
                     value[p - first] += _answer(grid, value, first, i - lane + child, p - grid.dom_ptr[i])[0]
@@ -113,13 +112,13 @@ def _best_moment(grid: Grid, path: Ints, t: int) -> None:
 def _answer(grid: Grid, value: Floats, first: int, i: int, above: int) -> tuple[float, int]:
     """The least cost of variable i when its parent is at `above` (an index; -1 for no parent), and where."""
     least, best = np.inf, -1
+    u = grid.up_ptr[i] + above
+    q, last = (grid.col_ptr[u], grid.col_ptr[u + 1]) if above >= 0 else (0, 0)
     for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
-        if value[p - first] < least:
-            least, best = value[p - first], p
-    if above >= 0:
-        u = grid.up_ptr[i] + above
-        for q in range(grid.col_ptr[u], grid.col_ptr[u + 1]):
-            p = grid.col_to[q]
-            if value[p - first] + grid.col_cost[q] < least:
-                least, best = value[p - first] + grid.col_cost[q], p
+        cost = value[p - first]
+        if q < last and grid.col_to[q] == p:
+            cost += grid.col_cost[q]
+            q += 1
+        if cost < least:
+            least, best = cost, p
     return least, best

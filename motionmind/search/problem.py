@@ -28,8 +28,12 @@ class Model(NamedTuple):
     State s of lane j has the row `starts[j] + s` in what is listed by state.
 
     The coupling of a lane to its parent costs `unary` (its part that separates into one term a state, summed over
-    all couplings that a state takes part in) plus a discount below 0 for the listed pairs, 0 for all others. That is
-    the form of a table whose unseen pairs back off to marginals, and makes a message linear in the pairs seen.
+    all couplings that a state takes part in) plus a correction for the listed pairs, 0 for all others: most often a
+    discount. That is the form of a table whose unseen pairs back off to marginals, and makes a message linear in the
+    pairs seen.
+
+    A lane starts in a state and arrives at a place. Where states are those of a joint graph both are the same; a state
+    may also be a move, which ends at a place (`motionmind.search.progression`).
 
     Attributes:
         starts: first row of each lane [L + 1].
@@ -43,8 +47,9 @@ class Model(NamedTuple):
         pair_starts: first pair row of each lane [L + 1]; a lane has one pair row for each state of its parent.
         pair_ptr: pairs of each pair row [sum + 1].
         pair_states: the lane's state in a listed pair [Q], increasing within a pair row.
-        pair_costs: its discount, below 0 [Q].
+        pair_costs: its correction [Q].
         allowed: whether a lane may be in a state on the way, at moves after the first posture and before the last [G].
+        place: where a lane is in a state, the goal being one of these [G].
     """
 
     starts: Ints
@@ -59,6 +64,7 @@ class Model(NamedTuple):
     pair_states: Indices
     pair_costs: Floats
     allowed: NDArray[np.bool_]
+    place: Indices
 
 
 class Grid(NamedTuple):
@@ -79,7 +85,7 @@ class Grid(NamedTuple):
         up_ptr: first coupling row of variable i [(T + 1) L + 1]; it has one for each position of its parent variable.
         col_ptr: listed pairs of each coupling row [U + 1].
         col_to: the variable's position in a listed pair [Q], increasing within a row.
-        col_cost: its discount, below 0 [Q].
+        col_cost: its correction [Q].
     """
 
     lanes: int
@@ -98,7 +104,12 @@ class Grid(NamedTuple):
 
 
 def with_waits(model: Model, goal: Ints, wait: float) -> Model:
-    """The model in which every lane may wait at its goal for `wait` a move, or hold there if that is cheaper."""
+    """The model in which every lane may wait at its goal for `wait` a move, or hold there if that is cheaper.
+
+    It is the model itself where `wait` is infinite.
+    """
+    if wait == np.inf:
+        return model
     rows = model.starts[:-1] + goal
     at = np.array([_insertion(model, row, state) for row, state in zip(rows, goal, strict=True)], dtype=np.int64)
     held = np.zeros(len(rows), dtype=bool)
@@ -113,6 +124,11 @@ def with_waits(model: Model, goal: Ints, wait: float) -> Model:
         targets=np.insert(model.targets, at[~held], goal[~held].astype(np.int32)),
         costs=np.insert(costs, at[~held], wait),
     )
+
+
+def places(model: Model, path: Indices) -> Indices:
+    """Where the lanes are along a path of states [T + 1, L]."""
+    return np.asarray(model.place[model.starts[:-1] + path])
 
 
 def leg_grids(model: Model, goal: Ints, wait: float, stops: Sequence[tuple[int, Ints]]) -> list[Grid]:
@@ -134,16 +150,18 @@ def _insertion(model: Model, row: int, state: int) -> int:
 def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
     """V[k, row]: the least that exactly k moves from a state to its lane's goal cost a lane on its own [moves + 1, G].
 
-        V[0, goal] = 0,   V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + V[k - 1, s']
+        V[0, s at goal] = 0,   V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + V[k - 1, s']
 
-    over states s' that are allowed on the way, and the goal with the last move. Infinite where no such walk exists.
-    Summed over lanes it bounds the cost of T moves from below, since each coupling is counted once, at the least it can
-    cost its lane.
+    over states s' that are allowed on the way, and those at the goal with the last move. Infinite where no such walk
+    exists. Summed over lanes it bounds the cost of T moves from below, since each coupling is counted once, at the
+    least it can cost its lane.
     """
     value = np.full((moves + 1, model.starts[-1]), np.inf)
     for lane in range(len(model.parents)):
         first, last = model.starts[lane], model.starts[lane + 1]
-        value[0, first + goal[lane]] = 0.0
+        for row in range(first, last):
+            if model.place[row] == goal[lane]:
+                value[0, row] = 0.0
         for k in range(1, moves + 1):
             for row in range(first, last):
                 best = np.inf

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from motionmind.jit import jit
-from motionmind.search.bound import discount
+from motionmind.search.bound import correction
 from motionmind.search.polish import coupling, edge_cost, path_cost
 from motionmind.search.problem import Floats, Grid, Ints, Model, leg_grids
 from motionmind.search.solve import Certificate, Rules, Via
@@ -43,12 +43,11 @@ def drawn(
     ]
     path = best.path.copy()
     for grid, (first, _), (last, _) in zip(leg_grids(model, goal, rules.wait, stops), stops, stops[1:], strict=False):
-        leg = path[first : last + 1]
-        domains = [grid.dom[slice(*span)] for span in pairwise(grid.dom_ptr)]
-        places = [np.searchsorted(domain, state) for domain, state in zip(domains, leg.ravel(), strict=True)]
-        chosen = grid.dom_ptr[:-1] + np.array(places, dtype=np.int64)
+        leg, chosen = path[first + 1 : last + 1], grid.dom_ptr[:-1].copy()
+        domains = [grid.dom[slice(*span)] for span in pairwise(grid.dom_ptr[grid.lanes :])]
+        chosen[grid.lanes :] += [np.searchsorted(domain, s) for domain, s in zip(domains, leg.ravel(), strict=True)]
         cost += float(sample(grid, chosen, ROUNDS, rng))
-        leg[:] = grid.dom[chosen].reshape(leg.shape)
+        leg[:] = grid.dom[chosen[grid.lanes :]].reshape(leg.shape)
     return replace(best, path=path, cost=cost + rules.per_move * (len(path) - 1), status="sampled")
 
 
@@ -56,7 +55,7 @@ def drawn(
 def sample(grid: Grid, path: Ints, rounds: int, rng: np.random.Generator) -> float:
     """Draw a path [n] (positions) in place, starting from the one there, in so many rounds; its cost."""
     for _ in range(rounds):
-        for t in range(1, grid.moves):
+        for t in range(1, grid.moves + 1):
             _draw_moment(grid, path, t, rng)
         for lane in range(grid.lanes):
             _draw_lane(grid, path, lane, rng)
@@ -75,7 +74,7 @@ def _draw_lane(grid: Grid, path: Ints, lane: int, rng: np.random.Generator) -> N
             for child in range(lane + 1, lanes):
                 below = i - lane + child
                 if grid.parents[child] == lane:
-                    value[p] += discount(grid, grid.up_ptr[below] + p - grid.dom_ptr[i], path[below])
+                    value[p] += correction(grid, grid.up_ptr[below] + p - grid.dom_ptr[i], path[below])
             if t < grid.moves:
                 edges = slice(grid.row_ptr[p], grid.row_ptr[p + 1])
                 value[p] += _soft_least(grid.row_cost[edges] + value[grid.row_to[edges]])
@@ -93,10 +92,12 @@ def _draw_moment(grid: Grid, path: Ints, t: int, rng: np.random.Generator) -> No
     value = np.full(grid.dom_ptr[(t + 1) * lanes] - first, np.inf)
     for lane in range(lanes - 1, -1, -1):
         i = t * lanes + lane
-        before, after = path[i - lanes], path[i + lanes]
+        before = path[i - lanes]
         for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
             p = grid.row_to[e]
-            value[p - first] = grid.row_cost[e] + grid.unary[p] + edge_cost(grid, p, after)
+            value[p - first] = grid.row_cost[e] + grid.unary[p]
+            if t < grid.moves:
+                value[p - first] += edge_cost(grid, p, path[i + lanes])
         for child in range(lane + 1, lanes):
             if grid.parents[child] == lane:
                 below = i - lane + child
@@ -106,9 +107,9 @@ def _draw_moment(grid: Grid, path: Ints, t: int, rng: np.random.Generator) -> No
                     if value[p - first] < np.inf:
                         u = grid.up_ptr[below] + p - grid.dom_ptr[i]
                         pairs = slice(grid.col_ptr[u], grid.col_ptr[u + 1])
-                        # Of all alike, and what the listed pairs have beyond that: exp(-(v + d)) - exp(-v), d <= 0.
-                        listed = value[grid.col_to[pairs] - first] - np.log(np.expm1(-grid.col_cost[pairs]))
-                        value[p - first] += _soft_least(np.append(listed, alike))
+                        # The sum of all alike, 1, and what the listed pairs change in it: exp(-(v + d)) - exp(-v).
+                        listed = np.exp(alike - value[grid.col_to[pairs] - first])
+                        value[p - first] += alike - np.log1p(np.sum(listed * np.expm1(-grid.col_cost[pairs])))
     for lane in range(lanes):
         i, parent = t * lanes + lane, grid.parents[lane]
         costs = value[grid.dom_ptr[i] - first : grid.dom_ptr[i + 1] - first].copy()
