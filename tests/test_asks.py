@@ -558,7 +558,7 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
         ({"novelty": np.nan}, "novelty must be"),
         ({"diversity": -1.0}, "diversity must be a number of nats"),
         ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
-        ({"coordination": "all"}, "coordination must be 'posture' or 'none', not 'all'"),
+        ({"coordination": "all"}, "coordination must be 'posture', 'progression' or 'none', not 'all'"),
         ({"memory": 10}, "memory of 10 bytes holds not one node"),
         ({"memory": 0}, "memory must be a whole number"),
     ],

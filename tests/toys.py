@@ -191,9 +191,8 @@ def random_toy(
         strength = 6.0 if frustrated else 2.0
         children.append(draw(1.0, size))
         above.append(draw(1.0, size_above))
-        listed = rng.random((size_above, size)) < rng.uniform(0.3, 0.7)
-        sign = rng.choice([-1.0, 1.0], (size_above, size)) if dear else -1.0
-        corrections.append(sign * draw(strength, (size_above, size)) * listed)
+        table = -draw(strength, (size_above, size)) * (rng.random((size_above, size)) < rng.uniform(0.3, 0.7))
+        corrections.append(table * rng.choice([-1.0, 1.0], table.shape) if dear else table)
     return Toy(
         parents,
         tuple(edges),

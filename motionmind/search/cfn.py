@@ -23,8 +23,8 @@ def cfn(
 
     Variables are named lane_t and their values after the lane's states, such as "s12", or, where moves are searched,
     after the number of the move and the state that it leads to, "m40_s12". The optimum is the cost that a certificate
-    states, the price of the moves themselves included. `vias` are passed at the moves that they name; lanes go on from
-    there as variables lane_t_on.
+    states, the price of the moves themselves included. `vias` are passed at the moves that they name; where moves are
+    searched, lanes go on from there as variables lane_t_on.
     """
     stops = [(0, start), *((via.move or 0, via.states) for via in vias), (moves, goal)]
     grids = leg_grids(model, goal, rules.wait, stops)
@@ -33,14 +33,17 @@ def cfn(
     def functions() -> Iterator[tuple[str, list[str], dict[str, object]]]:
         yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
         for (first, _), grid in zip(stops, grids, strict=False):
-            names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
-            if first > 0:  # where a leg starts is where the one before ends
-                names[: grid.lanes] = [f"{name}_on" for name in names[: grid.lanes]]
             domains = [slice(*span) for span in pairwise(grid.dom_ptr)]
+            names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
+            values = [[_value(model, i % grid.lanes, int(s)) for s in grid.dom[d]] for i, d in enumerate(domains)]
+            if first > 0:  # a leg starts where the one before ends, which is in the same states unless these are moves
+                starts = zip(names[: grid.lanes], values, strict=False)
+                names[: grid.lanes] = [name if variables[name] == here else f"{name}_on" for name, here in starts]
             for i, name in enumerate(names):
                 lane = i % grid.lanes
-                variables[name] = [_value(model, lane, int(s)) for s in grid.dom[domains[i]]]
-                yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
+                if name not in variables:  # what a leg starts with, the leg before has paid for
+                    variables[name] = values[i]
+                    yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
                 if i + grid.lanes < len(names):
                     after = i + grid.lanes
                     rows = range(domains[i].start, domains[i].stop)
