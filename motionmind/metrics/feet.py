@@ -35,10 +35,11 @@ def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
     """Share of frames in which a foot skates: it is below 5 cm, and moves level by more than 2.5 cm to the next frame.
 
-    Karunratanakul et al., "Guided motion diffusion for controllable human motion synthesis", ICCV (2023), section 5,
-    with these limits but two differences. Frames are at 30 a second, not 20, so that the limit is 0.75 m/s, not 0.5.
-    And a foot is both ends of its last bone: one that turns on its ball or on its tip stands. So it skates where it has
-    an end below 5 cm in both frames and every such end moves too far.
+    Karunratanakul, Preechakul, Suwajanakorn and Tang, "Guided motion diffusion for controllable human motion
+    synthesis", ICCV (2023), with these limits but two differences. Frames are at 30 a second, not 20, so that the limit
+    is 0.75 m/s, not 0.5. And a foot is both ends of its last bone: one that turns on its ball or on its tip stands. So
+    it skates where it has an end below 5 cm in both frames and every such end moves too far. A foot that swings past
+    near the floor, as in walking, counts too: judge by what the corpus's own movement has.
 
     Args:
         skeleton: the body.
@@ -56,7 +57,7 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
     """How far feet slide, cm a frame at 30 frames a second: the mean over frames and feet of v (2 - 2^(h / 2.5 cm)).
 
     Zhang, Starke, Komura and Saito, "Mode-adaptive neural networks for quadruped motion control", ACM TOG 37(4)
-    (2018), section 9: v is how far a foot moves level, h its height, the factor from 1 on the floor to 0 at 2.5 cm and
+    (2018): v is how far a foot moves level, h its height, the factor from 1 on the floor to 0 at 2.5 cm and
     above. Of a foot's two ends, as in `skating`, the one that slides least of those that are that low counts.
     """
     moved, height = _ends(skeleton, rotations, root, floor)

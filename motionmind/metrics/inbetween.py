@@ -45,8 +45,8 @@ def seen(
 def l2q(truth: Floats, made: Floats) -> Floats:
     """L2Q of each window [...]: the mean over its frames of the norm of the difference of all joints' quaternions.
 
-    `truth` and `made` are global rotations [..., T, J, 4]. No unit; 2 sqrt(J) sin(a / 4) where every joint is off by the
-    angle a.
+    `truth` and `made` are global rotations [..., T, J, 4]. No unit: 2 sqrt(J) sin(a / 4) where every joint is off by
+    the angle a.
     """
     nearer = np.minimum(np.sum((made - truth) ** 2, axis=-1), np.sum((made + truth) ** 2, axis=-1))
     return np.asarray(np.sqrt(nearer.sum(axis=-1)).mean(axis=-1))
