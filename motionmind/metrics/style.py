@@ -70,6 +70,15 @@ class Styles:
         return np.asarray(np.einsum("wcf,fg,wcg->c", off, self.precision, off) / len(off))
 
 
+def learn_styles(rows: Mapping[str, Floats]) -> Styles:
+    """The discriminants of the `features` of corpora [W, F], each of which counts as much as another."""
+    means = np.stack([seen.mean(axis=0) for seen in rows.values()])
+    spread = np.mean([np.cov(seen.T, bias=True) for seen in rows.values()], axis=0)
+    shrunk = (1.0 - _SHRINKAGE) * spread + _SHRINKAGE * np.diag(np.diag(spread))
+    # A joint that never moves has no spread, and what moves it then is as far off as can be told.
+    return Styles(tuple(rows), means, np.linalg.inv(shrunk + 1e-6 * np.eye(len(shrunk))))
+
+
 @dataclass(frozen=True, eq=False)
 class Judge:
     """Who says, of movement of so many frames, whether it would be taken for a corpus's.
@@ -130,7 +139,9 @@ def find_judge(corpora: Mapping[str, Sequences], frames: int) -> Judge:
         for corpus, sequences in corpora.items()
     }
     without = {
-        (corpus, name): _learn({key: _all(key, found, None if key != corpus else name) for key, found in rows.items()})
+        (corpus, name): learn_styles(
+            {key: _all(key, found, None if key != corpus else name) for key, found in rows.items()}
+        )
         for corpus, sequences in rows.items()
         for name in sequences
     }
@@ -153,12 +164,3 @@ def _all(corpus: str, sequences: Mapping[str, Floats], left_out: str | None) -> 
     if not found:
         raise MotionMindError(f"style: {corpus} needs two sequences at least, each of {WINDOW} frames or more")
     return np.concatenate(found)
-
-
-def _learn(rows: Mapping[str, Floats]) -> Styles:
-    """The discriminants of what is seen of corpora [W, F], each of which counts as much as another."""
-    means = np.stack([seen.mean(axis=0) for seen in rows.values()])
-    spread = np.mean([np.cov(seen.T, bias=True) for seen in rows.values()], axis=0)
-    shrunk = (1.0 - _SHRINKAGE) * spread + _SHRINKAGE * np.diag(np.diag(spread))
-    # A joint that never moves has no spread, and what moves it then is as far off as can be told.
-    return Styles(tuple(rows), means, np.linalg.inv(shrunk + 1e-6 * np.eye(len(shrunk))))
