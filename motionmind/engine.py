@@ -88,6 +88,7 @@ class Engine(Learned):
         tau: float = 1.0,
         bridge_price: float = 1.0,
         fps: float = 30.0,
+        follow: bool | None = None,
         watch: Watch | None = None,
     ) -> Tween:
         """The best movement from posture `a` to posture `b` in the style of the corpus.
@@ -124,6 +125,9 @@ class Engine(Learned):
             tau: nats for each move.
             bridge_price: nats for each degree of an unattested move.
             fps: frames a second of the motion.
+            follow: whether the motion keeps to the path, each joint in its state at each move; or is the mean of all
+                the ways that the corpus knows from A to B in as many moves, which held-out movement is nearer to. None
+                for the mean where nothing is asked of the path but its length, else for the path.
             watch: called between pieces of work with how far the search is; where it returns True, the best path so
                 far is the answer, with what is proven by then.
 
@@ -145,6 +149,8 @@ class Engine(Learned):
         if duration is not None:
             least, most = self._moves_in(duration, fps, moves, least, most)
         fixed = moves is not None or duration is not None
+        if follow is None:
+            follow = bool(pin or hold or avoid or via or unlike or sample or posturewise or strict or novelty)
         a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
         postures, at = self._vias(via)
         began = perf_counter()
@@ -194,12 +200,12 @@ class Engine(Learned):
             a,
             b,
             self.corpus,
-            self.states,
             self.grammar,
             self.carriage,
             fps,
             duration,
             dict(zip(certificate.passed, postures, strict=True)),
+            np.radians(self.space.tolerances[: len(a.skeleton)]) if follow else None,
         )
         (insertion,) = motion.insertions
         # A facing that is bridged shows at the root, which turns with it.
@@ -255,6 +261,7 @@ class Engine(Learned):
                 "tau": tau,
                 "bridge_price": bridge_price,
                 "fps": fps,
+                "follow": follow,
             },
         )
 

@@ -57,7 +57,7 @@ class Learned:
         space: the states of each lane.
         states: of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
-        carriage: how the corpus's bodies travel and stand.
+        carriage: how the corpus's bodies hold themselves, travel and stand.
         load_seconds: time that loading took.
     """
 
@@ -125,7 +125,7 @@ class Learned:
             weights=moves.weights,
             posture_weights=corpus.weights,
         )
-        return cls(corpus, space, states, grammar, learn_carriage(corpus, states, grammar.transitions))
+        return cls(corpus, space, states, grammar, learn_carriage(corpus))
 
     # --- saving and loading -----------------------------------------------------------------------------------------
 

@@ -14,9 +14,10 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
 from motionmind.realise.root import Carriage, carry, lowest, stand
-from motionmind.realise.samples import choose_samples, find_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
+from motionmind.realise.ways import CLOSELY, NEAR, likely, limbs, mean_rotations, nearness
+from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -26,33 +27,36 @@ def realise(
     a: Posture,
     b: Posture,
     corpus: Corpus,
-    states: NDArray[np.int32],
     grammar: Grammar,
     carriage: Carriage,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
+    within: Floats | None = None,
 ) -> Motion:
-    """The motion of a path of states [T + 1, L] from posture `a` to posture `b`, on the body of `a`.
+    """The motion from posture `a` to posture `b` in the moves of a path of states [T + 1, L], on the body of `a`.
 
     Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
-    are as in the postures there. Between them each lane passes, at the times of the moves, through orientations that
-    the corpus shows in its states; a C2 spline joins them. The root travels as the corpus's
-    root does in these moves and ends where `b` stands. Its height keeps the lowest point of the body as far
-    above the floor as the postures have it that the orientations come from; the floor is at 0, or lower under ends that
-    are.
+    are as in the postures there. Between them each limb is, at the times of the moves, where the mean of all ways is
+    that the corpus knows from `a` to `b` in as many moves (`motionmind.realise.ways`); a C2 spline joins them. With
+    `within` ways count the more the nearer they are to the path, and each joint is then brought into its state.
+
+    Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
+    Its height keeps the lowest point as far above the floor as the corpus's postures have it; the floor is at 0, or
+    lower under ends that are.
 
     Args:
         path: states of the lanes.
         a: first posture.
         b: last posture.
         corpus: the movement that was learned from.
-        states: of its postures [N, L].
         grammar: what was learned.
-        carriage: how its bodies travel and stand.
+        carriage: how its bodies hold themselves, travel and stand.
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: seconds that it lasts, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
+        within: radians within which each joint is of its state at each move [J]; None for the mean of all ways,
+            wherever the path goes.
     """
     if len(path) == 1:
         return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
@@ -65,41 +69,106 @@ def realise(
     times[-1] = length or times[-1]
     keys[-1] = times[-1]
 
-    # The facing's states are steps of a circle, which the corpus need not show: its lane is not sampled but turned.
+    # The facing's states are steps of a circle, which the corpus need not show: its lane has no ways but turns.
     joints = len(a.skeleton)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: corpus.to_lanes(posture.rotations) for move, posture in postures.items()}
-    poses, heights = np.empty((len(path), joints, 4)), np.empty(len(path))
-    for start, end in pairwise(stops):
-        between = slice(start + 1, end)
-        ends = stops[start][:joints], stops[end][:joints]
-        observed = find_samples(path[start : end + 1, :joints], states)
-        orientations = corpus.rotations[observed, np.arange(joints)[:, None]]
-        orientations[:, 0] = corpus.to_lanes(orientations[:, 0, :, None])[..., 0, :]  # of the root without its facing
-        chosen = choose_samples(observed, orientations, *ends)
-        poses[between] = corpus.to_lanes(corpus.rotations[chosen, np.arange(joints)])[:, :joints]
-        heights[between] = np.median(carriage.clearance[chosen], axis=1)
-    for move, lanes in stops.items():
-        poses[move] = lanes[:joints]
-    rotations = rotation_spline(keys, poses, times)
+    centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
+    halves = np.insert(keys, np.arange(1, len(keys)), 0.5 * (keys[1:] + keys[:-1]))
+    poses, stance = _mean_way(a.skeleton, carriage, stops, halves, None if within is None else centres)
+    if within is not None:
+        inner = np.array([move for move in range(len(path)) if move not in stops], dtype=np.intp)
+        poses[2 * inner] = _brought(poses[2 * inner], centres[inner], within)
+    rotations = rotation_spline(halves, poses, times)
     if corpus.facing == "free":
-        headings = _headings(path[:, -1], grammar, seconds, {move: lanes[-1] for move, lanes in stops.items()})
-        turn = rot.about_vertical(natural_spline(keys, headings, times))
+        facing = {move: lanes[-1] for move, lanes in stops.items()}
+        if within is None:
+            headings = _turning(stance[:-1] @ carriage.turn, stance[:-1] @ carriage.turn**2, facing)
+        else:
+            headings = natural_spline(keys, _headings(path[:, -1], grammar, seconds, facing), halves)
+        turn = rot.about_vertical(natural_spline(halves, headings, times))
         rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
         headings = rot.heading(poses[:, 0])
     rotations = rot.normalise(corpus.from_lanes(rotations))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
-    places = carry(path, headings, seconds, carriage.travel, grammar.transitions, a.root, b.root)
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     low = {move: lowest(a.skeleton, posture.rotations, posture.root) for move, posture in postures.items()}
     # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    heights[1:-1] += np.interp(keys[1:-1], keys[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
-    heights[list(low)] = list(low.values())
-    root = stand(a.skeleton, rotations, natural_spline(keys, places, times), _eased(keys, heights, times))
+    floor = np.interp(halves, keys[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
+    heights = stance @ carriage.clearance + floor
+    heights[[2 * move for move in low]] = list(low.values())
+    heights = _eased(halves, heights, times)
+    clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
+    places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(stance, headings, carriage), axis=0)])
+    drift = np.diff(natural_spline(halves, places, times), axis=0)
+    root = stand(a.skeleton, rotations, carry(a.skeleton, rotations, clear, drift, a.root, b.root), heights)
     root[0], root[-1] = a.root, b.root
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
+
+
+def _mean_way(
+    skeleton: Skeleton, carriage: Carriage, stops: Mapping[int, Floats], halves: Floats, path: Floats | None
+) -> tuple[Floats, Floats]:
+    """Mean orientations [2 T + 1, J, 4] of the ways from each of `stops` to the next, near `path` [T + 1, J, 4] if
+    given; and how likely what carries the body is in each of the corpus's moments [2 T + 1, N].
+
+    The mean's ends are near the stops but not there: what they are off by is taken off along the way in proportion to
+    the times of the steps [2 T + 1].
+    """
+    joints, moments = len(skeleton), len(carriage.weights)
+    poses, stance = np.empty((len(halves), joints, 4)), np.empty((len(halves), moments))
+    for start, end in pairwise(stops):
+        here, ends = slice(2 * start, 2 * end + 1), np.stack([stops[start], stops[end]])[:, :joints]
+        share = ((halves[here] - halves[2 * start]) / (halves[2 * end] - halves[2 * start]))[:, None]
+        straight = rot.slerp(ends[:1], ends[1:], share)
+        for part, limb in enumerate(limbs(skeleton)):
+            shown = np.ascontiguousarray(carriage.orientations[:, limb])
+            near = np.ones((len(share), moments))
+            if path is not None:
+                near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, limb]]
+            near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, limb])
+            near[0] *= carriage.weights
+            kinds = np.ascontiguousarray(carriage.kinds[:, part])
+            ways = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
+            if part == carriage.kinds.shape[1] - 1:
+                stance[here] = ways
+            else:
+                mean = mean_rotations(ways, shown, np.ascontiguousarray(straight[:, limb]))
+                off = rot.log(rot.inv_mul(straight[:, limb], mean))
+                off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
+                poses[here, limb] = rot.mul(straight[:, limb], rot.exp(off))
+    for move, lanes in stops.items():
+        poses[2 * move] = lanes[:joints]
+    return poses, stance
+
+
+def _brought(poses: Floats, centres: Floats, within: Floats) -> Floats:
+    """Orientations [..., J, 4] brought to within so many radians [J] of `centres`, the short way."""
+    off = rot.angle(centres, poses)
+    return np.where((off <= within)[..., None], poses, rot.slerp(centres, poses, within / np.maximum(off, 1e-9)))
+
+
+def _turning(turn: Floats, spread: Floats, facing: Mapping[int, Floats]) -> Floats:
+    """Headings in radians [2 T + 1], unwrapped, that turn by `turn` [2 T] a step but are `facing`'s at its moves.
+
+    What is missing is made up by the steps in proportion to how much their turns vary (`spread`: mean squares), as the mean of normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
+    """
+    out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
+    varies = np.maximum(spread - turn**2, 1e-4)
+    for start, end in pairwise(2 * move for move in facing):
+        missing = rot.heading(facing[end // 2]) - out[end]
+        missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
+        share = np.cumsum(varies[start:end]) / varies[start:end].sum()
+        out[start + 1 : end + 1] += missing * share
+        out[end + 1 :] += missing
+    return out
+
+
+def _drift(stance: Floats, headings: Floats, carriage: Carriage) -> Floats:
+    """How far the root travels in each step [2 T, 3], level, by what the corpus's bodies do in such stances."""
+    return rot.mul_vec(rot.about_vertical(headings[:-1]), stance[:-1] @ carriage.travel) * np.array([1.0, 0.0, 1.0])
 
 
 def _headings(

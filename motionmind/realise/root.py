@@ -1,4 +1,4 @@
-"""Where the body goes: the root carried along by the displacements that the corpus gives the root's moves."""
+"""Where the body goes: carried by its feet where they stand, as the corpus's bodies travel where none does."""
 
 from __future__ import annotations
 
@@ -9,70 +9,107 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
-from motionmind.grammar.transitions import Transitions
+from motionmind.realise.ways import kinds_of
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
+SLIP = 0.05  # what the corpus's own travel weighs beside a foot that stands
 
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
-    """How a corpus's bodies travel and stand.
+    """How a corpus's bodies hold themselves, travel and stand, in its postures and midway between them.
+
+    There are N moments: the postures, then the middle of each of the M moves. A step is half a move, two in each.
 
     Attributes:
-        travel: mean displacement that goes with each transition of the root's lane, metres, in the body's heading
-            when it sets out [E_0, 3].
-        clearance: height of each posture's lowest point above its clip's floor [N], metres, at least 0. The floor is
-            where the lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
+        orientations: of the lanes [N, L, 4].
+        weights: what each moment counts [N].
+        begins: moments from which the steps lead [2 M].
+        ends: the moment that each leads to [2 M].
+        shares: of each step among those that leave the same moment [2 M].
+        kinds: of which kind each part of each moment is [N, P], as `motionmind.realise.ways` says.
+        turn: mean turn about the vertical in the step out of each moment [N], radians.
+        travel: mean displacement of the root in it, metres, in the body's heading when it sets out [N, 3].
+        clearance: height of the lowest point above the clip's floor [N], metres, at least 0. The floor is where the
+            lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
     """
 
+    orientations: Floats
+    weights: Floats
+    begins: Ints
+    ends: Ints
+    shares: Floats
+    kinds: NDArray[np.int32]
+    turn: Floats
     travel: Floats
     clearance: Floats
 
 
-def learn_carriage(corpus: Corpus, states: NDArray[np.int32], transitions: Transitions) -> Carriage:
-    """How the bodies of a corpus travel and stand; `states` [N, L] are those of its postures."""
+def learn_carriage(corpus: Corpus) -> Carriage:
+    """How the bodies of a corpus hold themselves, travel and stand."""
     low = lowest(corpus.skeleton, corpus.rotations, corpus.root)
     floor = [np.quantile(low[clip.start : clip.stop], 0.05) for clip in corpus.clips]
     clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
-    return Carriage(_travel(corpus, states, transitions), clearance)
-
-
-def _travel(corpus: Corpus, states: NDArray[np.int32], transitions: Transitions) -> Floats:
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
-    turn = rot.about_vertical(rot.heading(corpus.rotations[begins, 0]))
-    moved = rot.mul_vec(rot.inv(turn), corpus.root[ends] - corpus.root[begins])
-    count = int(transitions.indptr[transitions.starts[1]])
-    size = int(transitions.starts[1])
-    key = states[begins, 0].astype(np.int64) * size + states[ends, 0]
-    listed = transitions.sources[:count] * size + transitions.targets[:count]
-    edge = np.searchsorted(listed, key)
-    counted = np.bincount(edge, weights, count)
-    return np.stack([np.bincount(edge, weights * moved[:, k], count) / counted for k in range(3)], axis=1)
+    shares = weights / np.bincount(begins, weights, len(corpus))[begins]
+    heading = rot.heading(corpus.rotations[:, 0])
+    turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
+    moved = rot.mul_vec(rot.about_vertical(-heading[begins]), corpus.root[ends] - corpus.root[begins])
+    lanes = corpus.to_lanes(corpus.rotations)
+    orientations = np.concatenate([lanes, rot.normalise(rot.slerp(lanes[begins], lanes[ends], 0.5))])
+    middles = len(corpus) + np.arange(len(begins))
+
+    def out_of(steps: Floats) -> Floats:
+        """What goes with a step out of each moment, from what goes with each move."""
+        return 0.5 * np.concatenate([np.bincount(begins, shares * steps, len(corpus)), steps])
+
+    # Midway the body has turned by half, and sees the rest of its way from there.
+    onward = rot.mul_vec(rot.about_vertical(-0.5 * turned), moved)
+    travel = [out_of(steps) for steps in moved.T]
+    for axis, steps in enumerate(onward.T):
+        travel[axis][len(corpus) :] = 0.5 * steps
+    return Carriage(
+        orientations,
+        np.concatenate([corpus.weights, weights]),
+        np.concatenate([begins, middles]),
+        np.concatenate([middles, ends]),
+        np.concatenate([shares, np.ones(len(begins))]),
+        kinds_of(corpus.skeleton, orientations),
+        out_of(turned),
+        np.stack(travel, axis=1),
+        np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
+    )
 
 
-def carry(
-    path: NDArray[np.int32],
-    headings: Floats,
-    seconds: Floats,
-    travel: Floats,
-    transitions: Transitions,
-    a: Floats,
-    b: Floats,
-) -> Floats:
-    """Positions [T + 1, 3] of the root at each posture of a path of states [T + 1, L], from `a` [3] to `b` [3].
+def carry(skeleton: Skeleton, rotations: Floats, clearance: Floats, drift: Floats, a: Floats, b: Floats) -> Floats:
+    """Positions [N, 3] of the root from `a` [3] to `b` [3], level; heights are as `stand` makes them.
 
-    Each move carries the root by `travel` [E_0, 3] of its transition, turned by the body's heading [T + 1] then; a
-    bridge by nothing. What is missing to `b` at the end is spread over the moves as they last, so no single one jumps.
+    From each frame to the next the points of the body that are near the floor are to stay, and the root is to go by
+    `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p how point p moves seen
+    from the root and w_p = exp(-height / GRIP), under the condition that they add up to b - a. So
+    v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is made up
+    where the body stands least.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        clearance: height of the lowest point above the floor [N], metres.
+        drift: how far the corpus's bodies would travel from each frame to the next [N - 1, 3].
+        a: first position of the root.
+        b: last position.
     """
-    steps = np.zeros((len(path) - 1, 3))
-    for t in range(len(steps)):
-        edge = transitions.edge(0, path[t, 0], path[t + 1, 0])
-        if edge >= 0:
-            steps[t] = rot.mul_vec(rot.about_vertical(headings[t]), travel[edge])
-    missing = b - a - steps.sum(axis=0)
-    share = seconds / seconds.sum() if len(seconds) else seconds
-    return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps + share[:, None] * missing, axis=0)]))
+    points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
+    height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP)
+    weight = SLIP + hold.sum(axis=1)
+    steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
+    slack = (1.0 / weight) / np.sum(1.0 / weight)
+    steps += slack[:, None] * (b - a - steps.sum(axis=0))
+    return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 
 def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats) -> Floats:
