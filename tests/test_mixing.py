@@ -372,9 +372,12 @@ def test_what_is_made_both_ways_alike_costs_what_it_did(walks: list[list[int]], 
 
 def test_the_root_travels_back_as_it_came() -> None:
     engine = learned([walk("thread", [0, 1, 3])], reverse=1.0)
-    travel = [edges(engine, np.append(engine.carriage.travel[:, k], np.zeros(999))) for k in range(3)]
-    assert travel[0] == {(0, 1): 1.0, (1, 0): -1.0, (1, 3): 2.0, (3, 1): -2.0}
-    assert set(travel[1].values()) | set(travel[2].values()) == {0.0}
+    # Out of the postures, of which the second goes on half as much forth and back; then from the middle of each move.
+    back = math.exp(-1.0)
+    between = (2.0 - back * 1.0) / (1.0 + back)
+    expected = 0.5 * np.array([1.0, between, -2.0, 1.0, 2.0, -1.0, -2.0])
+    np.testing.assert_allclose(engine.carriage.travel[:, 0], expected, atol=1e-12)
+    np.testing.assert_allclose(engine.carriage.travel[:, 1:], 0.0, atol=1e-12)
 
 
 def test_the_price_leaves_postures_and_how_joints_stand_together_alone() -> None:
@@ -434,8 +437,8 @@ def test_how_long_a_move_takes_and_where_it_leads_is_weighed_alike(home: Home) -
     assert edges(engine, engine.grammar.transitions.seconds) == pytest.approx({(0, 1): 0.26, (1, 0): 0.5})
     visits = dict(zip(steps(engine), engine.grammar.transitions.visits[:2].tolist(), strict=True))
     assert visits == {0: 1.5, 1: 1.25}
-    travel = edges(engine, np.append(engine.carriage.travel[:, 0], np.zeros(99)))
-    assert travel == pytest.approx({(0, 1): (3.0 + 0.25 * 1.0) / 1.25, (1, 0): -1.0})
+    np.testing.assert_allclose(engine.carriage.travel[:, 0], 0.5 * np.array([3.0, 0.0, 1.0, -1.0, 0.0, 3.0, 1.0, -1.0]))
+    np.testing.assert_allclose(engine.carriage.weights, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 0.25, 0.25])
 
 
 def test_how_joints_stand_together_is_weighed_alike(home: Home) -> None:

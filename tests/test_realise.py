@@ -17,7 +17,6 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.motion import Motion, Posture
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
-from motionmind.realise.samples import MOST, choose_samples, find_samples
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
 from motionmind.skeleton import Skeleton, human23
@@ -118,54 +117,6 @@ def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: f
     assert rot.angle(curve[1:], curve[:-1]).max() / (at[1] - at[0]) < 1.5 * fastest_between_keys
 
 
-# --- samples ----------------------------------------------------------------------------------------------------------
-
-
-def chosen_of(
-    path: NDArray[np.int32], states: NDArray[np.int32], orientations: Array, a: Array, b: Array
-) -> NDArray[np.int64]:
-    """Postures chosen of those with `states` and `orientations`."""
-    observed = find_samples(path, states)
-    return choose_samples(observed, orientations[observed, np.arange(path.shape[1])[:, None]], a, b)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_chosen_samples_are_the_smoothest_of_all(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lanes, moves = 3, int(rng.integers(2, 6))
-    states = rng.integers(0, 3, (14, lanes)).astype(np.int32)
-    states[:3] = np.arange(3)[:, None]  # every state occurs
-    orientations = rot.normalise(rng.normal(size=(14, lanes, 4)))
-    a, b = rot.normalise(rng.normal(size=(2, lanes, 4)))
-    path = rng.integers(0, 3, (moves + 1, lanes)).astype(np.int32)
-    chosen = chosen_of(path, states, orientations, a, b)
-    assert chosen.shape == (moves - 1, lanes)
-    for lane in range(lanes):
-        layers = [np.flatnonzero(states[:, lane] == state) for state in path[1:-1, lane]]
-
-        def cost(pick: tuple[int, ...] | NDArray[np.int64], lane: int = lane) -> float:
-            through = np.concatenate([a[None, lane], orientations[list(pick), lane], b[None, lane]])
-            return float(np.sum(rot.angle(through[1:], through[:-1]) ** 2))
-
-        assert all(pick in layer for pick, layer in zip(chosen[:, lane], layers, strict=True))
-        assert cost(chosen[:, lane]) == pytest.approx(min(map(cost, product(*layers))), abs=1e-9)
-
-
-def test_one_move_passes_through_nothing() -> None:
-    path = np.zeros((2, 3), dtype=np.int32)
-    ends = np.tile(rot.IDENTITY, (3, 1))
-    chosen = chosen_of(path, np.zeros((4, 3), dtype=np.int32), np.tile(rot.IDENTITY, (4, 3, 1)), ends, ends)
-    assert chosen.shape == (0, 3)
-
-
-def test_of_many_samples_even_ones_are_considered() -> None:
-    angles = np.linspace(0.0, 1.0, 10 * MOST)
-    states = np.zeros((len(angles), 1), dtype=np.int32)
-    a, b = rot.about_vertical(np.zeros(1)), rot.about_vertical(np.ones(1))
-    chosen = chosen_of(np.zeros((3, 1), np.int32), states, rot.about_vertical(angles)[:, None], a, b)
-    assert abs(angles[chosen[0, 0]] - 0.5) <= 0.5 / MOST
-
-
 # --- durations and the root -------------------------------------------------------------------------------------------
 
 
@@ -183,19 +134,6 @@ def test_moves_take_the_time_that_moving_lanes_took() -> None:
     usual = np.median(transitions.seconds)
     # A hold is timed by holds only where nothing moves; a bridge has no time of its own.
     np.testing.assert_allclose(durations(path, transitions), [0.1, 0.2, np.median([5.0, 5.0, 5.7 / 4.0]), usual])
-
-
-def test_the_root_is_carried_in_the_bodys_heading_and_ends_at_b() -> None:
-    transitions = graph(np.array([[0], [1], [2]]), [0.5, 0.5])
-    travel = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])  # a step ahead, then one twice as long
-    path = np.array([[0], [1], [2], [0]], dtype=np.int32)
-    seconds = np.array([1.0, 1.0, 2.0])
-    a, headings = np.array([1.0, 1.0, 1.0]), np.array([0.0, np.pi / 2.0, 0.0, 0.0])
-    ahead = a + np.array([[0.0, 0, 0], [0.0, 0, 1], [2.0, 0, 1], [2.0, 0, 1]])
-    np.testing.assert_allclose(carry(path, headings, seconds, travel, transitions, a, ahead[-1]), ahead, atol=1e-12)
-    b = ahead[-1] + np.array([0.4, 0.0, -0.8])
-    shared = ahead + np.array([0.0, 0.25, 0.5, 1.0])[:, None] * (b - ahead[-1])
-    np.testing.assert_allclose(carry(path, headings, seconds, travel, transitions, a, b), shared, atol=1e-12)
 
 
 def test_bodies_stand_as_high_as_they_are_told() -> None:
@@ -243,13 +181,13 @@ def learned(motion: Motion, facing: Facing = "free") -> Learned:
         states, sizes, centres = np.concatenate([states, steps[:, None]], axis=1), [*sizes, 24], [*centres, ring]
     pooled = 23 if facing == "free" else None
     transitions = count_transitions(states, np.array(sizes), corpus.begins, corpus.seconds, pooled=pooled)
-    return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus, states, transitions))
+    return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus))
 
 
 def realised(known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0) -> Motion:
     """The motion along postures `rows` of the corpus."""
     return realise(
-        known.states[rows], a, b, known.corpus, known.states, known, known.carriage, fps  # type: ignore[arg-type]
+        known.states[rows], a, b, known.corpus, known, known.carriage, fps  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -361,7 +299,7 @@ def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
     whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
     path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
     path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
-    found = realise(path, *turned, known.corpus, known.states, known, known.carriage, 60.0)  # type: ignore[arg-type]
+    found = realise(path, *turned, known.corpus, known, known.carriage, 60.0)  # type: ignore[arg-type]
     headings = np.unwrap(rot.heading(found.rotations[:, 0]))
     assert headings[-1] - headings[0] == pytest.approx(goal if way > 0 else goal - 2.0 * np.pi, abs=1e-9)
     assert np.all(way * np.diff(headings) > -1e-3)

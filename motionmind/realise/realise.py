@@ -13,6 +13,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
+from motionmind.realise.limits import within_limits
 from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
@@ -90,7 +91,7 @@ def realise(
         rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
         headings = rot.heading(poses[:, 0])
-    rotations = rot.normalise(corpus.from_lanes(rotations))
+    rotations = within_limits(a.skeleton, rot.normalise(corpus.from_lanes(rotations)))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -126,7 +127,7 @@ def _mean_way(
         for part, limb in enumerate(limbs(skeleton)):
             shown = np.ascontiguousarray(carriage.orientations[:, limb])
             near = np.ones((len(share), moments))
-            if path is not None:
+            if path is not None and end > start + 1:
                 near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, limb]]
             near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, limb])
             near[0] *= carriage.weights
@@ -153,7 +154,8 @@ def _brought(poses: Floats, centres: Floats, within: Floats) -> Floats:
 def _turning(turn: Floats, spread: Floats, facing: Mapping[int, Floats]) -> Floats:
     """Headings in radians [2 T + 1], unwrapped, that turn by `turn` [2 T] a step but are `facing`'s at its moves.
 
-    What is missing is made up by the steps in proportion to how much their turns vary (`spread`: mean squares), as the mean of normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
+    What is missing is made up by the steps in proportion to how much their turns vary (`spread`: mean squares), as the
+    mean of normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
     """
     out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     varies = np.maximum(spread - turn**2, 1e-4)
@@ -168,7 +170,8 @@ def _turning(turn: Floats, spread: Floats, facing: Mapping[int, Floats]) -> Floa
 
 def _drift(stance: Floats, headings: Floats, carriage: Carriage) -> Floats:
     """How far the root travels in each step [2 T, 3], level, by what the corpus's bodies do in such stances."""
-    return rot.mul_vec(rot.about_vertical(headings[:-1]), stance[:-1] @ carriage.travel) * np.array([1.0, 0.0, 1.0])
+    along = rot.mul_vec(rot.about_vertical(headings[:-1]), stance[:-1] @ carriage.travel)
+    return np.asarray(along * np.array([1.0, 0.0, 1.0]))
 
 
 def _headings(

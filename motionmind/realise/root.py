@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
-SLIP = 0.05  # what the corpus's own travel weighs beside a foot that stands
+SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,10 +21,10 @@ from motionmind.skeleton import Skeleton
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ALIKE = .6  # radians a joint (root mean square) within which a limb's postures are of one kind
-NEAR = .2  # the same, standard deviation: how near a walk's ends are to the postures that are given
+ALIKE = 0.2  # radians a joint (root mean square) within which a limb's postures are of one kind
+NEAR = 0.15  # the same, standard deviation: how near a walk's ends are to the postures that are given
 CLOSELY = 0.13  # the same: how closely a walk follows a path that it is to follow
-STRAIGHT_ON = .8  # share of moves after which a walk goes straight on as its clip does
+STRAIGHT_ON = 0.8  # share of steps after which a walk goes straight on as its clip does
 ANYWHERE = 0.01  # share after which it goes on from any posture, so that some walk joins any two
 
 
@@ -96,7 +96,7 @@ def nearness(orientations: Floats, posture: Floats, width: float) -> Floats:
     out = np.empty(len(orientations))
     for i in range(len(orientations)):
         out[i] = _squared(orientations[i], posture)
-    return np.exp((out.min() - out) / (2.0 * len(posture) * width**2))
+    return np.exp((out.min() - out) / (2.0 * len(posture) * width**2))  # type: ignore[no-any-return]
 
 
 @jit

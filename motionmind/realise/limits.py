@@ -1,0 +1,47 @@
+"""What no body does: joints beyond their limits are brought back to them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.notation.anatomy import Body
+from motionmind.notation.body_file import body
+from motionmind.skeleton import BODIES, Skeleton
+
+Floats = NDArray[np.float64]
+
+
+def within_limits(skeleton: Skeleton, rotations: Floats) -> Floats:
+    """The same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
+
+    Limits are those of the anatomy of human23 or human44, widened to what the first and the last posture have, which
+    were given. Angles are clipped one by one, as swing and twist; a body of another kind is left as it is.
+    """
+    known = [name for name, make in BODIES.items() if make().names == skeleton.names]
+    if not known:
+        return rotations
+    anatomy = body(known[0])
+    degrees = anatomy.degrees(rotations)
+    least, most = _limits(anatomy)
+    ends = degrees[[0, -1]]
+    clipped = np.clip(degrees, np.minimum(least, ends.min(axis=0)), np.maximum(most, ends.max(axis=0)))
+    beyond = np.any(clipped != degrees, axis=-1)
+    frames = np.flatnonzero(beyond.any(axis=1))
+    if len(frames) == 0:
+        return rotations
+    named = {name: clipped[frames, joint] for joint, name in enumerate(anatomy.skeleton.names)}
+    out = rotations.copy()
+    out[frames] = np.where(beyond[frames, :, None], anatomy.rotations(named), rotations[frames])
+    return out
+
+
+def _limits(anatomy: Body) -> tuple[Floats, Floats]:
+    """Least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite where none is said."""
+    least = np.full((len(anatomy.skeleton), 3), -np.inf)
+    most = -least
+    for index, name in enumerate(anatomy.skeleton.names):
+        for angle in anatomy.anatomy(name)[1].angles.values():
+            ends = sorted(angle.sign * end for end in angle.range)
+            least[index, angle.axis], most[index, angle.axis] = ends
+    return least, most
