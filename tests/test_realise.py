@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -15,10 +15,13 @@ from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.corpus.gather import gather
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.motion import Motion, Posture
+from motionmind.notation.body_file import body
+from motionmind.realise.limits import within_limits
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
 from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
+from motionmind.realise.ways import ANYWHERE, STRAIGHT_ON, likely, limbs, mean_rotations
 from motionmind.skeleton import Skeleton, human23
 
 Array = NDArray[np.float64]
@@ -145,6 +148,83 @@ def test_bodies_stand_as_high_as_they_are_told() -> None:
     np.testing.assert_array_equal(placed[:, [0, 2]], root[:, [0, 2]])
 
 
+def test_a_foot_that_stands_carries_the_body() -> None:
+    """A body that sways over its feet: from the postures alone the root's way is found again."""
+    stander, rest = human23(), np.tile(rot.IDENTITY, (30, 23, 1))
+    sway = rot.from_axis_angle([1.0, 0.0, 0.0], 0.2 * np.sin(np.arange(30) / 5.0))
+    rest[:, [stander.index("left_hip"), stander.index("right_hip")]] = sway[:, None]
+    rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
+    feet = [stander.index("left_toes"), stander.index("right_toes")]
+    seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
+    root = carry(stander, rest, np.zeros(30), np.zeros((29, 3)), -seen[0], -seen[-1])
+    np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
+    assert np.ptp(seen[:, 2]) > 0.1
+
+
+def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
+    motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
+    a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
+    flown = carry(human23(), motion.rotations, np.full(12, 3.0), drift, a, b)
+    missing = b - drift.sum(axis=0)
+    np.testing.assert_allclose(np.diff(flown, axis=0), drift + missing / 11.0, atol=1e-9)
+    np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
+
+
+# --- ways -------------------------------------------------------------------------------------------------------------
+
+
+def test_limbs_share_out_the_joints_and_what_carries_the_body_is_pelvis_and_legs() -> None:
+    names = human23().names
+    *parts, carrying = ([names[j] for j in part] for part in limbs(human23()))
+    assert sorted(name for part in parts for name in part) == sorted(names)
+    assert parts[0] == ["pelvis", "lumbar", "thorax"]
+    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in parts
+    assert carrying == ["pelvis", *parts[1], *parts[2]]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count, steps = 4, 3
+    begins, ends = np.array([0, 1, 2, 2]), np.array([1, 2, 3, 0])
+    shares = np.array([1.0, 1.0, 0.3, 0.7])
+    kinds = np.array([0, 1, 0, 1], dtype=np.int32)
+    near = rng.uniform(0.1, 1.0, (steps + 1, count))
+    go = np.zeros((count, count))
+    go[begins, ends] = shares
+    alike = (kinds[:, None] == kinds) / 2.0
+    move = go @ (
+        STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * np.full((count, count), 0.25)
+    )
+    expected = np.zeros((steps + 1, count))
+    for walked in product(range(count), repeat=steps + 1):
+        weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
+        expected[np.arange(steps + 1), walked] += weight
+    expected /= expected.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(likely(begins, ends, shares, kinds, near), expected, atol=1e-12)
+
+
+def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
+    rng = np.random.default_rng(0)
+    angles = np.radians([10.0, 30.0])
+    q = rot.about_vertical(angles)[:, None] * rng.choice([-1.0, 1.0], (2, 1, 1))
+    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.tile(rot.IDENTITY, (2, 1, 1)))
+    np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
+
+
+def test_joints_are_brought_to_their_limits_and_no_further() -> None:
+    anatomy = body("human23")
+    q = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (3, 1, 1))
+    bent = anatomy.rotations({"left_knee": np.array([[170.0, 0.0, 0.0]]), "right_hip": np.array([[0.0, 100.0, 0.0]])})
+    q[1] = bent[0]
+    limited = anatomy.degrees(within_limits(human23(), q))[1]
+    assert limited[human23().index("left_knee"), 0] == pytest.approx(150.0)
+    assert limited[human23().index("right_hip"), 1] == pytest.approx(80.0)
+    np.testing.assert_array_equal(within_limits(human23(), q)[[0, 2]], q[[0, 2]])
+    q[2] = q[1]  # what is given is not changed, nor what goes no further
+    np.testing.assert_array_equal(within_limits(human23(), q), q)
+
+
 # --- the whole --------------------------------------------------------------------------------------------------------
 
 
@@ -184,10 +264,12 @@ def learned(motion: Motion, facing: Facing = "free") -> Learned:
     return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus))
 
 
-def realised(known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0) -> Motion:
+def realised(
+    known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0, within: Array | None = None
+) -> Motion:
     """The motion along postures `rows` of the corpus."""
     return realise(
-        known.states[rows], a, b, known.corpus, known, known.carriage, fps  # type: ignore[arg-type]
+        known.states[rows], a, b, known.corpus, known, known.carriage, fps, within=within  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -213,17 +295,29 @@ def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, r
     assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
 
 
+def test_a_path_that_is_followed_is_in_its_states_at_each_move(walking: Learned) -> None:
+    motion, rows = walk(), [5, 6, 7, 20, 21, 30, 8, 9]
+    for within in (1e-6, np.radians(5.0)):
+        found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, np.full(23, within))
+        at = found.at(found.insertions[0].times)
+        lanes = [walking.corpus.to_lanes(q)[:, :23] for q in (at.rotations, motion.rotations[rows])]
+        # Between two frames the spline is not the arc that `at` takes; a frame is 1 / 60 s.
+        assert rot.angle(*lanes).max() < within + 0.02
+    assert rot.angle(*lanes).max() > 0.02
+
+
 def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
+    """The mean way lies near what was done between the same postures, and much nearer than the straight way."""
     motion = walk()
-    rows = list(range(5, 25))
-    found = realised(walking, rows, motion.posture(5), motion.posture(24), fps=5.0)
-    lanes = [walking.corpus.to_lanes(q)[:, :23] for q in (found.rotations, motion.rotations[rows])]
-    assert rot.angle(*lanes).max() < 1e-6
-    # Every state was left by one move only, so its travel is that move's.
-    if walking.corpus.facing == "stage":  # the free facing is known to within its states' width only
-        np.testing.assert_allclose(found.root, motion.root[rows], atol=1e-6)
-    turned = rot.heading(found.rotations[:, 0]) - rot.heading(motion.rotations[rows, 0])
-    assert np.degrees(np.abs(turned)).max() < 15.0
+    rows = list(range(5, 17))
+    found = realised(walking, rows, motion.posture(5), motion.posture(16), fps=5.0)
+    share = np.linspace(0.0, 1.0, len(rows))[:, None]
+    straight = rot.slerp(motion.rotations[5], motion.rotations[16], share)
+    off, straight_off = (
+        rot.angle(*(walking.corpus.to_lanes(x)[:, :23] for x in (q, motion.rotations[rows]))).mean()
+        for q in (found.rotations, straight)
+    )
+    assert off < 0.5 * straight_off
 
 
 def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned) -> None:
@@ -248,10 +342,12 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     root = jumping.root.copy()
     root[10:13, 1] += 0.25
     known = learned(replace(jumping, root=root))
-    grounded = walk()
-    found = realised(known, list(range(5, 18)), grounded.posture(5), grounded.posture(17), fps=5.0)
+    grounded, rows = walk(), list(range(5, 18))
+    found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, np.full(23, 1e-6))
     heights = lowest(human23(), found.rotations, found.root)
-    np.testing.assert_allclose(heights, [0.0] * 5 + [0.25] * 3 + [0.0] * 5, atol=1e-6)
+    assert heights.argmax() in (5, 6, 7)
+    assert 0.1 < heights.max() <= 0.25 + 1e-9
+    assert heights[[0, 1, 2, -3, -2, -1]].max() < 0.03
 
 
 def test_no_frame_jumps(walking: Learned) -> None:
@@ -299,7 +395,9 @@ def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
     whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
     path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
     path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
-    found = realise(path, *turned, known.corpus, known, known.carriage, 60.0)  # type: ignore[arg-type]
+    found = realise(
+        path, *turned, known.corpus, known, known.carriage, 60.0, within=np.full(23, 0.3)  # type: ignore[arg-type]
+    )  # fmt: skip
     headings = np.unwrap(rot.heading(found.rotations[:, 0]))
     assert headings[-1] - headings[0] == pytest.approx(goal if way > 0 else goal - 2.0 * np.pi, abs=1e-9)
     assert np.all(way * np.diff(headings) > -1e-3)

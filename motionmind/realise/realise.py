@@ -81,10 +81,13 @@ def realise(
         inner = np.array([move for move in range(len(path)) if move not in stops], dtype=np.intp)
         poses[2 * inner] = _brought(poses[2 * inner], centres[inner], within)
     rotations = rotation_spline(halves, poses, times)
+    # Each step leads to the middle of a move or from there.
+    steps = stance[:-1, -len(carriage.turn) :] + stance[1:, -len(carriage.turn) :]
+    steps /= steps.sum(axis=1, keepdims=True)
     if corpus.facing == "free":
         facing = {move: lanes[-1] for move, lanes in stops.items()}
         if within is None:
-            headings = _turning(stance[:-1] @ carriage.turn, stance[:-1] @ carriage.turn**2, facing)
+            headings = _turning(steps @ carriage.turn, steps @ carriage.turn**2, facing)
         else:
             headings = natural_spline(keys, _headings(path[:, -1], grammar, seconds, facing), halves)
         turn = rot.about_vertical(natural_spline(halves, headings, times))
@@ -102,7 +105,7 @@ def realise(
     heights[[2 * move for move in low]] = list(low.values())
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
-    places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(stance, headings, carriage), axis=0)])
+    places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(steps @ carriage.travel, headings), axis=0)])
     drift = np.diff(natural_spline(halves, places, times), axis=0)
     root = stand(a.skeleton, rotations, carry(a.skeleton, rotations, clear, drift, a.root, b.root), heights)
     root[0], root[-1] = a.root, b.root
@@ -168,9 +171,9 @@ def _turning(turn: Floats, spread: Floats, facing: Mapping[int, Floats]) -> Floa
     return out
 
 
-def _drift(stance: Floats, headings: Floats, carriage: Carriage) -> Floats:
-    """How far the root travels in each step [2 T, 3], level, by what the corpus's bodies do in such stances."""
-    along = rot.mul_vec(rot.about_vertical(headings[:-1]), stance[:-1] @ carriage.travel)
+def _drift(travel: Floats, headings: Floats) -> Floats:
+    """How far the root goes in each step [2 T, 3], level, by its `travel` in the body's own heading midway [2 T, 3]."""
+    along = rot.mul_vec(rot.about_vertical(0.5 * (headings[1:] + headings[:-1])), travel)
     return np.asarray(along * np.array([1.0, 0.0, 1.0]))
 
 

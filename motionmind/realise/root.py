@@ -32,8 +32,8 @@ class Carriage:
         ends: the moment that each leads to [2 M].
         shares: of each step among those that leave the same moment [2 M].
         kinds: of which kind each part of each moment is [N, P], as `motionmind.realise.ways` says.
-        turn: mean turn about the vertical in the step out of each moment [N], radians.
-        travel: mean displacement of the root in it, metres, in the body's heading when it sets out [N, 3].
+        turn: turn about the vertical in each half of each move [M], radians.
+        travel: displacement of the root in it, metres, in the body's heading midway [M, 3].
         clearance: height of the lowest point above the clip's floor [N], metres, at least 0. The floor is where the
             lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
     """
@@ -58,20 +58,10 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     shares = weights / np.bincount(begins, weights, len(corpus))[begins]
     heading = rot.heading(corpus.rotations[:, 0])
     turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
-    moved = rot.mul_vec(rot.about_vertical(-heading[begins]), corpus.root[ends] - corpus.root[begins])
+    moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
     lanes = corpus.to_lanes(corpus.rotations)
     orientations = np.concatenate([lanes, rot.normalise(rot.slerp(lanes[begins], lanes[ends], 0.5))])
     middles = len(corpus) + np.arange(len(begins))
-
-    def out_of(steps: Floats) -> Floats:
-        """What goes with a step out of each moment, from what goes with each move."""
-        return 0.5 * np.concatenate([np.bincount(begins, shares * steps, len(corpus)), steps])
-
-    # Midway the body has turned by half, and sees the rest of its way from there.
-    onward = rot.mul_vec(rot.about_vertical(-0.5 * turned), moved)
-    travel = [out_of(steps) for steps in moved.T]
-    for axis, steps in enumerate(onward.T):
-        travel[axis][len(corpus) :] = 0.5 * steps
     return Carriage(
         orientations,
         np.concatenate([corpus.weights, weights]),
@@ -79,8 +69,8 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
         kinds_of(corpus.skeleton, orientations),
-        out_of(turned),
-        np.stack(travel, axis=1),
+        0.5 * turned,
+        0.5 * moved,
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
     )
 
