@@ -207,7 +207,9 @@ class Engine(Learned):
             dict(zip(certificate.passed, postures, strict=True)),
             np.radians(self.space.tolerances[: len(a.skeleton)]) if follow else None,
         )
+        realising = perf_counter() - began
         (insertion,) = motion.insertions
+        passing_by = self.corpus.to_lanes(motion.at(insertion.times).rotations)
         # A facing that is bridged shows at the root, which turns with it.
         named = ((a.skeleton.names[0] if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
         bridged = tuple(dict.fromkeys(named))
@@ -224,6 +226,7 @@ class Engine(Learned):
             shared=shared_moves(certificate.path, [other.path for other in unlike]),
             passed=certificate.passed,
             snap_degrees=snap[[0, -1]],
+            path_degrees=self.space.distance(passing_by, certificate.path),
             via_degrees=snap[1:-1],
             sources=sources,
             expansions=certificate.expansions,
@@ -235,7 +238,7 @@ class Engine(Learned):
                 "problem": posing + certificate.seconds["problem"],
                 "bound": certificate.seconds["bound"],
                 "search": certificate.seconds["search"],
-                "realise": perf_counter() - began,
+                "realise": realising,
             },
             posed=searched,
             asked={

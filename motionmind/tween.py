@@ -89,7 +89,8 @@ class Tween:
         shared: how many moves of joints it shares with the tweens that it was to differ from, counted for each of them.
         passed: the moves at which it passes the postures that it was to pass through.
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
-        via_degrees: the same for the postures that it was to pass through [K, L].
+        path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
+        via_degrees: angle to their states for the postures that it was to pass through [K, L].
         sources: for each move and lane one place in the corpus that attests it, None where none does.
         expansions: of A*.
         peak_nodes: the greatest number of nodes that A* held.
@@ -112,6 +113,7 @@ class Tween:
     shared: int
     passed: tuple[int, ...]
     snap_degrees: Floats
+    path_degrees: Floats
     via_degrees: Floats
     sources: tuple[tuple[Source | None, ...], ...]
     expansions: int
@@ -138,7 +140,7 @@ class Tween:
         Lists of rows are by move or posture, then by joint. The `costs` add up to the cost: those of all joints' moves,
         of how they coordinate, and `per_move` for each move.
         """
-        account = self.account
+        account, off = self.account, self.path_degrees[1:-1]
         return {
             "asked": self.asked,
             "status": self.status,
@@ -166,6 +168,7 @@ class Tween:
                 end: dict(zip(self.joints, map(float, row), strict=True))
                 for end, row in zip("AB", self.snap_degrees, strict=True)
             },
+            "path_degrees": {"mean": float(off.mean()), "most": float(off.max())} if off.size else {},
             "sources": [[None if source is None else asdict(source) for source in row] for row in self.sources],
             "times": self.motion.insertions[0].times.tolist(),
             "names": [list(row) for row in account.names],

@@ -39,7 +39,7 @@ def realise(
 
     Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
     are as in the postures there. Between them each limb is, at the times of the moves, where the mean of all ways is
-    that the corpus knows from `a` to `b` in as many moves (`motionmind.realise.ways`); a C2 spline joins them. With
+    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them. With
     `within` ways count the more the nearer they are to the path, and each joint is then brought into its state.
 
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
@@ -64,6 +64,7 @@ def realise(
     seconds = durations(path, grammar.transitions)
     frames = max(1, round((length or float(seconds.sum())) * fps))
     fps = frames / length if length else fps
+    count = max(1, round((len(path) - 1) * frames / fps / float(seconds.sum())))
     seconds *= frames / fps / seconds.sum()
     keys = np.concatenate([[0.0], np.cumsum(seconds)])
     times = np.arange(frames + 1) / fps
@@ -76,6 +77,10 @@ def realise(
     stops = {move: corpus.to_lanes(posture.rotations) for move, posture in postures.items()}
     centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
     halves = np.insert(keys, np.arange(1, len(keys)), 0.5 * (keys[1:] + keys[:-1]))
+    if within is None and not through and count != len(path) - 1:
+        # A path may take more moves than there is time for; the corpus's ways are not to be hurried.
+        halves = np.linspace(0.0, keys[-1], 2 * count + 1)
+        stops = {0: stops[0], count: stops[len(path) - 1]}
     poses, stance = _mean_way(a.skeleton, carriage, stops, halves, None if within is None else centres)
     if within is not None:
         inner = np.array([move for move in range(len(path)) if move not in stops], dtype=np.intp)
@@ -98,11 +103,11 @@ def realise(
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
-    low = {move: lowest(a.skeleton, posture.rotations, posture.root) for move, posture in postures.items()}
+    low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
     # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(halves, keys[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
+    floor = np.interp(halves, keys[[0, -1]], np.minimum([low[0], low[-1]], 0.0))
     heights = stance @ carriage.clearance + floor
-    heights[[2 * move for move in low]] = list(low.values())
+    heights[[2 * move for move in stops]] = low
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(steps @ carriage.travel, headings), axis=0)])
