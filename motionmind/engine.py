@@ -22,7 +22,7 @@ from motionmind.grammar.progression import fit_progression
 from motionmind.grammar.transitions import Weights
 from motionmind.learned import Learned, States
 from motionmind.mapping import joint_mapping
-from motionmind.motion import FASTEST, Posture
+from motionmind.motion import FASTEST, Motion, Posture
 from motionmind.posturewise import diagnose_posturewise, nearest_posture
 from motionmind.realise.realise import realise
 from motionmind.realise.timing import usual
@@ -35,7 +35,7 @@ from motionmind.search.progression import of_moves
 from motionmind.search.sample import drawn
 from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
-from motionmind.tween import Posed, Tween, explain
+from motionmind.tween import Floats, Posed, Tween, explain
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -149,8 +149,7 @@ class Engine(Learned):
         if duration is not None:
             least, most = self._moves_in(duration, fps, moves, least, most)
         fixed = moves is not None or duration is not None
-        if follow is None:
-            follow = bool(pin or hold or avoid or via or unlike or sample or posturewise or strict or novelty)
+        follow = follow if follow is not None else any((pin, hold, avoid, via, unlike, sample, posturewise, novelty))
         a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
         postures, at = self._vias(via)
         began = perf_counter()
@@ -209,7 +208,6 @@ class Engine(Learned):
         )
         realising = perf_counter() - began
         (insertion,) = motion.insertions
-        passing_by = self.corpus.to_lanes(motion.at(insertion.times).rotations)
         # A facing that is bridged shows at the root, which turns with it.
         named = ((a.skeleton.names[0] if bridge.joint == FACING else bridge.joint, bridge.move) for bridge in bridges)
         bridged = tuple(dict.fromkeys(named))
@@ -226,7 +224,7 @@ class Engine(Learned):
             shared=shared_moves(certificate.path, [other.path for other in unlike]),
             passed=certificate.passed,
             snap_degrees=snap[[0, -1]],
-            path_degrees=self.space.distance(passing_by, certificate.path),
+            path_degrees=self._off(motion, certificate.path),
             via_degrees=snap[1:-1],
             sources=sources,
             expansions=certificate.expansions,
@@ -267,6 +265,10 @@ class Engine(Learned):
                 "follow": follow,
             },
         )
+
+    def _off(self, motion: Motion, path: States) -> Floats:
+        """Degrees [T + 1, L] between the motion's orientations at its moves and the states of a path."""
+        return self.space.distance(self.corpus.to_lanes(motion.at(motion.insertions[0].times).rotations), path)
 
     def _answer(
         self,

@@ -241,6 +241,7 @@ REPORT = [
     "shared",
     "vias",
     "snap_degrees",
+    "path_degrees",
     "sources",
     "times",
     "names",

@@ -357,7 +357,8 @@ def test_a_tween_against_the_time_of_the_corpus_costs_the_price_a_move_and_joint
     assert not any(s.reversed for row in forth.sources for s in row if s)
     # It takes as long, and goes back over the ground that it came.
     np.testing.assert_allclose(back.motion.insertions[0].times, forth.motion.insertions[0].times)
-    np.testing.assert_allclose(back.motion.root, forth.motion.root[::-1], atol=0.1)
+    if price == 0.0:  # the mean way is the same only where both directions count alike
+        np.testing.assert_allclose(back.motion.root, forth.motion.root[::-1], atol=0.1)
     with pytest.raises(Exception, match="no path from A to B"):
         learned([clip]).tween(b, a, strict=True)
 

@@ -116,6 +116,12 @@ def app(context: click.Context) -> None:
 @click.option("--tau", type=NATS, default=1.0, help="Nats for each move.")
 @click.option("--bridge-price", type=NATS, default=1.0, help="Nats for each degree of an unattested move.")
 @click.option("--fps", type=RATE, default=30.0, help="Frames a second of the motion.")
+@click.option(
+    "--follow/--mean",
+    default=None,
+    help="The motion keeps to the path's states, or is the mean of the corpus's ways  [default: --mean, unless more "
+    "than a length is asked of the path]",
+)
 @HOME
 def tween(
     a: Path,

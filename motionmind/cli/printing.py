@@ -105,6 +105,12 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         worst = int(row.argmax())
         mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
         lines.append((stop, f"{where}{mean} off the corpus's states, at most {most}"))
+    if result.moves > 1:
+        kind = "keeps to the path" if result.asked["follow"] else "the mean of the corpus's ways"
+        off = result.path_degrees[1:-1]
+        lines.append(
+            ("motion", f"{kind}: {off.mean():.1f} degrees a joint off its states on the way, at most {off.max():.1f}")
+        )
     if files:
         lines.append(("written", ", ".join(map(click.format_filename, files))))
     for name, line in lines:

@@ -18,10 +18,9 @@ def within_limits(skeleton: Skeleton, rotations: Floats) -> Floats:
     Limits are those of the anatomy of human23 or human44, widened to what the first and the last posture have, which
     were given. Angles are clipped one by one, as swing and twist; a body of another kind is left as it is.
     """
-    known = [name for name, make in BODIES.items() if make().names == skeleton.names]
-    if not known:
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None:
         return rotations
-    anatomy = body(known[0])
     degrees = anatomy.degrees(rotations)
     least, most = _limits(anatomy)
     ends = degrees[[0, -1]]
@@ -34,6 +33,11 @@ def within_limits(skeleton: Skeleton, rotations: Floats) -> Floats:
     out = rotations.copy()
     out[frames] = np.where(beyond[frames, :, None], anatomy.rotations(named), rotations[frames])
     return out
+
+
+def anatomy_of(skeleton: Skeleton) -> Body | None:
+    """What is known of a body that has the joints of human23 or human44, whatever its proportions."""
+    return next((body(name) for name, make in BODIES.items() if make().names == skeleton.names), None)
 
 
 def _limits(anatomy: Body) -> tuple[Floats, Floats]:

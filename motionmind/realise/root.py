@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
+from motionmind.notation.anatomy import SIDES
+from motionmind.realise.limits import anatomy_of
 from motionmind.realise.ways import kinds_of
 from motionmind.skeleton import Skeleton
 
@@ -110,5 +112,16 @@ def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats
 
 
 def lowest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """Heights [...] of the lowest joint or tip of postures with local rotations [..., J, 4] and root [..., 3]."""
-    return np.asarray(skeleton.positions_and_tips(rotations, root)[..., 1].min(axis=-1))
+    """Heights [...] of the lowest joint, tip or heel of postures with local rotations [..., J, 4] and root [..., 3].
+
+    Heels are known of bodies with an anatomy, whose proportions they are given in.
+    """
+    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
+    least, anatomy = heights.min(axis=-1), anatomy_of(skeleton)
+    if anatomy is not None and anatomy.leg is not None:
+        heel = np.array(anatomy.leg.heel) * skeleton.height / anatomy.skeleton.height
+        ankles = [anatomy.named(anatomy.leg.ankle, side) for side in SIDES]
+        turned = skeleton.global_rotations(rotations)[..., ankles, :]
+        heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
+        least = np.minimum(least, (heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]).min(axis=-1))
+    return np.asarray(least)
