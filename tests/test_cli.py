@@ -30,7 +30,19 @@ ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("ara
 REPORT = {
     *("asked", "shared", "vias"),
     *("status", "cost", "lower_bound", "gap", "moves", "expansions", "peak_nodes", "node_budget", "seconds", "joints"),
-    *("path", "attested", "bridges", "waits", "snap_degrees", "sources", "times", "names", "degrees", "likelihood"),
+    *(
+        "path",
+        "attested",
+        "bridges",
+        "waits",
+        "snap_degrees",
+        "path_degrees",
+        "sources",
+        "times",
+        "names",
+        "degrees",
+        "likelihood",
+    ),
     *("costs", "asked", "vias", "shared"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
@@ -137,7 +149,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert ran.err.count("\n") == 1
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
-    assert list(table) == ["moves", "cost", "proven", "attested", "bridged", "waited", "A", "B", "written"]
+    assert list(table) == ["moves", "cost", "proven", "attested", "bridged", "waited", "A", "B", "motion", "written"]
     assert f" {report['moves']}, in " in table["moves"]
     assert f"{report['cost']:.3f}" in table["cost"]
     assert f"{report['lower_bound']:.3f}, gap {report['gap']:.2%}" in table["proven"]
