@@ -182,7 +182,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
         last = nodes.tally[_HEAPED]
         nodes.heap[last], nodes.slot[node] = node, last  # behind the heap, where there is room now
         many += _mark(nodes, kept, node)
-    others = nodes.tally[_NODES] > many
+    others = bool(nodes.tally[_NODES] > many)
     nodes.tally[_HEAPED] = 0
     for k in range(size):
         node = nodes.heap[k]
