@@ -151,8 +151,8 @@ _REGISTRY = (
         parameters={"alpha": 9.0, "beta": 100.0 / 7.0, "inner": -8.0 / 7.0, "outer": -5.0 / 7.0},
         dimensions=_XYZ,
         about="x' = alpha (y - x - f(x)), y' = x - y + z, z' = -beta y, where f has the slope `inner` up to |x| = 1 "
-        "and `outer` beyond: Chua's circuit, with the double scroll; Matsumoto, Chua and Komuro, IEEE Trans. CAS 32:797 "
-        "(1985)",
+        "and `outer` beyond: Chua's circuit, with the double scroll; Matsumoto, Chua and Komuro, IEEE Trans. CAS "
+        "32:797 (1985)",
     ),
     Flow(
         "duffing",

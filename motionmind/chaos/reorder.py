@@ -84,14 +84,7 @@ def reorder(sites: Floats, points: Floats) -> Ints:
     Raises:
         MotionMindError: there is no site, or points and sites are no finite numbers of the same dimension.
     """
-    sites, points = np.asarray(sites, dtype=np.float64), np.asarray(points, dtype=np.float64)
-    if sites.ndim != 2 or points.ndim != 2 or sites.shape[1] != points.shape[1] or sites.size == 0:
-        raise MotionMindError(
-            f"points of shape {list(points.shape)} cannot be told by sites of shape {list(sites.shape)}: "
-            "that takes sites [N, d], one at least, and points [L, d]"
-        )
-    if not (np.isfinite(sites).all() and np.isfinite(points).all()):
-        raise MotionMindError("sites and points must be finite numbers")
+    sites, points = checked(sites, points)
     from scipy.spatial import cKDTree
 
     # Of sites that coincide the first stands for all; where the first coordinates differ, no sites do.
@@ -101,12 +94,29 @@ def reorder(sites: Floats, points: Floats) -> Ints:
     tree = cKDTree(sites[labels], balanced_tree=False, compact_nodes=False)
     if len(labels) == 1:
         return np.full(len(points), labels[0], dtype=np.int64)
-    distances, found = tree.query(points, k=2)
-    indices = labels[found[:, 0]]
-    for n in np.flatnonzero(distances[:, 1] <= distances[:, 0] * (1.0 + _ROUNDING)):
-        near = np.sort(labels[tree.query_ball_point(points[n], distances[n, 0] * (1.0 + _ROUNDING))])
+    # Points that are near each other ask for the same part of the tree: one after another they take half the time.
+    order = cKDTree(points, leafsize=64, balanced_tree=False, compact_nodes=False).indices
+    distances, found = tree.query(points[order], k=2)
+    indices = np.empty(len(points), dtype=np.int64)
+    indices[order] = labels[found[:, 0]]
+    tied = distances[:, 1] <= distances[:, 0] * (1.0 + _ROUNDING)
+    for n, reach in zip(order[tied], distances[tied, 1], strict=True):
+        near = np.sort(labels[tree.query_ball_point(points[n], reach * (1.0 + _ROUNDING))])
         indices[n] = near[np.argmin(np.sum((sites[near] - points[n]) ** 2, axis=1))]
-    return np.asarray(indices, dtype=np.int64)
+    return indices
+
+
+def checked(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Sites [N, d] and points [L, d] that can be compared: finite numbers, one site at least; else MotionMindError."""
+    sites, points = np.asarray(sites, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    if sites.ndim != 2 or points.ndim != 2 or sites.shape[1] != points.shape[1] or sites.size == 0:
+        raise MotionMindError(
+            f"points of shape {list(points.shape)} cannot be told by sites of shape {list(sites.shape)}: "
+            "that takes sites [N, d], one at least, and points [L, d]"
+        )
+    if not (np.isfinite(sites).all() and np.isfinite(points).all()):
+        raise MotionMindError("sites and points must be finite numbers")
+    return sites, points
 
 
 def runs(indices: Ints) -> Ints:

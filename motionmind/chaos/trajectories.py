@@ -169,7 +169,7 @@ class _Run:
 
     def _diverged(self, steps: int) -> MotionMindError:
         return MotionMindError(
-            f"{self.flow.label} diverges from {_written(self.start)}: after {steps} steps of {self.step:g} it is "
+            f"{self.flow.label} diverges from {_written(self.start)}: within {steps} steps of {self.step:g} it is "
             f"farther than {_FAR:g} from the origin; a start nearer to {_written(self.flow.start)} or a smaller step "
             "may stay on the attractor"
         )
