@@ -40,8 +40,8 @@ def either(function: _F) -> _F:
 def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> Any:
     """`function` compiled for numba's `signature` alone, and told by its address: one compiled loop serves all such.
 
-    A loop that is given another compiled function as it is would be compiled for it anew in every process. An
-    exception inside is lost. `keep` stores it on disk, for functions of this package.
+    A loop that is given a function of `jit` would be compiled for it anew in every process. An exception inside is
+    lost. `keep` stores it on disk: for functions of this package, which may be closures over others and over values.
 
     Raises:
         numba.core.errors.NumbaError: it cannot be compiled.

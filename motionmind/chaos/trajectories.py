@@ -12,11 +12,10 @@ Source: Benettin, Galgani and Strelcyn, "Kolmogorov entropy and numerical experi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from types import FunctionType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +25,7 @@ from motionmind.errors import MotionMindError
 from motionmind.jit import either, jit, pointer
 
 Floats = NDArray[np.float64]
+Step = Callable[[Floats, float, tuple[float, ...], Floats, Floats], None]
 
 _FAR = 1e9  # farther from the origin than any attractor: the trajectory has left for infinity
 _APART = 1e-8  # how far Benettin's second trajectory is put from the first, against 1 + |x|
@@ -99,14 +99,10 @@ def largest_exponent(
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A flow from a start with a step, its arguments checked.
-
-    `code` is its compiled field, or the field as it is, and takes a point and `parameters`.
-    """
+    """A flow from a start with a step, its arguments checked; `compiled` is None where its field cannot be."""
 
     flow: Flow
-    code: Any
-    parameters: tuple[float, ...]
+    compiled: Step | None
     start: Floats
     step: float
     transient: int
@@ -130,25 +126,28 @@ class _Run:
             raise MotionMindError(f"{flow.name}: its field fails at {_written(begin)}: {error}") from error
         if shape != (d,):
             raise MotionMindError(f"{flow.name}: its field gives an array {list(shape)} at a point [{d}], not [{d}]")
-        code, parameters = _compiled(flow.field, d, tuple(flow.parameters.values()))
-        return cls(flow, code, parameters, begin, step, transient)
+        return cls(flow, _compiled(flow.field, d, len(flow.parameters)), begin, step, transient)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        return tuple(self.flow.parameters.values())
 
     def settled(self) -> Floats:
         """Where the transient ends [d]."""
         return self.follow(self.start, 2, self.transient)[1] if self.transient else self.start
 
     def follow(self, start: Floats, count: int, every: int) -> Floats:
-        follow = _follow if self.code is self.flow.field else _follow_compiled
-        points, steps = follow(self.code, self.parameters, start, self.step, count, every)
-        if steps < (count - 1) * every:
-            raise self._diverged(steps)
+        follow, advance = (_follow_compiled, self.compiled) if self.compiled else (_follow, _step_of(self.flow.field))
+        points, kept = follow(advance, self.parameters, start, self.step, count, every)
+        if kept < count:
+            raise self._diverged(kept * every)
         return points
 
     def growth(self, start: Floats, steps: int, enough: float) -> tuple[float, int]:
         """Nats by which neighbours part, and in how many steps."""
-        part = _part if self.code is self.flow.field else _part_compiled
-        growth, used = part(self.code, self.parameters, start, self.step, steps, enough)
-        if not np.isfinite(growth):
+        part, advance = (_part_compiled, self.compiled) if self.compiled else (_part, _step_of(self.flow.field))
+        growth, used = part(advance, self.parameters, start, self.step, steps, enough)
+        if np.isnan(growth):
             raise self._diverged(used)
         return float(growth), int(used)
 
@@ -165,7 +164,7 @@ class _Run:
             )
 
     def speed(self, point: Floats) -> float:
-        return float(np.linalg.norm(self.flow.field(point.copy(), *self.flow.parameters.values())))
+        return float(np.linalg.norm(self.flow.field(point.copy(), *self.parameters)))
 
     def _diverged(self, steps: int) -> MotionMindError:
         return MotionMindError(
@@ -183,45 +182,50 @@ def _written(point: Sequence[float] | Floats) -> str:
 
 
 @cache
-def _compiled(field: Field, d: int, parameters: tuple[float, ...]) -> tuple[Any, tuple[float, ...]]:
-    """The field as a pointer to code for points [d], or itself where numba cannot compile it, and what else it takes.
+def _compiled(field: Field, d: int, parameters: int) -> Step | None:
+    """A step of the field, in d dimensions and with so many parameters, as a pointer; None if numba cannot compile it.
 
-    Flows of our own take their parameters, so that code on disk serves all of them; others have theirs compiled in.
+    Only those of our own fields are kept on disk, where what they are compiled from is known.
     """
     from numba import types
     from numba.core.errors import NumbaError
-    from numba.np.unsafe import ndarray
 
-    to_fixed_tuple: Any = ndarray.to_fixed_tuple
-    point, rates = types.float64[::1], types.UniTuple(types.float64, d)  # type: ignore[no-untyped-call]
-    if field.__module__ == Flow.__module__:
-        return pointer(field, rates(point, *(len(parameters) * [types.float64])), keep=True), parameters
-    inner = either(getattr(field, "py_func", field))
-    for form in (lambda x: inner(x, *parameters), lambda x: to_fixed_tuple(inner(x, *parameters), d)):
-        with suppress(NumbaError):
-            return pointer(form, rates(point), keep=False), ()
-    return field, parameters
+    point, number = types.float64[::1], types.float64
+    values = types.Tuple([number] * parameters)  # type: ignore[no-untyped-call]
+    plain = getattr(field, "py_func", field)
+    if not isinstance(plain, FunctionType):
+        return None
+    try:
+        signature = types.void(point, number, values, point, point)
+        step: Step = pointer(_step_of(either(plain)), signature, keep=field.__module__ == Flow.__module__)
+        return step
+    except NumbaError:
+        return None
 
 
-@either
-def _advance(field: Any, parameters: tuple[float, ...], x: Floats, h: float, y: Floats, total: Floats) -> None:
-    """One step of length h: x [d] moves on. y and total [d] are room to work in."""
-    k = field(x, *parameters)
-    for i in range(len(x)):
-        total[i] = k[i]
-        y[i] = x[i] + 0.5 * h * k[i]
-    k = field(y, *parameters)
-    for i in range(len(x)):
-        total[i] += 2.0 * k[i]
-    for i in range(len(x)):
-        y[i] = x[i] + 0.5 * h * k[i]
-    k = field(y, *parameters)
-    for i in range(len(x)):
-        total[i] += 2.0 * k[i]
-        y[i] = x[i] + h * k[i]
-    k = field(y, *parameters)
-    for i in range(len(x)):
-        x[i] += h / 6.0 * (total[i] + k[i])
+def _step_of(field: Field) -> Step:
+    """One step of length h, for which x [d] moves on; y and total [d] are room to work in."""
+
+    def step(x: Floats, h: float, parameters: tuple[float, ...], y: Floats, total: Floats) -> None:
+        k = field(x, *parameters)
+        for i in range(len(x)):
+            total[i] = k[i]
+            y[i] = x[i] + 0.5 * h * k[i]
+        k = field(y, *parameters)
+        for i in range(len(x)):
+            total[i] += 2.0 * k[i]
+        for i in range(len(x)):
+            y[i] = x[i] + 0.5 * h * k[i]
+        k = field(y, *parameters)
+        for i in range(len(x)):
+            total[i] += 2.0 * k[i]
+        for i in range(len(x)):
+            y[i] = x[i] + h * k[i]
+        k = field(y, *parameters)
+        for i in range(len(x)):
+            x[i] += h / 6.0 * (total[i] + k[i])
+
+    return step
 
 
 @either
@@ -234,24 +238,24 @@ def _near(x: Floats) -> bool:
 
 
 def _follow(
-    field: Any, parameters: tuple[float, ...], start: Floats, h: float, count: int, every: int
+    step: Step, parameters: tuple[float, ...], start: Floats, h: float, count: int, every: int
 ) -> tuple[Floats, int]:
-    """Points [count, d] from `start` on, `every` steps apart, and how many steps were made: fewer if it diverged."""
+    """Points [count, d] from `start` on, `every` steps apart, and how many there are: fewer where it diverged."""
     d = len(start)
     x, y, total = start.copy(), np.empty(d), np.empty(d)
     points = np.empty((count, d))
     points[0] = x
     for n in range(1, count):
         for _ in range(every):
-            _advance(field, parameters, x, h, y, total)
+            step(x, h, parameters, y, total)
         if not _near(x):
-            return points, (n - 1) * every
+            return points, n
         points[n] = x
-    return points, (count - 1) * every
+    return points, count
 
 
 def _part(
-    field: Any, parameters: tuple[float, ...], start: Floats, h: float, steps: int, enough: float
+    step: Step, parameters: tuple[float, ...], start: Floats, h: float, steps: int, enough: float
 ) -> tuple[float, int]:
     """Nats by which a neighbour of `start` parts from its trajectory within `steps`, or as soon as they are `enough`.
 
@@ -264,10 +268,10 @@ def _part(
         other[i] += apart / np.sqrt(d)
     grown = 0.0
     for n in range(steps):
-        _advance(field, parameters, x, h, y, total)
-        _advance(field, parameters, other, h, y, total)
+        step(x, h, parameters, y, total)
+        step(other, h, parameters, y, total)
         if not _near(x):
-            return np.nan, n
+            return np.nan, n + 1
         square = 0.0
         for i in range(d):
             square += (other[i] - x[i]) ** 2
