@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from motionmind.chaos.flows import FLOWS, Flow, flow_of
-from motionmind.chaos.trajectories import largest_exponent, trajectory
+from motionmind.chaos.trajectories import _compiled, largest_exponent, trajectory
 from motionmind.errors import MotionMindError
 
 # Sprott, "Chaos and Time-Series Analysis" (2003), appendix A; the third from Wolf et al., Physica D 16:285 (1985),
@@ -65,8 +67,13 @@ def _lorenz(x: np.ndarray) -> np.ndarray:
     return np.array([10.0 * (x[1] - x[0]), x[0] * (28.0 - x[2]) - x[1], x[0] * x[1] - 8.0 / 3.0 * x[2]])
 
 
+def _uncompiled(value: float) -> float:
+    """The value, by a way that numba does not know."""
+    return float(json.loads(json.dumps(float(value))))
+
+
 def _slow(x: np.ndarray) -> list[float]:
-    return [float(rate) for rate in {"rates": _lorenz(x)}["rates"].tolist()]
+    return [_uncompiled(rate) for rate in _lorenz(x)]
 
 
 def _with_parameters(x: np.ndarray, sigma: float, rho: float, beta: float) -> tuple[float, float, float]:
@@ -83,6 +90,7 @@ def test_any_function_is_a_flow_compiled_or_not() -> None:
         Flow("tuple", _with_parameters, known.start, known.step, parameters=given),
     ):
         assert np.allclose(trajectory(flow, count=50, transient=200), points, rtol=1e-6)
+    assert [_compiled(field, 3, 0) is None for field in (_lorenz, _slow)] == [False, True]
     assert Flow("array", _lorenz, known.start, known.step).dimensions == ("x1", "x2", "x3")
 
 
@@ -129,6 +137,23 @@ def test_a_flow_that_diverges_says_after_how_many_steps(
 ) -> None:
     with pytest.raises(MotionMindError, match=rf"{flow.name}.* diverges from \(.*\): within \d+ steps"):
         trajectory(flow, start, count=100, step=step)
+
+
+def test_a_field_that_is_not_compiled_diverges_and_fails_in_the_same_words() -> None:
+    def plain(x: np.ndarray) -> list[float]:
+        return [_uncompiled(x[0]) * x[0]]
+
+    def failing(x: np.ndarray) -> list[float]:
+        return [math.exp(_uncompiled(x[0]))]
+
+    for field, message in ((plain, "diverges from"), (failing, "its field fails after")):
+        with pytest.raises(MotionMindError, match=message):
+            trajectory(Flow("explosion", field, (1.0,), 0.01, transient=0), count=100)
+
+
+def test_a_start_far_out_is_no_standing_still() -> None:
+    flow = FLOWS["lorenz"]
+    assert len(trajectory(flow, (2e3, 2e3, 2e3), count=5, step=1e-4, transient=400_000)) == 5
 
 
 def test_tiny_steps_make_no_flow_seem_settled() -> None:

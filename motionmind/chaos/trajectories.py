@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from types import FunctionType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,13 +26,14 @@ from motionmind.errors import MotionMindError
 from motionmind.jit import either, jit, pointer
 
 Floats = NDArray[np.float64]
+Loop = Callable[..., tuple[Any, Any]]
 Step = Callable[[Floats, float, tuple[float, ...], Floats, Floats], None]
 
 _FAR = 1e9  # farther from the origin than any attractor: the trajectory has left for infinity
 _APART = 1e-8  # how far Benettin's second trajectory is put from the first, against 1 + |x|
 _ENOUGH = 20.0  # nats that the distance must grow by in a chaotic flow
 _PATIENCE = 200_000  # steps within which it must
-_STILL = 1e-9  # of the fastest that it went: slower is standing still
+_STILL = 1e-9  # of the speed at the flow's own start: what is slower stands still
 
 
 def trajectory(
@@ -66,8 +68,7 @@ def trajectory(
     begin = run.settled()
     run.check(begin)
     points = run.follow(begin, count, every)
-    fastest = max(run.speed(run.start), run.speed(points[0]))
-    if run.speed(points[-1]) <= _STILL * fastest:
+    if run.speed(points[-1]) <= _STILL * run.speed(np.array(flow.start)):
         raise MotionMindError(
             f"{flow.label} settles from {_written(run.start)}: it stands still at {_written(points[-1])}; "
             "a start that is not on the way to a fixed point would move"
@@ -137,19 +138,26 @@ class _Run:
         return self.follow(self.start, 2, self.transient)[1] if self.transient else self.start
 
     def follow(self, start: Floats, count: int, every: int) -> Floats:
-        follow, advance = (_follow_compiled, self.compiled) if self.compiled else (_follow, _step_of(self.flow.field))
-        points, kept = follow(advance, self.parameters, start, self.step, count, every)
+        points, kept = self._call(_follow, _follow_compiled, start, count, every)
         if kept < count:
             raise self._diverged(kept * every)
-        return points
+        return np.asarray(points)
 
     def growth(self, start: Floats, steps: int, enough: float) -> tuple[float, int]:
         """Nats by which neighbours part, and in how many steps."""
-        part, advance = (_part_compiled, self.compiled) if self.compiled else (_part, _step_of(self.flow.field))
-        growth, used = part(advance, self.parameters, start, self.step, steps, enough)
+        growth, used = self._call(_part, _part_compiled, start, steps, enough)
         if np.isnan(growth):
             raise self._diverged(used)
         return float(growth), int(used)
+
+    def _call(self, loop: Loop, compiled_loop: Loop, start: Floats, *rest: float) -> tuple[Any, Any]:
+        if self.compiled:
+            return compiled_loop(self.compiled, self.parameters, start, self.step, *rest)
+        try:
+            with np.errstate(all="ignore"):  # compiled code goes on with infinity, too
+                return loop(_step_of(self.flow.field), self.parameters, start, self.step, *rest)
+        except (ArithmeticError, ValueError) as error:
+            raise MotionMindError(f"{self.flow.label}: its field fails after {_written(start)}: {error}") from error
 
     def check(self, start: Floats) -> None:
         """MotionMindError unless the flow is chaotic where it begins; with tiny steps that would take long to see."""
