@@ -90,7 +90,7 @@ def test_any_function_is_a_flow_compiled_or_not() -> None:
         Flow("tuple", _with_parameters, known.start, known.step, parameters=given),
     ):
         assert np.allclose(trajectory(flow, count=50, transient=200), points, rtol=1e-6)
-    assert [_compiled(field, 3, 0) is None for field in (_lorenz, _slow)] == [False, True]
+    assert [_compiled(field, 0) is None for field in (_lorenz, _slow)] == [False, True]
     assert Flow("array", _lorenz, known.start, known.step).dimensions == ("x1", "x2", "x3")
 
 
@@ -193,6 +193,7 @@ def test_unknown_names_are_told_what_there_is() -> None:
         (lambda x: (x[0], x[3], x[1]), "its field fails at"),
         (lambda x: (x[0], x[1]), r"gives an array \[2\] at a point \[3\]"),
         (lambda x, a: (a, a, a), "its field fails at"),
+        (lambda x: (1 / (float(x[0]) - 1.0), x[1], x[2]), "its field fails at"),
     ],
 )
 def test_a_field_that_does_not_fit_is_refused_before_it_is_compiled(field: object, message: str) -> None:

@@ -123,11 +123,11 @@ class _Run:
         # Compiled code would read past the end of an array without a word, so the field is tried as it is.
         try:
             shape = np.shape(flow.field(begin.copy(), *flow.parameters.values()))
-        except (TypeError, IndexError, ValueError) as error:
+        except (TypeError, IndexError, ValueError, ArithmeticError) as error:
             raise MotionMindError(f"{flow.name}: its field fails at {_written(begin)}: {error}") from error
         if shape != (d,):
             raise MotionMindError(f"{flow.name}: its field gives an array {list(shape)} at a point [{d}], not [{d}]")
-        return cls(flow, _compiled(flow.field, d, len(flow.parameters)), begin, step, transient)
+        return cls(flow, _compiled(flow.field, len(flow.parameters)), begin, step, transient)
 
     @property
     def parameters(self) -> tuple[float, ...]:
@@ -190,8 +190,8 @@ def _written(point: Sequence[float] | Floats) -> str:
 
 
 @cache
-def _compiled(field: Field, d: int, parameters: int) -> Step | None:
-    """A step of the field, in d dimensions and with so many parameters, as a pointer; None if numba cannot compile it.
+def _compiled(field: Field, parameters: int) -> Step | None:
+    """A step of the field, with so many parameters, as a pointer; None where numba cannot compile it.
 
     Only those of our own fields are kept on disk, where what they are compiled from is known.
     """
@@ -205,7 +205,7 @@ def _compiled(field: Field, d: int, parameters: int) -> Step | None:
         return None
     try:
         signature = types.void(point, number, values, point, point)
-        step: Step = pointer(_step_of(either(plain)), signature, keep=field.__module__ == Flow.__module__)
+        step: Step = pointer(_step_of(either(plain)), signature, keep=plain.__module__ == Flow.__module__)
         return step
     except NumbaError:
         return None
@@ -278,7 +278,7 @@ def _part(
     for n in range(steps):
         step(x, h, parameters, y, total)
         step(other, h, parameters, y, total)
-        if not _near(x):
+        if not (_near(x) and _near(other)):
             return np.nan, n + 1
         square = 0.0
         for i in range(d):
