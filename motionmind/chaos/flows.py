@@ -1,7 +1,7 @@
 """Chaotic flows dx/dt = f(x): a registry, and the type for any other.
 
-Steps are about a hundredth of a turn around the attractor, so that a trajectory of which each 11th point is kept goes
-round in nine points or so, whatever the flow. The double scroll is what Chua's circuit has for an attractor: one flow.
+Steps are a sixtieth to a hundredth of a turn around the attractor: a trajectory of which each 11th point is kept goes
+round in six to ten. The double scroll is what Chua's circuit has for an attractor: one flow.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Flow:
             if it can be, and called as it is otherwise, which takes some hundred times as long. Compiled code does
             not hear of exceptions: it should not raise any.
         start: a point in the attractor's basin [d].
-        step: of the integration, in units of time; a hundredth of a turn around the attractor or so.
+        step: of the integration, in units of time; a sixtieth to a hundredth of a turn around the attractor.
         transient: steps from a start until the trajectory is taken to be on the attractor.
         parameters: by their names, in the order in which the field takes them.
         dimensions: the coordinates' names [d]; x1, x2 and so on where none are given.
@@ -128,7 +128,7 @@ _REGISTRY = (
         "lorenz",
         _lorenz,
         start=(1.0, 1.0, 20.0),
-        step=0.005,
+        step=0.007,
         parameters={"sigma": 16.0, "rho": 45.0, "beta": 4.0},
         dimensions=_XYZ,
         about="x' = sigma (y - x), y' = x (rho - z) - y, z' = x y - beta z; Lorenz, J. Atmos. Sci. 20:130 (1963), with "
