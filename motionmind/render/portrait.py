@@ -90,6 +90,11 @@ class Portrait:
         """Where points [..., d] are in the picture [..., 2], in the flow's coordinates."""
         return np.asarray(points[..., self.axes[:2]])
 
+    def in_space(self, points: Array) -> Array:
+        """The same, with what goes towards the viewer [..., 3]; 0 where the flow has but two coordinates."""
+        towards = [self._towards * points[..., i] for i in self.axes[2][:1]] or [np.zeros(points.shape[:-1])]
+        return np.concatenate([self.seen(points), towards[0][..., None]], axis=-1)
+
     @cached_property
     def sheets(self) -> Array:
         """Points all over the attractor [SHEETS, d], along one trajectory."""
@@ -182,7 +187,7 @@ def portrait_of(variation: Variation) -> Portrait:
 
 @jit
 def _nearest(along: Array, towards: float, width: int, height: int) -> Array:
-    """The coordinates that are left out [H, W, d - 2] where a trajectory passes pixels, nearest to the viewer; else nan.
+    """The coordinates that are left out [H, W, d - 2] where a trajectory passes, nearest to the viewer; else nan.
 
     Args:
         along: the trajectory [N, d]: column and row, in pixels, and the coordinates that are left out.
