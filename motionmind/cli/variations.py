@@ -269,6 +269,27 @@ def review(
         context.exit(INTERRUPTED)
 
 
+@app.command(epilog=example("motionmind attractor --of variation.json -o attractor.png"))
+@click.option("--of", "variation", type=FILE, required=True, help="A variation that vary wrote.")
+@click.option(
+    "-o", "--output", type=FILE, required=True, help="Where it goes: a picture (.png, .svg), or a page (.html)."
+)
+def attractor(variation: Path, output: Path) -> None:
+    """Draw a variation on its attractor: where the piece's postures live, and the way through them.
+
+    Both trajectories, the cell of each posture, some of the postures, and both itineraries: where the variation parts
+    from the piece, and where it jumps. In .svg the pointer tells more. The page turns in three dimensions, and a body
+    dances the variation beside it.
+    """
+    from motionmind.render.attractor import ATTRACTORS, write_attractor
+    from motionmind.variation.variation_json import read_variation
+
+    check_outputs([(output, ATTRACTORS)], [variation])
+    found = read_variation(variation)
+    write_attractor(output, found)
+    click.echo(f"{output}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
+
+
 def _piece(
     source: Path, clip: str | None, home: Path | None, joints: Path | None, **given: Any
 ) -> tuple[Motion, str | None]:
