@@ -311,6 +311,8 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run) -> None:
     variation = varied("rossler", 30)
     write_variation("variation.json", variation)
     write_variation("changed.json", replace(variation, order=variation.order[::-1]))
+    for name, course in (("flat", {"nudge": (0.1, 0.0)}), ("still", {"skip": -1})):
+        write_variation(f"{name}.json", replace(variation, course=replace(variation.course, **course)))
     strange = Flow("strange", FLOWS["rossler"].field, (1.0, 1.0, 0.0), 0.05, parameters={"a": 0.2, "b": 0.2, "c": 5.7})
     write_variation("strange.json", vary(variation.piece, flow=strange))
     Path("notes.json").write_text("[]")
@@ -320,6 +322,8 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run) -> None:
         ("gone.json", "a.png", "there is no such file"),
         ("notes.json", "a.png", "notes.json"),
         ("changed.json", "a.png", "give another order here"),
+        ("flat.json", "a.png", "not 2 numbers and 10 points"),
+        ("still.json", "a.png", "not 3 numbers and -1 points"),
         ("strange.json", "a.png", "no flow 'strange'"),
     ):
         ran = run("attractor", "--of", source, "-o", output)

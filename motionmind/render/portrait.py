@@ -26,12 +26,11 @@ from motionmind.variation.variation import Variation
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 MOST = 10_000  # postures of a piece or of a variation: more cells than a picture has room for
 SHEETS = 2_000_000  # steps of the trajectory that shows where the attractor is
 _USUAL = {"lorenz": ("x", "z"), "chua": ("x", "z")}  # in which coordinates a flow is best seen, if not the first two
-_SOFT = 4.0  # pixels
+_SOFT = 4.0  # pixels: what of the attractor's outline is finer is chance
 _GAP = 3  # pixels, at least half a gap between strands of the trajectory that is not one of the attractor
 
 
@@ -81,7 +80,7 @@ class Portrait:
 
     @cached_property
     def axes(self) -> tuple[int, int, tuple[int, ...]]:
-        """Which coordinates go to the right and up, and which are left out."""
+        """Which coordinates go to the right and up, and which are left out, one at least: chaos takes three."""
         names = list(self.flow.dimensions)
         across, up = (names.index(name) for name in _USUAL.get(self.flow.name, names[:2]))
         return across, up, tuple(i for i in range(len(names)) if i not in (across, up))
@@ -91,9 +90,8 @@ class Portrait:
         return np.asarray(points[..., self.axes[:2]])
 
     def in_space(self, points: Array) -> Array:
-        """The same, with what goes towards the viewer [..., 3]; 0 where the flow has but two coordinates."""
-        towards = [self._towards * points[..., i] for i in self.axes[2][:1]] or [np.zeros(points.shape[:-1])]
-        return np.concatenate([self.seen(points), towards[0][..., None]], axis=-1)
+        """The same, and towards the viewer [..., 3]."""
+        return np.concatenate([self.seen(points), self._towards * points[..., self.axes[2][:1]]], axis=-1)
 
     @cached_property
     def sheets(self) -> Array:
@@ -101,18 +99,6 @@ class Portrait:
         return trajectory(
             self.flow, self.piece[-1], count=SHEETS, every=1, step=self.variation.course.step, transient=0
         )
-
-    @cached_property
-    def _ordered(self) -> list[int]:
-        """All coordinates: to the right, up, towards the viewer, and those that cannot be seen."""
-        across, up, left_out = self.axes
-        return [across, up, *left_out]
-
-    @cached_property
-    def _handed(self) -> float:
-        """Whether more of the coordinate towards the viewer is nearer, 1 or -1: three of them are right-handed."""
-        across, up, left_out = self.axes
-        return 1.0 if len(left_out) != 1 or (up - across) % 3 == 1 else -1.0
 
     def cells(self, corner: Array, scale: float, width: int, height: int) -> Indices:
         """The posture whose cell each pixel of the attractor is in [height, width]; EMPTY beside the attractor.
@@ -155,8 +141,8 @@ def portrait_of(variation: Variation) -> Portrait:
     Edits from the first on that moves postures are left out: what follows no trajectory any more is not on it.
 
     Raises:
-        MotionMindError: its flow is not one of `motionmind.chaos.flows`, its trajectories give another order here, or
-            it has more postures than can be drawn.
+        MotionMindError: its flow is not one of `motionmind.chaos.flows`, its course is none, its trajectories give
+            another order here, or it has more postures than can be drawn.
     """
     course = variation.course
     most = max(len(variation.piece), len(variation.order))
@@ -164,6 +150,11 @@ def portrait_of(variation: Variation) -> Portrait:
         raise MotionMindError(f"a picture of an attractor shows {MOST} postures at most, not {most}")
     variation = replace(variation, edits=tuple(takewhile(lambda edit: not isinstance(edit, Cut), variation.edits)))
     flow, every = flow_of(course.flow, **course.parameters), course.skip + 1
+    if course.skip < 0 or len(course.nudge) != len(flow.start):
+        raise MotionMindError(
+            f"a course of {flow.name} has a nudge of {len(flow.start)} numbers and skips 0 points or more, "
+            f"not {len(course.nudge)} numbers and {course.skip} points"
+        )
     piece = trajectory(
         flow,
         course.start,
