@@ -163,7 +163,7 @@ def test_every_step_of_both_trajectories_is_drawn_and_passes_its_sites(portrait:
         assert len(points) == (count - 1) * portrait.every + 1
         places = np.array([dots(plate, title)[n].at for n in range(count)])
         np.testing.assert_allclose(points[:: portrait.every], places, atol=1e-9)
-        assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 60.0
+        assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 80.0
 
 
 def test_both_itineraries_are_drawn_and_every_jump(portrait: Portrait, plate: Plate) -> None:

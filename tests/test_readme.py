@@ -50,7 +50,7 @@ def test_the_commands_for_ones_own_movement_run(elsewhere: dict[str, str], tmp_p
     shutil.copy(tmp_path / "adagio.bvh", tmp_path / "clip.bvh")
     (tmp_path / "corpora").symlink_to(ROOT / "corpora")
     commands = [command for command in COMMANDS[2:] if command.startswith("motionmind ")]
-    assert len(commands) == 14
+    assert len(commands) == 15
     for command in commands:
         done = subprocess.run(
             command, shell=True, cwd=tmp_path, env=elsewhere, capture_output=True, text=True, check=False
