@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from motionmind import rotations as rot
-from motionmind.chaos.flows import FLOWS
+from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.engine import Engine
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lost, read_motion, write_motion
@@ -467,3 +467,9 @@ def test_bad_input_is_one_line(run: Run, tmp_path: Path, arguments: tuple[str, .
     assert message in done.err
     assert len(done.err.strip().splitlines()) == 1
     assert not (tmp_path / "out.json").exists()
+
+
+def test_the_exponent_is_reported_and_says_how_fast_trajectories_part(kata: Piece) -> None:
+    found = vary(kata, flow=flow_of("lorenz", rho=45.92), skip=4, step=0.005)
+    assert found.course.exponent == pytest.approx(2.16 * np.log(2.0), rel=0.03)  # Wolf et al., Physica D 16:285 (1985)
+    assert found.report()["course"]["parting"] == pytest.approx(found.course.exponent * 5 * 0.005)

@@ -143,6 +143,9 @@ def print_review(found: dict[str, Any]) -> None:
         f"({values}), nudge {nudge}, skip {course['skip']}"
     )
     click.echo(
+        f"Lyapunov exponent {course['exponent']:.3g}: trajectories part by {course['parting']:.2g} nats a posture"
+    )
+    click.echo(
         f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')}: {counts['inserted']} with an "
         f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )

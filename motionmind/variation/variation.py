@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary
+from motionmind.chaos.trajectories import largest_exponent
 from motionmind.engine import Engine
 from motionmind.errors import MotionMindError
 from motionmind.motion import Motion
@@ -37,6 +38,7 @@ Ints = NDArray[np.int64]
 NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewhere than with the first posture
 SKIP = 10
 ALTERNATIVES = 3
+EXPONENT_STEPS = 300_000
 LONGEST = 1_000_000  # postures that a variation may have
 
 
@@ -52,6 +54,7 @@ class Course:
         skip: points of the trajectories that are left out between two postures.
         step: of the integration.
         transient: steps that are dropped of the piece's trajectory at first.
+        exponent: the flow's largest Lyapunov exponent, nats a unit of time, to within some percent.
     """
 
     flow: str
@@ -61,6 +64,12 @@ class Course:
     skip: int
     step: float
     transient: int
+    exponent: float
+
+    @property
+    def parting(self) -> float:
+        """Nats by which neighbouring trajectories part, on average, from one posture to the next."""
+        return self.exponent * self.step * (self.skip + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +129,12 @@ class Variation:
         seams = [_plain(seam) for seam in self.seams]
         return {
             "piece": {"name": self.piece.motion.name, "postures": len(self.piece), "facing": self.piece.facing},
-            "course": {**asdict(self.course), "start": list(self.course.start), "nudge": list(self.course.nudge)},
+            "course": {
+                **asdict(self.course),
+                "start": list(self.course.start),
+                "nudge": list(self.course.nudge),
+                "parting": self.course.parting,
+            },
             "order": self.postures.tolist(),
             "counts": {
                 "postures": len(self.postures),
@@ -272,6 +286,7 @@ def vary(
         skip,
         flow.step if step is None else step,
         flow.transient if transient is None else transient,
+        round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=step, transient=transient), 4),
     )
     variation = Variation(piece, course, found.indices)
     if engine is None:
