@@ -400,3 +400,17 @@ def test_the_page_follows_the_variation_on_its_attractor(browser: Any, tmp_path:
     context.close()
     assert [line for line in said if not re.search("GPU stall|WebGL context could not", line)] == []
     assert [url for url in asked if not url.startswith(("data:", "file:"))] == []
+
+
+def test_a_variation_that_is_longer_than_its_piece_stays_with_it_to_its_end(sketchy: None) -> None:
+    found = portrait_of(vary(Piece.of(ballet_clip("jump")), nudge=0.0, length=20))
+    assert found.parting is None
+    words = [mark.text for mark in attractor(found).marks if isinstance(mark, Words)]
+    assert any("stays with it to its end" in text for text in words)
+    assert not any("they part at" in text for text in words)
+
+
+def test_more_steps_than_a_picture_has_lines_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(portraits, "MOST_STEPS", 100)
+    with pytest.raises(MotionMindError, match="shows 100 steps at most, not 220: 20 postures, 11 steps each"):
+        portrait_of(vary(Piece.of(ballet_clip("jump")), length=20))

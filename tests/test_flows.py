@@ -111,7 +111,7 @@ def test_any_function_is_a_flow_compiled_or_not() -> None:
     ids=lambda x: x.label if isinstance(x, Flow) else str(x),
 )
 def test_a_flow_that_settles_is_refused_with_its_exponent(flow: Flow, start: tuple[float, ...] | None) -> None:
-    with pytest.raises(MotionMindError, match=r"is not chaotic from .* an exponent of|settles from .* stands still"):
+    with pytest.raises(MotionMindError, match=r"is not chaotic from .* an exponent of|settles from .* stand still"):
         trajectory(flow, start, count=20)
 
 
@@ -169,6 +169,9 @@ def test_tiny_steps_make_no_flow_seem_settled() -> None:
         ({"count": 1, "step": 0.0}, "must be a positive number, not 0.0"),
         ({"count": 1, "step": np.nan}, "must be a positive number, not nan"),
         ({"count": 1, "transient": -1}, "0 at least, not -1"),
+        ({"count": 1, "transient": 10.5}, "a whole number of steps, 0 at least, not 10.5"),
+        ({"count": 1, "step": "x"}, "one for its step, not None and 'x'"),
+        ({"count": 1, "start": "x"}, "takes 3 numbers to start at"),
         ({"count": 1, "start": (1.0, 2.0)}, "starts at 3 finite numbers"),
         ({"count": 1, "start": (1.0, np.inf, 0.0)}, "starts at 3 finite numbers"),
     ],
@@ -206,3 +209,9 @@ def test_a_flow_needs_a_start_and_as_many_names() -> None:
         Flow("none", _lorenz, (), 0.01)
     with pytest.raises(MotionMindError, match="3 coordinates have 2 names"):
         Flow("two", _lorenz, (1.0, 1.0, 1.0), 0.01, dimensions=("x", "y"))
+
+
+@pytest.mark.parametrize(("name", "start"), [("lorenz", (0.0, 0.0, 5.0)), ("duffing", (0.5, 0.0, 0.0, 0.0))])
+def test_a_saddle_that_neighbours_leave_is_a_fixed_point_all_the_same(name: str, start: tuple[float, ...]) -> None:
+    with pytest.raises(MotionMindError, match=rf"{name}.* settles from .*: it comes to stand still at"):
+        trajectory(FLOWS[name], start, count=5, transient=0)

@@ -96,3 +96,15 @@ def test_the_same_arguments_give_the_same_bytes() -> None:
     assert one.points.tobytes() == two.points.tobytes()
     assert one.indices.tobytes() == two.indices.tobytes()
     assert trajectory(FLOWS["thomas"], count=500).tobytes() == one.sites.tobytes()
+
+
+def test_a_nudge_that_leads_out_of_the_basin_is_named() -> None:
+    with pytest.raises(MotionMindError, match=r"nudged by 1e\+09, 0, 0: lorenz .* diverges .* within 1 step of"):
+        itinerary(FLOWS["lorenz"], 5, nudge=1e9)
+    with pytest.raises(MotionMindError, match="a nudge is a number or one for each coordinate, not 'x'"):
+        itinerary(FLOWS["lorenz"], 5, nudge="x")  # type: ignore[arg-type]
+
+
+def test_what_lies_too_far_out_to_compare_is_refused() -> None:
+    with pytest.raises(MotionMindError, match=r"below 1e\+150"):
+        reorder(np.zeros((2, 3)), np.full((1, 3), 1e200))

@@ -22,6 +22,7 @@ from motionmind.errors import MotionMindError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_FAR = 1e150  # beyond it squares of distances overflow
 _ROUNDING = 1e-12  # by how much two distances may differ, as a part of them, where the nearer one is looked for exactly
 
 
@@ -69,12 +70,18 @@ def itinerary(
         MotionMindError: an argument is out of range, or a trajectory diverges or settles.
     """
     sites = trajectory(flow, start, count=count, every=every, step=step, transient=transient)
-    nudge = np.asarray(nudge, dtype=np.float64)
+    try:
+        nudge = np.asarray(nudge, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MotionMindError(f"a nudge is a number or one for each coordinate, not {nudge!r}") from None
     offset = nudge * np.eye(1, sites.shape[1])[0] if nudge.ndim == 0 else nudge
     if offset.shape != sites[0].shape or not np.isfinite(offset).all():
         raise MotionMindError(f"a nudge in {flow.name} is a finite number or {sites.shape[1]} of them, not {nudge}")
     length = count if length is None else length
-    points = trajectory(flow, sites[0] + offset, count=length, every=every, step=step, transient=0)
+    try:
+        points = trajectory(flow, sites[0] + offset, count=length, every=every, step=step, transient=0)
+    except MotionMindError as error:
+        raise MotionMindError(f"nudged by {', '.join(f'{x:g}' for x in offset)}: {error}") from error
     return Itinerary(sites, points, reorder(sites, points))
 
 
@@ -114,8 +121,8 @@ def checked(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
             f"points of shape {list(points.shape)} cannot be told by sites of shape {list(sites.shape)}: "
             "that takes sites [N, d], one at least, and points [L, d]"
         )
-    if not (np.isfinite(sites).all() and np.isfinite(points).all()):
-        raise MotionMindError("sites and points must be finite numbers")
+    if not (np.abs(sites) < _FAR).all() or not (np.abs(points) < _FAR).all():
+        raise MotionMindError(f"sites and points must be finite numbers below {_FAR:g}")
     return sites, points
 
 

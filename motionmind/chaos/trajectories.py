@@ -33,6 +33,7 @@ _FAR = 1e9  # farther from the origin than any attractor: the trajectory has lef
 _APART = 1e-8  # how far Benettin's second trajectory is put from the first, against 1 + |x|
 _ENOUGH = 20.0  # nats that the distance must grow by in a chaotic flow
 _PATIENCE = 200_000  # steps within which it must
+_LONG = 10_000  # steps in which what nears a fixed point comes to stand still
 _STILL = 1e-9  # of the speed at the flow's own start: what is slower stands still
 
 
@@ -67,13 +68,7 @@ def trajectory(
     run = _Run.of(flow, start, step, transient)
     begin = run.settled()
     run.check(begin)
-    points = run.follow(begin, count, every)
-    if run.speed(points[-1]) <= _STILL * run.speed(np.array(flow.start)):
-        raise MotionMindError(
-            f"{flow.label} settles from {_written(run.start)}: it stands still at {_written(points[-1])}; "
-            "a start that is not on the way to a fixed point would move"
-        )
-    return points
+    return run.follow(begin, count, every)
 
 
 def largest_exponent(
@@ -110,16 +105,23 @@ class _Run:
 
     @classmethod
     def of(cls, flow: Flow, start: ArrayLike | None, step: float | None, transient: int | None) -> _Run:
-        begin = np.array(flow.start if start is None else start, dtype=np.float64)
-        step = flow.step if step is None else float(step)
-        transient = flow.transient if transient is None else transient
         d = len(flow.start)
+        try:
+            begin = np.array(flow.start if start is None else start, dtype=np.float64)
+            step = flow.step if step is None else float(step)
+        except (TypeError, ValueError):
+            raise MotionMindError(
+                f"{flow.name} takes {d} numbers to start at and one for its step, not {start!r} and {step!r}"
+            ) from None
+        transient = flow.transient if transient is None else transient
         if begin.shape != (d,) or not np.isfinite(begin).all():
             raise MotionMindError(f"{flow.name} starts at {d} finite numbers, not at {start!r}")
         if not 0.0 < step < np.inf:
             raise MotionMindError(f"the step of {flow.name} must be a positive number, not {step}")
-        if transient < 0:
-            raise MotionMindError(f"the transient of {flow.name} is a number of steps, 0 at least, not {transient}")
+        if isinstance(transient, bool) or not isinstance(transient, int | np.integer) or transient < 0:
+            raise MotionMindError(
+                f"the transient of {flow.name} is a whole number of steps, 0 at least, not {transient!r}"
+            )
         # Compiled code would read past the end of an array without a word, so the field is tried as it is.
         try:
             shape = np.shape(flow.field(begin.copy(), *flow.parameters.values()))
@@ -160,7 +162,10 @@ class _Run:
             raise MotionMindError(f"{self.flow.label}: its field fails after {_written(start)}: {error}") from error
 
     def check(self, start: Floats) -> None:
-        """MotionMindError unless the flow is chaotic where it begins; with tiny steps that would take long to see."""
+        """MotionMindError unless the flow is chaotic where it begins; with tiny steps that would take long to see.
+
+        Neighbours part on the way to a fixed point, too, if it is a saddle: so it is also seen where that leads.
+        """
         run = replace(self, step=max(self.step, self.flow.step))
         growth, used = run.growth(start, _PATIENCE, _ENOUGH)
         if growth < _ENOUGH:
@@ -170,15 +175,21 @@ class _Run:
                 f"{growth / (used * run.step):.3g}, where {_ENOUGH:g} nats would show that it is positive; it settles "
                 "on a fixed point or an orbit"
             )
+        end = run.follow(start, 2, _LONG)[1]
+        if run.speed(end) <= _STILL * run.speed(np.array(self.flow.start)):
+            raise MotionMindError(
+                f"{self.flow.label} settles from {_written(self.start)}: it comes to stand still at {_written(end)}; "
+                "a start that is not on the way to a fixed point would move"
+            )
 
     def speed(self, point: Floats) -> float:
         return float(np.linalg.norm(self.flow.field(point.copy(), *self.parameters)))
 
     def _diverged(self, steps: int) -> MotionMindError:
         return MotionMindError(
-            f"{self.flow.label} diverges from {_written(self.start)}: within {steps} steps of {self.step:g} it is "
-            f"farther than {_FAR:g} from the origin; a start nearer to {_written(self.flow.start)} or a smaller step "
-            "may stay on the attractor"
+            f"{self.flow.label} diverges from {_written(self.start)}: within {steps} step{'s' * (steps != 1)} of "
+            f"{self.step:g} it is farther than {_FAR:g} from the origin; a start nearer to "
+            f"{_written(self.flow.start)} or a smaller step may stay on the attractor"
         )
 
 

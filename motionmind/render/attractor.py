@@ -84,7 +84,8 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
     nudge = ", ".join(f"{value:.4g}" for value in course.nudge)
     told = f"{_many(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
     if portrait.parting is None:
-        told += f"The variation begins ({nudge}) beside the piece and never leaves it."
+        told += f"The variation begins ({nudge}) beside the piece and stays with it to its end"
+        told += f"; then it jumps {_many(len(portrait.jumps), 'time')}." if portrait.jumps else "."
     else:
         told += (
             f"The variation begins ({nudge}) beside the piece, parts from it after "

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST = 10_000  # postures of a piece or of a variation: more cells than a picture has room for
+MOST_STEPS = 200_000  # of a trajectory, lines each
 SHEETS = 2_000_000  # steps of the trajectory that shows where the attractor is
 _USUAL = {"lorenz": ("x", "z"), "chua": ("x", "z")}  # in which coordinates a flow is best seen, if not the first two
 _SOFT = 4.0  # pixels: what of the attractor's outline is finer is chance
@@ -69,9 +70,9 @@ class Portrait:
 
     @property
     def parting(self) -> int | None:
-        """The first point at which another posture comes than in the piece; None where there is none."""
-        apart = np.flatnonzero(self.order != np.arange(len(self.order)))
-        return int(apart[0]) if len(apart) else None
+        """The first point at which it jumps, while the piece goes on; None where it stays with it to its end."""
+        first = min(self.jumps, default=len(self.sites))
+        return first if first < len(self.sites) else None
 
     @cached_property
     def jumps(self) -> dict[int, Seam]:
@@ -148,6 +149,11 @@ def portrait_of(variation: Variation) -> Portrait:
     most = max(len(variation.piece), len(variation.order))
     if most > MOST:
         raise MotionMindError(f"a picture of an attractor shows {MOST} postures at most, not {most}")
+    if most * (course.skip + 1) > MOST_STEPS:
+        raise MotionMindError(
+            f"a picture of an attractor shows {MOST_STEPS} steps at most, not {most * (course.skip + 1)}: "
+            f"{most} postures, {course.skip + 1} steps each"
+        )
     variation = replace(variation, edits=tuple(takewhile(lambda edit: not isinstance(edit, Cut), variation.edits)))
     flow, every = flow_of(course.flow, **course.parameters), course.skip + 1
     if course.skip < 0 or len(course.nudge) != len(flow.start):
