@@ -53,11 +53,11 @@ def listed(known: list[str]) -> None:
         click.echo(f"{folder.name:14}{title}")
         if folder.name in known:
             click.echo(f"{'':14}  python -m experiments {folder.name}")
-            continue
         for script in sorted(folder.glob("*.py")):
             lines = (ast.get_docstring(ast.parse(script.read_text())) or "").splitlines()
-            for line in (line for line in lines if line.startswith("python ")):
-                click.echo(f"{'':14}  {line}")
+            for line in map(str.strip, lines):
+                if line.startswith("python "):
+                    click.echo(f"{'':14}  {line}")
 
 
 if __name__ == "__main__":

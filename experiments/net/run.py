@@ -73,6 +73,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
                     "window": int(number),
                     "kind": kind,
                     "taken": int(who.takes(rotations[:FRAMES], name, sequence)),
+                    "distance": who.distance(rotations[:FRAMES], name, sequence),
                     "collides": collides(piece.skeleton, rotations, root).mean(),
                     "off_balance_cm": off_balance(piece.skeleton, rotations, root),
                     "l2q": l2q(*turned),
@@ -157,6 +158,7 @@ def chart(rows: list[Row]) -> str:
     panels = []
     for title, key in (
         ("taken for the corpus", "taken"),
+        ("distance in style, in limits", "distance"),
         ("frames with a collision", "collides"),
         ("cm off balance", "off_balance_cm"),
         ("L2Q", "l2q"),
@@ -165,7 +167,7 @@ def chart(rows: list[Row]) -> str:
         for place, row in enumerate(means(rows)):
             panel.series[row["kind"]] = [(float(place), row[key])]
         panels.append(panel)
-    return svg(panels, columns=4)
+    return svg(panels, columns=5)
 
 
 def tell(rows: list[Row]) -> str:
@@ -174,6 +176,7 @@ def tell(rows: list[Row]) -> str:
             "": lambda r: r["kind"],
             "windows": lambda r: r["windows"],
             "taken for the corpus": lambda r: f"{r['taken']:.0%}",
+            "distance in style": lambda r: f"{r['distance']:.2f}",
             "frames with a collision": lambda r: f"{r['collides']:.1%}",
             "off balance": lambda r: f"{r['off_balance_cm']:.1f} cm",
             "L2Q": lambda r: f"{r['l2q']:.3f}",
