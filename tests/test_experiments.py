@@ -87,12 +87,12 @@ def test_a_run_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_what_people_wrote_around_what_was_found_stays(tmp_path: Path) -> None:
     from experiments.harness import BEGIN, END, Setting, answer
 
-    (tmp_path / "README.md").write_text(f"# Mine\n\nBefore.\n\n{BEGIN}\nold\n{END}\n\nAfter.\n")
+    (tmp_path / "README.md").write_text(f"# Mine\n\nBefore.\n\n{BEGIN}\nwhat was there\n{END}\n\nAfter.\n")
     answer("turing", Setting(quick=True, data=None), Here(), tmp_path)
     text = (tmp_path / "README.md").read_text()
     assert text.startswith(f"# Mine\n\nBefore.\n\n{BEGIN}\n")
     assert text.endswith(f"{END}\n\nAfter.\n")
-    assert "old" not in text
+    assert "what was there" not in text
     assert "Simulated raters" in text
 
 
