@@ -48,7 +48,7 @@ def test_every_folder_is_listed_with_its_question_and_command() -> None:
     folders = [path.name for path in (ROOT / "experiments").iterdir() if path.is_dir() and path.name != "__pycache__"]
     for folder in folders:
         readme = (ROOT / "experiments" / folder / "README.md").read_text()
-        assert f"{folder:14}{readme.splitlines()[0].lstrip('# ')}" in listed
+        assert f"{folder:16}{readme.splitlines()[0].lstrip('# ')}" in listed
         assert f"python -m experiments {folder}\n" in listed or f"python experiments/{folder}/" in listed
 
 

@@ -39,7 +39,6 @@ from motionmind.metrics import (
     sparc,
 )
 from motionmind.metrics.measure import at_rate, measure
-from motionmind.metrics.verbatim import limbs
 from motionmind.motion import Motion
 from motionmind.skeleton import human23, human44
 
@@ -341,16 +340,6 @@ def test_a_move_that_nobody_made_is_no_cliche(engine: Engine) -> None:
 
 
 # --- what is copied ---------------------------------------------------------------------------------------------------
-
-
-def test_limbs_are_chains_that_make_up_the_body() -> None:
-    body = human23()
-    found = limbs(body)
-    assert sorted(joint for limb in found for joint in limb) == list(range(23))
-    assert all(body.parents[after] == before for limb in found for before, after in pairwise(limb))
-    names = [[body.names[joint] for joint in limb] for limb in found]
-    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in names
-    assert len(found) == 7
 
 
 def test_a_clip_is_copied_whole_from_itself_and_not_without_it(engine: Engine) -> None:
