@@ -14,8 +14,8 @@ LEFT, RIGHT, TOP, BOTTOM = 52, 12, 30, 42
 
 @dataclass
 class Panel:
-    """One pair of axes, with series of points [(x, y), ...] by name; `log` has x on a logarithmic axis. Where points
-    are not joined x is but a place, without numbers."""
+    """One pair of axes, with series of points [(x, y), ...] by name; `log` has x on a logarithmic axis. Where x is
+    but a place it is not `numbered`."""
 
     title: str
     x: str
@@ -23,6 +23,7 @@ class Panel:
     series: dict[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     log: bool = False
     joined: bool = True
+    numbered: bool = True
 
 
 def svg(panels: Sequence[Panel], columns: int = 3) -> str:
@@ -70,7 +71,7 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
         _, y = at(x0, tick)
         out.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="#e4e4e4"/>')
         out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
-    for tick in x_ticks if panel.joined else ():
+    for tick in x_ticks if panel.numbered else ():
         x, _ = at(tick, y0)
         shown = 10.0**tick if panel.log else tick
         out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.4g}</text>')

@@ -104,6 +104,62 @@ def test_a_name_that_is_no_question_is_refused() -> None:
     assert "no question 'weather'" in done.stderr
 
 
+# --- what bodies cannot do, and what is awkward -----------------------------------------------------------------------
+
+
+def standing(**turns: tuple[str, float]) -> tuple[Any, Any, Any]:
+    """A body that stands, ten times, with some joints turned about an axis by degrees; its rotations and root."""
+    from motionmind import human23
+    from motionmind import rotations as rot
+
+    body = human23()
+    rotations = np.tile(rot.IDENTITY, (10, len(body), 1))
+    for joint, (axis, degrees) in turns.items():
+        rotations[:, body.index(joint)] = rot.from_axis_angle(np.eye(3)["xyz".index(axis)], np.radians(degrees))
+    ground = -body.positions_and_tips(rotations[0], np.zeros(3))[:, 1].min()
+    return body, rotations, np.tile([0.0, ground, 0.0], (10, 1))
+
+
+def test_parts_that_reach_into_each_other_collide() -> None:
+    from experiments.net.run import collides
+
+    for turns, expected in (
+        ({}, (False, False)),
+        ({"left_hip": ("z", -12.0), "right_hip": ("z", 12.0)}, (True, False)),  # legs crossed into each other
+        ({"left_shoulder": ("z", -95.0)}, (False, True)),  # an arm through the hip
+        ({"left_shoulder": ("z", -60.0), "left_knee": ("x", 60.0)}, (False, False)),
+    ):
+        assert tuple(found.any() for found in collides(*standing(**turns))) == expected, turns
+
+
+def test_a_body_that_leans_is_off_balance() -> None:
+    from experiments.net.run import off_balance
+
+    assert off_balance(*standing()) == 0.0
+    leaning = [off_balance(*standing(left_ankle=("x", -a), right_ankle=("x", -a), pelvis=("x", a))) for a in (20, 40)]
+    assert 5.0 < leaning[0] < leaning[1]
+
+
+def test_a_move_is_awkward_that_is_faster_and_rougher_than_the_corpus() -> None:
+    from dataclasses import replace
+
+    from experiments.panel.run import awkward, material, usual
+    from motionmind.metrics.measure import at_rate
+
+    engine, _ = material(None, "adagio alone")
+    own = usual(engine)
+    assert 0.0 < own.awkward < 50.0
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    moves = clip.times
+    counts = [
+        awkward(at_rate(replace(clip, times=moves / pace)), moves / pace, own.speed, own.jerk).sum()
+        for pace in (0.5, 1.0, 2.0, 4.0)
+    ]
+    assert counts[0] == 0
+    assert counts == sorted(counts)
+    assert counts[-1] > 30
+
+
 # --- the Turing test --------------------------------------------------------------------------------------------------
 
 

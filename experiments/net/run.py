@@ -162,7 +162,7 @@ COMPARED = (("posture", "none"), ("progression", "none"), ("progression", "postu
 def chart(rows: list[Row]) -> str:
     panels = []
     for key, (title, _) in MEASURES.items():
-        panel = Panel(title, "a dot a sequence, at the right their mean", "", joined=False)
+        panel = Panel(title, "a dot a sequence, at the right their mean", "", joined=False, numbered=False)
         for place, kind in enumerate(("danced", "slerp", *SCHEMES)):
             by_sequence = _by_sequence(rows, kind, key)
             found = [(place + 0.3 * n / len(by_sequence), _mean(v)) for n, v in enumerate(by_sequence.values())]

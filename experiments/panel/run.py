@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -17,6 +18,8 @@ from motionmind.chaos.reorder import itinerary
 from motionmind.metrics import angular_jerk, angular_speed
 from motionmind.metrics.measure import at_rate
 from motionmind.variation.seams import judge
+
+Floats = NDArray[np.float64]
 
 FLOWS, NUDGES, LENGTH = ("lorenz", "rossler"), (0.1, 0.3, 1.0), 200
 RULES: dict[str, dict[str, Any]] = {
@@ -42,8 +45,8 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row]:
     """Each of some abrupt transitions, joined under one rule."""
     found, pieces = material(data, by)
-    speed, jerk = limits(found)
-    pairs = [(piece, pair) for piece in pieces for pair in left(len(piece))]
+    own = usual(found)
+    pairs = [(piece, pair) for piece in pieces for pair in leaps(len(piece))]
     order = np.random.default_rng(seed).permutation(len(pairs))
     out: list[Row] = []
     for number in order:
@@ -62,6 +65,7 @@ def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row
             "own_path": abs(pair[1] - pair[0]),
             "bridges": 0,
             "awkward": 0,
+            "own_awkward": own.awkward,
         }
         try:
             tween = found.tween(*piece.ends(*pair), node_budget=BUDGET, fps=FPS, **RULES[rule])
@@ -69,7 +73,7 @@ def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row
             pass
         else:
             row |= {"solved": 1, "moves": float(tween.moves), "bridges": len(tween.bridges)}
-            row["awkward"] = int(awkward(tween.motion, tween.motion.insertions[0].times, speed, jerk).sum())
+            row["awkward"] = int(awkward(tween.motion, tween.motion.insertions[0].times, own.speed, own.jerk).sum())
         out.append(row)
         if len(out) == most:
             break
@@ -91,7 +95,7 @@ def material(data: str | None, by: str) -> tuple[Engine, list[Piece]]:
     return Engine.learn(part(whole, [number]), make_discretization("ballet")), [piece]
 
 
-def left(count: int) -> list[tuple[int, int]]:
+def leaps(count: int) -> list[tuple[int, int]]:
     """Where variations of a piece of so many postures leave its order: from which posture to which other, once each."""
     found: dict[tuple[int, int], None] = {}
     for flow in FLOWS:
@@ -101,29 +105,44 @@ def left(count: int) -> list[tuple[int, int]]:
     return list(found)
 
 
+@dataclass(frozen=True)
+class Usual:
+    """What is usual of a corpus's joints: the speed and the jerk [J] that each goes beyond in one frame of a hundred,
+    and how many in a hundred of its own moves are awkward all the same."""
+
+    speed: Floats
+    jerk: Floats
+    awkward: float
+
+
 @lru_cache(maxsize=2)
-def limits(found: Engine) -> tuple[float, float]:
-    """The speed and the jerk, means over joints, that one in a hundred of the corpus's own frames goes beyond."""
-    clips = [at_rate(found.corpus.motion(clip)).rotations for clip in found.corpus.clips]
-    speed = np.concatenate([angular_speed(q, FPS).mean(axis=1) for q in clips])
-    jerk = np.concatenate([angular_jerk(q, FPS).mean(axis=1) for q in clips if len(q) > 3])
-    return float(np.percentile(speed, RARE)), float(np.percentile(jerk, RARE))
+def usual(found: Engine) -> Usual:
+    whole = found.corpus
+    clips = [at_rate(whole.motion(clip)) for clip in whole.clips]
+    speed = np.percentile(np.concatenate([angular_speed(clip.rotations, FPS) for clip in clips]), RARE, axis=0)
+    long = [clip.rotations for clip in clips if len(clip) > 3]
+    jerk = np.percentile(np.concatenate([angular_jerk(q, FPS) for q in long]), RARE, axis=0)
+    own = [
+        awkward(motion, whole.times[clip.start : clip.stop], speed, jerk)
+        for motion, clip in zip(clips, whole.clips, strict=True)
+    ]
+    return Usual(speed, jerk, 100.0 * float(np.concatenate(own).mean()))
 
 
-def awkward(motion: Motion, moves: NDArray[np.float64], speed: float, jerk: float) -> NDArray[np.bool_]:
-    """Whether each move has a frame in which joints turn faster, and one in which they jerk more, than the corpus's do
-    but in one frame of a hundred."""
+def awkward(motion: Motion, moves: Floats, speed: Floats, jerk: Floats) -> NDArray[np.bool_]:
+    """Whether in each move some joint turns faster and jerks more than `speed` and `jerk` [J]."""
     if len(motion) < 4:
         return np.zeros(len(moves) - 1, dtype=bool)
-    fast = angular_speed(motion.rotations, FPS).mean(axis=1) > speed
-    rough = angular_jerk(motion.rotations, FPS).mean(axis=1) > jerk
-    times = motion.times
 
-    def has(frames: NDArray[np.bool_], ahead: int) -> NDArray[np.bool_]:
-        at = np.searchsorted(moves, times[: len(frames)] + 0.5 * ahead / FPS, side="right") - 1
-        return np.bincount(at[frames].clip(0, len(moves) - 2), minlength=len(moves) - 1) > 0
+    def has(values: Floats, most: Floats, frames: int) -> NDArray[np.bool_]:
+        """Whether each joint goes beyond the most within each move [T, J]; a value is of so many frames."""
+        at = np.searchsorted(moves, motion.times[: len(values)] + 0.5 * frames / FPS, side="right") - 1
+        out = np.zeros((len(moves) - 1, values.shape[1]), dtype=bool)
+        np.logical_or.at(out, at.clip(0, len(out) - 1), values > most)
+        return out
 
-    return has(fast, 1) & has(rough, 3)
+    fast = has(angular_speed(motion.rotations, FPS), speed, 1)
+    return np.any(fast & has(angular_jerk(motion.rotations, FPS), jerk, 3), axis=1)
 
 
 # --- what is told -----------------------------------------------------------------------------------------------------
@@ -150,6 +169,7 @@ def means(rows: list[Row]) -> list[Row]:
                 "most": max(lengths),
                 "shorter": float(np.mean([row["moves"] < row["own_path"] for row in ahead])) if ahead else float("nan"),
                 "awkward": 100.0 * sum(row["awkward"] for row in solved) / max(sum(row["moves"] for row in solved), 1),
+                "own_awkward": mine[0]["own_awkward"],
                 "bridges": float(np.mean([row["bridges"] for row in solved])) if solved else float("nan"),
             }
         )
@@ -179,6 +199,7 @@ def tell(rows: list[Row]) -> str:
             "moves": lambda r: f"{r['least']:.0f} to {r['most']:.0f}, median {r['median']:.0f}",
             "shorter than the piece's own way": lambda r: f"{r['shorter']:.0%}",
             "awkward in 100 moves": lambda r: f"{r['awkward']:.1f}",
+            "of the corpus's own": lambda r: f"{r['own_awkward']:.1f}",
             "bridges": lambda r: f"{r['bridges']:.1f}",
         },
         means(rows),
