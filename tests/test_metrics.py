@@ -400,6 +400,13 @@ def test_style_is_told_by_how_joints_move_and_not_by_where_they_are() -> None:
     assert judge.table(0) == found
 
 
+def test_of_two_corpora_in_one_style_each_is_taken_for_the_other_as_often() -> None:
+    rng = np.random.default_rng(5)
+    judge = find_judge({"one": wavers(rng, 1.0, 12), "other": wavers(rng, 1.0, 12)}, 60)
+    for shares in judge.table(0).values():
+        assert 0.25 < shares["held out"] < 0.75
+
+
 def test_style_needs_something_to_be_judged_by() -> None:
     rng = np.random.default_rng(3)
     slow, fast = wavers(rng, 0.4), wavers(rng, 1.6)
@@ -427,6 +434,8 @@ def test_a_tween_is_measured_by_the_states_that_it_passes(engine: Engine) -> Non
     )
     for figure in found.values():
         assert not figure.low > figure.high
+    slow = engine.tween(*ends, moves=4, duration=2.9)  # at the corpus's pace that would be 14 moves
+    assert measure(slow.motion, engine)["moves"].value == 4
 
 
 def test_a_corpus_measures_itself_within_its_range_but_for_what_it_copies(engine: Engine) -> None:

@@ -13,7 +13,7 @@ from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, RECORDED, movement, recorded, without
 from motionmind import Skeleton
 from motionmind import rotations as rot
-from motionmind.metrics import Judge, find_feet, find_floor, find_judge, l2q
+from motionmind.metrics import Judge, angular_speed, find_feet, find_floor, find_judge, l2q
 from motionmind.notation.body_file import body as anatomy
 from motionmind.render.anatomy import body_of
 
@@ -75,6 +75,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
                     "kind": kind,
                     "taken": int(who.takes(rotations[:FRAMES], name, sequence)),
                     "distance": who.distance(rotations[:FRAMES], name, sequence),
+                    "speed": angular_speed(rotations, FPS).mean(),
                     "legs_collide": legs.mean(),
                     "others_collide": others.mean(),
                     "off_balance_cm": off_balance(piece.skeleton, rotations, root),
@@ -150,6 +151,7 @@ def off_balance(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 MEASURES = {
     "taken": ("taken for the corpus", "{:.0%}"),
     "distance": ("distance in style", "{:.2f}"),
+    "speed": ("angular speed, rad/s", "{:.2f}"),
     "legs_collide": ("frames in which legs collide", "{:.1%}"),
     "others_collide": ("or other parts", "{:.1%}"),
     "off_balance_cm": ("off balance, cm", "{:.1f}"),
