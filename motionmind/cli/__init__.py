@@ -12,6 +12,7 @@ import click
 
 import motionmind.cli.corpora
 import motionmind.cli.looks
+import motionmind.cli.measures
 import motionmind.cli.pictures
 import motionmind.cli.scores
 import motionmind.cli.variations  # noqa: F401 (each adds its commands)

@@ -1,0 +1,84 @@
+"""The command that measures movement beside a corpus."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from motionmind.cli.commands import app
+from motionmind.cli.files import read, read_mapping
+from motionmind.cli.options import FILE, HOME, JSON, example, reading
+from motionmind.cli.printing import count
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.metrics.measure import Figure
+
+
+@app.command(epilog=example("motionmind measure tween.json --corpus ballet"))
+@click.argument("file", type=FILE)
+@click.option("--corpus", required=True, metavar="NAME", help="Corpus that it is held against, by name or folder.")
+@click.option("--report", type=FILE, help="What tween --report wrote of FILE: its path of states, exactly.")
+@JSON
+@reading
+@HOME
+def measure(
+    file: Path,
+    corpus: str,
+    report: Path | None,
+    as_json: bool,
+    joints: Path | None,
+    home: Path | None,
+    **source: Any,
+) -> None:
+    """Measure movement, beside the range of a corpus's own.
+
+    FILE is any movement: a tween, a recording. How it moves is seen at 30 frames a second; what it says, in the
+    corpus's states. The range is from the 5th to the 95th percentile of the corpus's clips, in pieces as long, or of a
+    tenth of it; what is beyond it is marked.
+    """
+    import numpy as np
+
+    from motionmind.engine import Engine
+    from motionmind.explain import read_report
+    from motionmind.learned import own_skeleton
+    from motionmind.metrics.measure import measure
+
+    motion = own_skeleton(read(file, **source), read_mapping(joints))
+    engine = Engine.load(corpus, home)
+    path = None
+    if report is not None:
+        told = read_report(report)
+        if tuple(told.joints) != engine.corpus.lanes:
+            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints are others")
+        path = np.array(told.path, dtype=np.int32)
+        if np.any(path < 0) or np.any(path >= engine.space.sizes):
+            raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
+    found = measure(motion, engine, path)
+    if as_json:
+        figures = {name: {k: _number(v) for k, v in asdict(figure).items()} for name, figure in found.items()}
+        click.echo(json.dumps({"corpus": engine.corpus.name, "frames": len(motion), "figures": figures}))
+        return
+    seconds = motion.times[-1] - motion.times[0]
+    click.echo(f"{file}: {count(len(motion), 'frame')} in {seconds:.2f} s, beside {engine.corpus.name}")
+    width = max(map(len, found))
+    click.echo(f"{'':{width}}     value    corpus 5 to 95 %")
+    for name, figure in found.items():
+        click.echo(_line(name.replace("_", " "), figure, width))
+
+
+def _line(name: str, figure: Figure, width: int) -> str:
+    beyond = "<" if figure.value < figure.low else ">" if figure.value > figure.high else " "
+    low, high = ("-" if math.isnan(number) else f"{number:.4g}" for number in (figure.low, figure.high))
+    unit = f" ({figure.unit})" * bool(figure.unit)
+    return f"{name:{width}}  {figure.value:8.4g} {beyond}  {low:>6} to {high:8}  {figure.about}{unit}"
+
+
+def _number(value: Any) -> Any:
+    """What JSON can hold: null for what has no value."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value

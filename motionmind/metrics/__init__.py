@@ -1,0 +1,31 @@
+"""Measures of movement: how far from the truth, how smooth, whether feet stay, how likely, how new, in whose style."""
+
+from motionmind.metrics.feet import find_feet, find_floor, foot_slide, skating
+from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
+from motionmind.metrics.paths import Habits, arrival_spread, arrivals, find_habits
+from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
+from motionmind.metrics.style import Judge, find_judge
+from motionmind.metrics.verbatim import Phrasebook, find_phrases
+
+__all__ = [
+    "Habits",
+    "Judge",
+    "Phrasebook",
+    "angular_jerk",
+    "angular_speed",
+    "arrival_spread",
+    "arrivals",
+    "find_feet",
+    "find_floor",
+    "find_habits",
+    "find_judge",
+    "find_phrases",
+    "foot_slide",
+    "l2p",
+    "l2q",
+    "npss",
+    "position_spread",
+    "seen",
+    "skating",
+    "sparc",
+]

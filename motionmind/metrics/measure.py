@@ -1,0 +1,241 @@
+"""All measures of one movement at once, each beside the range that the corpus's own movement has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.learned import Learned, own_skeleton
+from motionmind.metrics.feet import RATE, find_feet, find_floor, foot_slide, skating
+from motionmind.metrics.paths import Habits, arrival_spread, find_habits
+from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
+from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
+from motionmind.metrics.verbatim import LONGEST, Phrasebook, find_phrases
+from motionmind.motion import Motion
+from motionmind.realise.spline import natural_spline, rotation_spline
+from motionmind.realise.timing import usual
+from motionmind.skeleton import Skeleton
+
+Floats = NDArray[np.float64]
+Path = NDArray[np.int32]
+
+RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
+_SHORTEST = 4  # frames that a jerk needs
+_PIECE, _MARGIN = 32, 8  # keys that are splined at a time, and those on either side that bear on them
+_MOST = 100  # pieces of the corpus that are measured
+_PARTS = 10  # at least so many are made of all its movement
+_KEYED = 2.0  # frames in the time of a move; fewer are keyframes
+_HUMAN = 1.0  # metres; limits of skating are for bodies as high as this at least
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measure of a movement.
+
+    Attributes:
+        value: what it is; NaN where it has no meaning, as the smoothness of rest.
+        low: 5th percentile of the corpus's own movement, in pieces; NaN where that has none.
+        high: 95th percentile.
+        unit: of all three; "" where they are numbers or shares.
+        about: what it says, in words.
+    """
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    about: str
+
+
+_ABOUT: Mapping[str, tuple[str, str]] = {
+    "speed": ("rad/s", "mean angular speed of the joints"),
+    "jerk": ("rad/s^3", "mean angular jerk of the joints"),
+    "sparc": ("", "smoothness of the speed: the closer to 0 the smoother"),
+    "style": ("", "how far from how the corpus's joints move: squared Mahalanobis distance"),
+    "skating": ("", "share of frames in which a foot that is low moves far"),
+    "slide": ("cm", "how far a foot near the floor slides, a frame"),
+    "moves": ("", "number of moves"),
+    "arrival_spread": ("moves", "how far apart joints arrive for good"),
+    "attested": ("", "share of the joints' transitions that were seen in the corpus"),
+    "log_likelihood": ("nats", "of each attested transition of a joint"),
+    "cliche_rate": ("", "share of joints' moves, where there is a choice, that are the likeliest"),
+    "frequency": ("", "percentile of how often the corpus makes the joints' moves"),
+    "longest_run": ("postures", "longest run of whole postures from one clip"),
+    "mean_run": ("postures", "mean of such runs"),
+} | {
+    f"copied_{size}_{n}": ("", f"share of what a {size} does in {n} posture{'s' * (n != 1)} that the corpus has")
+    for size in ("joint", "limb", "body")
+    for n in range(1, LONGEST + 1)
+}
+
+
+def measure(motion: Motion, learned: Learned, path: Path | None = None) -> dict[str, Figure]:
+    """All measures of a movement beside a corpus.
+
+    How it moves is seen at 30 frames a second, keyframes joined by splines, as tweens join them. What it says in states
+    is seen at the corpus's own postures a second; keyframes as they are, and what the engine made at the times of its
+    moves. The corpus's range is that of its own clips, in pieces as long as the movement, or as the clip or a tenth of
+    the corpus if that is shorter; of what is copied it is what each has from the other clips.
+
+    Args:
+        motion: on the corpus's skeleton, or on one that maps to it.
+        learned: the corpus.
+        path: states of the movement [T + 1, L], where the engine's report says them.
+
+    Raises:
+        SkeletonError: the movement is on other joints.
+        MotionMindError: there is not enough of it to measure.
+    """
+    corpus = learned.corpus
+    motion = _on(corpus.skeleton, motion)
+    step = 1.0 / corpus.rate if corpus.rate else usual(learned.grammar.transitions)
+    sampled = at_rate(motion)
+    if path is None:
+        path = _path(motion, learned, step)
+    elif path.ndim != 2 or path.shape[1] != len(corpus.lanes):
+        raise MotionMindError(f"a path through {corpus.name} has {len(corpus.lanes)} lanes, not {path.shape[1:]}")
+    if len(sampled) < _SHORTEST or len(path) < 2:
+        raise MotionMindError(
+            f"{motion.name or 'the movement'} is too short to be measured: it takes {_SHORTEST} frames at {RATE:g} a "
+            f"second, and two postures, {step:.2f} s apart"
+        )
+    habits, phrases = find_habits(learned.grammar), find_phrases(corpus, np.asarray(learned.states))
+    clips = [at_rate(corpus.motion(clip)) for clip in corpus.clips]
+    seen = [features(clip.rotations) for clip in clips]
+    own = _motion_figures(sampled, _style(seen, None)) | _path_figures(path, habits, phrases, None)
+    rows: dict[str, list[float]] = {name: [] for name in own}
+    frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
+    postures = min(len(path), max(len(corpus) // _PARTS, 2))
+    for found in (*_usual_motion(clips, seen, frames), *_usual_paths(learned, postures, habits, phrases)):
+        for name, value in found.items():
+            rows.setdefault(name, []).append(value)
+    out = {}
+    for name, value in own.items():
+        known = np.array(rows[name])[np.isfinite(rows[name])]
+        low, high = np.percentile(known, RANGE) if len(known) else (np.nan, np.nan)
+        out[name] = Figure(value, float(low), float(high), *_ABOUT[name])
+    return out
+
+
+def at_rate(motion: Motion) -> Motion:
+    """The movement at 30 frames a second: what is coarser is joined by splines, what is finer is thinned."""
+    if motion.fps >= RATE or len(motion) < 2:
+        return motion.resample(RATE)
+    start, keys = motion.times[0], motion.times
+    times = start + np.arange(int(np.floor((keys[-1] - start) * RATE + 1e-3)) + 1) / RATE
+    rotations, root = np.empty((len(times), len(motion.skeleton), 4)), np.empty((len(times), 3))
+    # A key bears on a natural spline a quarter as much for each key between; a margin spares splines of all keys.
+    for first in range(0, len(keys) - 1, _PIECE):
+        last = min(first + _PIECE, len(keys) - 1)
+        near = slice(max(first - _MARGIN, 0), last + _MARGIN + 1)
+        here = (times >= keys[first]) & ((times < keys[last]) | (last == len(keys) - 1))
+        rotations[here] = rotation_spline(keys[near], motion.rotations[near], times[here])
+        root[here] = natural_spline(keys[near], motion.root[near], times[here])
+    return replace(motion, rotations=rotations, root=root, times=times, insertions=())
+
+
+def _on(skeleton: Skeleton, motion: Motion) -> Motion:
+    """The movement on the corpus's joints; SkeletonError names the difference."""
+    if skeleton.difference(motion.skeleton) is not None:
+        motion = own_skeleton(motion)
+    difference = skeleton.difference(motion.skeleton)
+    if difference is not None:
+        raise SkeletonError(f"{motion.name or 'the movement'} is on another skeleton than the corpus: {difference}")
+    return motion
+
+
+def _path(motion: Motion, learned: Learned, step: float) -> Path:
+    """The states [T + 1, L] that a movement passes: of its keyframes, or every `step` seconds where it has many frames,
+    or move by move where the engine made it."""
+    whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
+    postures = motion
+    if whole:
+        postures = motion.at(whole[0].times)
+    elif motion.fps * step >= _KEYED:
+        postures = motion.resample(1.0 / step)
+    return learned.space.assign(learned.corpus.to_lanes(postures.rotations))
+
+
+def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
+    """What is measured of movement at 30 frames a second; `style` is what it is to be like."""
+    body, rotations, root = motion.skeleton, motion.rotations, motion.root
+    speed = angular_speed(rotations, RATE)
+    out = {
+        "speed": float(speed.mean()),
+        "jerk": float(angular_jerk(rotations, RATE).mean()),
+        "sparc": sparc(speed.mean(axis=1), RATE),
+    }
+    if style is not None and len(motion) >= WINDOW:
+        out["style"] = float(style.distances(rotations)[0])
+    if body.height >= _HUMAN and find_feet(body):
+        floor = find_floor(body, rotations, root)
+        out["skating"] = skating(body, rotations, root, floor)
+        out["slide"] = foot_slide(body, rotations, root, floor)
+    return out
+
+
+def _path_figures(path: Path, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
+    """What is measured of states; `clip` is the clip of the corpus that they are from."""
+    runs = phrases.runs(path, clip) or [0]
+    return {
+        "moves": float(len(path) - 1),
+        "arrival_spread": arrival_spread(path),
+        "attested": _mean(habits.attested(path)),
+        "log_likelihood": _mean(habits.log_likelihoods(path)),
+        "cliche_rate": _mean(habits.cliches(path)),
+        "frequency": _mean(habits.percentiles(path)),
+        "longest_run": float(max(runs)),
+        "mean_run": _mean(np.array(runs)),
+    } | {
+        f"copied_{size}_{n}": phrases.copied(path, size, n, clip)
+        for size in phrases.groups
+        for n in range(1, LONGEST + 1)
+    }
+
+
+def _style(seen: Sequence[Floats], besides: int | None) -> Styles | None:
+    """How the joints of clips move, by the `features` of all but one; None where nothing is left to tell it by."""
+    rows = [one for number, one in enumerate(seen) if number != besides and len(one)]
+    return learn_styles({"own": np.concatenate(rows)}) if rows else None
+
+
+def _usual_motion(clips: Sequence[Motion], seen: Sequence[Floats], frames: int) -> Iterator[dict[str, float]]:
+    """How a corpus's clips at 30 frames a second, with their `features`, move, in pieces of as many frames; style is
+    beside the other clips."""
+    pieces = _pieces([len(clip) for clip in clips], frames, _SHORTEST)
+    styles = {number: _style(seen, number) for number, _ in pieces}
+    for number, start in pieces:
+        yield _motion_figures(clips[number].slice(start, start + frames), styles[number])
+
+
+def _usual_paths(learned: Learned, postures: int, habits: Habits, phrases: Phrasebook) -> Iterator[dict[str, float]]:
+    """What a corpus's clips say, in pieces of as many postures."""
+    states, clips = np.asarray(learned.states), learned.corpus.clips
+    for number, start in _pieces([len(clip) for clip in clips], postures, 2):
+        path = states[clips[number].start : clips[number].stop][start : start + postures]
+        found = _path_figures(path, habits, phrases, number)
+        del found["moves"]  # which is how long the piece was made
+        if len(clips) == 1:  # there is no other to copy from
+            found = {name: value for name, value in found.items() if not name.endswith("run") and "copied" not in name}
+        yield found
+
+
+def _pieces(lengths: Sequence[int], size: int, least: int) -> list[tuple[int, int]]:
+    """Where pieces of a `size` begin: the clip's number, and where in it; the whole of a clip that is shorter, if it is
+    not less than `least`. Of many, some that are evenly spread."""
+    found = [
+        (number, start)
+        for number, length in enumerate(lengths)
+        if length >= least
+        for start in range(0, max(length - size, 0) + 1, size)
+    ]
+    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), _MOST)).astype(int))]
+
+
+def _mean(values: NDArray[Any]) -> float:
+    return float(np.mean(values)) if len(values) else float("nan")
