@@ -63,6 +63,10 @@ def recording() -> Motion:
     return ballet_clip("jump").resample(30.0)
 
 
+def inserted(variation: Variation) -> list[int]:
+    return [seam.number for seam in variation.seams if seam.insertion]
+
+
 def same(one: Motion, other: Motion) -> bool:
     """Whether two movements are the same to the last bit."""
     return all(np.array_equal(getattr(one, what), getattr(other, what)) for what in ("rotations", "root", "times"))
@@ -162,6 +166,16 @@ def test_the_same_asked_twice_is_the_same_to_the_byte(kata: Piece, karate: Engin
         ({"length": 0}, "length must be a whole number from 1"),
         ({"nudge": (1.0, 2.0)}, "nudge"),
         ({"start": (1.0,)}, "lorenz starts at 3 finite numbers"),
+        ({"start": "x"}, "start must be finite numbers, not 'x'"),
+        ({"nudge": "x"}, "nudge must be finite numbers, not 'x'"),
+        ({"nudge": ((1.0,), (1.0, 2.0))}, "nudge must be finite numbers"),
+        ({"step": "x"}, "step must be a finite number, not 'x'"),
+        ({"step": (0.1,)}, "step must be a finite number"),
+        ({"step": True}, "step must be"),
+        ({"length": True}, "length must be a whole number from 1 to 1000000, not True"),
+        ({"skip": np.float64(10.0)}, "skip must be a whole number"),
+        ({"transient": 10.5}, "transient must be a whole number from 0, not 10.5"),
+        ({"flow": "lorenz"}, "flow must be a Flow, such as flow_of"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(kata: Piece, options: dict[str, object], message: str) -> None:
@@ -383,6 +397,36 @@ def test_damaged_files_are_refused_or_read(
         except MotionMindError:
             refused += 1
     assert 50 < refused < 300
+
+
+def test_numpys_numbers_are_written_as_what_they_are(kata: Piece, karate: Engine, tmp_path: Path) -> None:
+    whole = {"skip": 3, "transient": 500, "length": 30}
+    asked = {"step": 0.01, "nudge": 0.5, "start": (1.0, 2.0, 20.0)}
+    once = vary(kata, karate, **whole, **asked, alternatives=1, seed=2, novelty=0.5, moves=(3, 4))  # type: ignore[arg-type]
+    assert inserted(once)
+    again = vary(
+        kata,
+        karate,
+        **{name: np.int64(value) for name, value in whole.items()},
+        **{name: np.array(value)[()] for name, value in asked.items()},
+        alternatives=np.int64(1),
+        seed=np.int64(2),
+        novelty=np.float64(0.5),
+        moves=(np.int64(3), np.int64(4)),
+    )
+    seam = inserted(once)[0]
+    write_variation(tmp_path / "a.json", once.approve(seam).cut(1, 2, 9).replace(seam, 1))
+    one, two, nine = np.array([1, 2, 9])
+    write_variation(tmp_path / "b.json", again.approve(np.int64(seam)).cut(one, two, nine).replace(np.int64(seam), one))
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert read_variation(tmp_path / "a.json").course.nudge == (0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("nudge", [0.1, (0.1, -0.3, 1e-9)])
+def test_a_course_holds_the_nudge_that_was_asked(kata: Piece, nudge: float | tuple[float, ...]) -> None:
+    course = vary(kata, nudge=nudge).course
+    assert course.nudge == (nudge if isinstance(nudge, tuple) else (nudge, 0.0, 0.0))
+    assert np.array_equal(vary(kata, nudge=course.nudge).order, vary(kata, nudge=nudge).order)
 
 
 def test_what_a_conversion_loses_is_said(smoothed: Variation, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
 from motionmind.motion import FASTEST, Motion, Posture
+from motionmind.variation.arguments import number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -88,7 +89,7 @@ class Piece:
         """
         if rate is None:
             return cls(motion, np.arange(len(motion)), facing)
-        if not 0.0 < rate <= FASTEST:
+        if not 0.0 < number("rate", rate) <= FASTEST:
             raise MotionMindError(
                 f"a rate must be a number of postures a second above 0, at most {FASTEST:g}, not {rate}"
             )

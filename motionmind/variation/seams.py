@@ -12,15 +12,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.engine import Engine
-from motionmind.errors import MotionMindError, NoPathError, SkeletonError
+from motionmind.errors import NoPathError, SkeletonError
 from motionmind.motion import Motion, Posture
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween import Bridge, Tween, Wait
+from motionmind.variation.arguments import whole
 from motionmind.variation.piece import Piece
 
 Floats = NDArray[np.float64]
@@ -213,8 +215,7 @@ def smooth(
         watch: as for `Engine.tween`; once it returns True, what is left stays pending.
         asked: the other arguments of `Engine.tween`.
     """
-    if not (isinstance(alternatives, int) and alternatives >= 1):
-        raise MotionMindError(f"alternatives must be a whole number from 1, not {alternatives}")
+    alternatives = whole("alternatives", alternatives, 1)
     joins, ended = list(joins), False
 
     def watching(so_far: Progress) -> bool:
@@ -241,7 +242,8 @@ def smooth(
             ways: dict[bytes, Tween] = {}
             for tween in found:  # a corpus may know one way only: then the next one is the same
                 ways.setdefault(tween.path.tobytes(), tween)
-            joins[number] = replace(join, candidates=tuple(map(Candidate.of, ways.values())), asked=found[0].asked)
+            plain = msgspec.to_builtins(found[0].asked, enc_hook=np.generic.item)
+            joins[number] = replace(join, candidates=tuple(map(Candidate.of, ways.values())), asked=plain)
         if ended:
             break
     return tuple(joins)

@@ -17,6 +17,7 @@ from motionmind.engine import Engine
 from motionmind.errors import MotionMindError
 from motionmind.motion import Motion
 from motionmind.search.solve import Watch
+from motionmind.variation.arguments import number, numbers, whole
 from motionmind.variation.piece import Arranged, Piece
 from motionmind.variation.review import (
     Approve,
@@ -50,7 +51,7 @@ class Course:
         flow: the flow's name.
         parameters: of the flow.
         start: of the piece's trajectory, before its transient [d].
-        nudge: how far from there, once the transient is over, the variation's trajectory begins [d].
+        nudge: how far from there, once the transient is over, the variation's trajectory begins [d], as it was asked.
         skip: points of the trajectories that are left out between two postures.
         step: of the integration.
         transient: steps that are dropped of the piece's trajectory at first.
@@ -152,20 +153,20 @@ class Variation:
 
     def approve(self, *seams: int) -> Variation:
         """These seams are good as they are."""
-        return self._after(Approve(seams))
+        return self._after(Approve(_numbers(seams)))
 
     def discard(self, *seams: int) -> Variation:
         """Without the insertions at these seams; MotionMindError where there is none."""
-        return self._after(Discard(seams))
+        return self._after(Discard(_numbers(seams)))
 
     def replace(self, seam: int, alternative: int) -> Variation:
         """With another of the movements that the engine found for a seam, counted from 1; it is open again."""
-        return self._after(Replace(seam, alternative))
+        return self._after(Replace(whole("a seam's number", seam), whole("an alternative's number", alternative)))
 
     def cut(self, first: int, last: int, before: int) -> Variation:
         """With postures `first` to `last` before posture `before` instead, all as they are numbered now, from 0;
         `before` may be the number of postures, which is the end. Seams keep their numbers, new ones get the next."""
-        return self._after(Cut(first, last, before))
+        return self._after(Cut(*(whole("a posture's number", posture) for posture in (first, last, before))))
 
     def smooth(
         self,
@@ -207,6 +208,10 @@ class Variation:
 
     def _after(self, edit: Edit) -> Variation:
         return replace(self, edits=(*self.edits, edit))
+
+
+def _numbers(seams: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(whole("a seam's number", seam) for seam in seams)
 
 
 def _plain(seam: Seam) -> dict[str, Any]:
@@ -271,21 +276,25 @@ def vary(
         SkeletonError: the piece is on another skeleton than the corpus.
     """
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    length = len(piece) if length is None else length
-    for name, value, least in (("skip", skip, 0), ("length", length, 1)):
-        if not (isinstance(value, int | np.integer) and least <= value <= LONGEST):
-            raise MotionMindError(f"{name} must be a whole number from {least} to {LONGEST}, not {value}")
-    found = itinerary(
-        flow, len(piece), length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient
-    )
+    if not isinstance(flow, Flow):
+        raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
+    skip = whole("skip", skip, 0, LONGEST)
+    length = whole("length", len(piece) if length is None else length, 1, LONGEST)
+    step = number("step", flow.step if step is None else step)
+    transient = whole("transient", flow.transient if transient is None else transient, 0)
+    start = numbers("start", flow.start if start is None else start)
+    away = numbers("nudge", nudge)
+    if np.ndim(nudge) == 0:
+        away += (0.0,) * (len(flow.start) - 1)
+    found = itinerary(flow, len(piece), length, nudge=away, start=start, every=skip + 1, step=step, transient=transient)
     course = Course(
         flow.name,
         dict(flow.parameters),
-        tuple(map(float, flow.start if start is None else start)),
-        tuple(map(float, found.points[0] - found.sites[0])),
+        start,
+        away,
         skip,
-        flow.step if step is None else step,
-        flow.transient if transient is None else transient,
+        step,
+        transient,
         round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=step, transient=transient), 4),
     )
     variation = Variation(piece, course, found.indices)
