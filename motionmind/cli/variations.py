@@ -188,7 +188,9 @@ def vary(
     "--cut", type=Span(), metavar="A..B", help="Postures to take out, as --list numbers them, and to --paste."
 )
 @click.option("--paste", type=click.IntRange(min=0), metavar="N", help="The posture before which they go.")
-@click.option("--smooth", metavar="CORPUS", help="Judge and smooth the seams that are not yet, by this corpus.")
+@click.option(
+    "--smooth", metavar="CORPUS", help="Judge and smooth, by this corpus, the seams that are not yet or are discarded."
+)
 @click.option("--replace", type=COUNT, metavar="SEAM", help="Seam at which --alternative is to stand.")
 @click.option("--alternative", type=COUNT, metavar="K", help="Which of the movements found for it.")
 @click.option("--approve", type=Numbers(), metavar="SEAMS", help="Seams that are good, as 1,3; or all.")
@@ -241,7 +243,7 @@ def review(
     if output and not edits:
         raise click.UsageError("-o is for what was edited, and nothing is", context)
     check_outputs([(output, (".json",))] if output else [], [])
-    found = read_variation(file)
+    found = before = read_variation(file)
     for _ in range(undo):
         found = found.undo()
     if cut and paste is not None:
@@ -250,20 +252,31 @@ def review(
     if smooth:
         wishes, engine = asked(options), _engine(smooth, home)
         with interruption:
-            found = found.smooth(
+            smoothed = found.smooth(
                 engine, alternatives=alternatives, told=interruption.told, watch=interruption.watch, **wishes
             )
+        if smoothed is found and not interruption.asked:
+            is_left = any(seam.is_abrupt for seam in found.seams)
+            note(
+                "nothing new was found for what is left to smooth"
+                if is_left
+                else "nothing is left to smooth: --discard what is to be made anew"
+            )
+        found = smoothed
     if replace and alternative:
         found = found.replace(replace, alternative)
     if approve:
         found = found.approve(*_meant(found, approve))
     if discard:
         found = found.discard(*_meant(found, discard))
-    if edits:
+    is_written = found.edits != before.edits or output is not None
+    if is_written:
         write_variation(output or file, found)
     if listing or as_json or not edits:
         _tell(found, as_json)
-    if edits and not as_json:
+    if edits and found.edits == before.edits:
+        note("nothing changed")
+    if is_written and not as_json:
         click.echo(f"written   {click.format_filename(output or file)}")
     if interruption.asked:
         context.exit(INTERRUPTED)

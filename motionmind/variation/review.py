@@ -53,7 +53,8 @@ class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unkno
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """Seams that had not been judged or smoothed are."""
+    """Seams that had not been judged or smoothed are, or whose insertion had been discarded; nobody has approved what
+    stands there now."""
 
     joins: tuple[Join, ...]
 
@@ -144,6 +145,13 @@ class State:
                 found.append(Seam(verdict.number, at, start, end, join, verdict.decision, verdict.chosen))
         return tuple(found)
 
+    def shows(self, other: State) -> bool:
+        """Whether another state is the same to whoever looks: its postures, its seams and what stands there."""
+        mine, theirs = (
+            [(seam.number, seam.join, seam.decision, seam.chosen) for seam in state.seams] for state in (self, other)
+        )
+        return np.array_equal(self.postures, other.postures) and mine == theirs
+
     def seam(self, number: int) -> Seam:
         """The seam of that number; MotionMindError names those there are."""
         for seam in self.seams:
@@ -175,7 +183,17 @@ def edited(state: State, edit: Edit) -> State:
         case Cut():
             return _numbered(replace(state, sequence=_moved(state.sequence, edit)))
         case Smooth(joins):
-            return replace(state, joins={**state.joins, **{(join.start, join.end): join for join in joins}})
+            return _smoothed(state, {(join.start, join.end): join for join in joins})
+
+
+def _smoothed(state: State, joins: Mapping[tuple[int, int], Join]) -> State:
+    """The state with what is said of transitions now; what was decided stands only where there was and is nothing."""
+    verdicts = dict(state.verdicts)
+    for (one, other), verdict in verdicts.items():
+        join = joins.get((int(state.order[one]), int(state.order[other])))
+        if join and (join.candidates or verdict.decision == "discarded"):
+            verdicts[one, other] = Verdict(verdict.number)
+    return replace(state, joins={**state.joins, **joins}, verdicts=verdicts)
 
 
 def _with_candidates(state: State, number: int, what: str) -> tuple[Candidate, ...]:

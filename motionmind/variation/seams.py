@@ -130,6 +130,13 @@ class Join:
         """Whether it is abrupt and the engine was not asked yet."""
         return self.is_abrupt and not self.candidates and not self.failure
 
+    def tells_more_than(self, other: Join | None) -> bool:
+        """Whether there is more in it than in what was known of the same transition, if anything."""
+        if other is None or self.candidates or not self.is_abrupt:
+            return True
+        said = other.corpus, other.breaks, other.failure
+        return not other.candidates and not self.is_pending and (self.corpus, self.breaks, self.failure) != said
+
 
 @dataclass(frozen=True, eq=False)
 class Judge:

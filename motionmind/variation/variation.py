@@ -75,7 +75,8 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """A variation and its review. Nothing changes it: what edits it returns another one.
+    """A variation and its review. Nothing changes it: what edits it returns another one, or itself where the edit
+    changes nothing, which is no edit then.
 
     Attributes:
         piece: what it is a variation of.
@@ -178,7 +179,11 @@ class Variation:
         watch: Watch | None = None,
         **asked: Any,
     ) -> Variation:
-        """With the seams judged, and smoothed by the engine, that no corpus was asked about or that were not smoothed.
+        """With the seams judged, and smoothed by the engine, that no corpus was asked about, that were not smoothed, or
+        whose insertions are discarded.
+
+        What is found for these is open again. A transition that comes more than once is made anew where all its
+        insertions are discarded, and keeps what it had where nothing is found.
 
         Args:
             engine: the corpus that says which of them are abrupt, and smooths those.
@@ -192,13 +197,14 @@ class Variation:
             SkeletonError: the piece is on another skeleton than the corpus.
             MotionMindError: an argument is out of its range.
         """
-        left = [seam for seam in self.seams if seam.join is None or (seam.join.is_abrupt and not seam.join.candidates)]
-        pairs = dict.fromkeys((seam.start, seam.end) for seam in left)  # once however often it comes
-        judged = judge(self.piece, pairs, engine, posturewise)
-        if not judged:
-            return self
+        stands = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
+        known = {(seam.start, seam.end): seam.join for seam in self.seams}  # once however often it comes
+        left = [pair for pair, join in known.items() if pair not in stands and (join is None or join.is_abrupt)]
+        judged = judge(self.piece, left, engine, posturewise)
         asked = {"posturewise": posturewise, **asked}
-        return self._after(Smooth(smooth(self.piece, judged, engine, alternatives, told=told, watch=watch, **asked)))
+        found = smooth(self.piece, judged, engine, alternatives, told=told, watch=watch, **asked)
+        news = tuple(join for join in found if join.tells_more_than(known[join.start, join.end]))
+        return self._after(Smooth(news)) if news else self
 
     def undo(self) -> Variation:
         """Without the last edit; MotionMindError where there is none."""
@@ -207,7 +213,8 @@ class Variation:
         return replace(self, edits=self.edits[:-1])
 
     def _after(self, edit: Edit) -> Variation:
-        return replace(self, edits=(*self.edits, edit))
+        after = replace(self, edits=(*self.edits, edit))
+        return self if self._state.shows(after._state) else after
 
 
 def _numbers(seams: tuple[int, ...]) -> tuple[int, ...]:
