@@ -6,6 +6,7 @@ import json
 import random
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.engine import Engine
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lost, read_motion, write_motion
-from motionmind.motion import Motion
+from motionmind.motion import Insertion, Motion
 from motionmind.search.solve import Progress
 from motionmind.variation.piece import Piece
 from motionmind.variation.seams import BODY, Join, judge
@@ -117,6 +118,43 @@ def test_steps_are_the_pieces_in_the_bodys_heading_and_nothing_teleports(kata: P
             continue
         turn = Rotation.from_rotvec([0.0, headings[n] - faced[i], 0.0])
         np.testing.assert_allclose(step, turn.apply(own.root[k] - own.root[i])[[0, 2]], atol=1e-9)
+
+
+@given(order=orders, spans=st.lists(st.tuples(st.integers(0, 107), st.integers(1, 5)), max_size=12))
+def test_a_pieces_own_insertions_are_marked_where_the_whole_of_them_comes(
+    kata: Piece, order: np.ndarray, spans: list[tuple[int, int]]
+) -> None:
+    ranges, end = [], 0
+    for begin, moves in sorted(spans):
+        if begin >= end and begin + moves < len(kata):
+            ranges.append(range(begin, end := begin + moves + 1))
+    times = kata.motion.times
+    marks = tuple(Insertion(times[span.start : span.stop], (("pelvis", 0),)) for span in ranges)
+    piece = Piece(replace(kata.motion, insertions=marks), kata.frames)
+    order = np.concatenate([order, np.arange(30, 80)])
+    motion, frames = piece.arranged(order, {})
+    here = [
+        (n, span)
+        for n, first in enumerate(order)
+        for span in ranges
+        if span.start == first and np.array_equal(order[n : n + len(span)], span)
+    ]
+    assert len(motion.insertions) == len(here)
+    for mark, (n, span) in zip(motion.insertions, here, strict=True):
+        np.testing.assert_allclose(mark.times, motion.times[frames[n : n + len(span)]], atol=1e-9)
+        assert mark.bridged == (("pelvis", 0),)
+
+
+@given(order=orders)
+def test_what_stays_is_counted_with_the_time_that_it_takes(
+    kata: Piece, smoothed: Variation, order: np.ndarray
+) -> None:
+    counts = Variation(kata, smoothed.course, order).report()["counts"]
+    moving = [n for n, (i, k) in enumerate(pairwise(order)) if i != k]
+    assert counts["stays"] == len(order) - 1 - len(moving)
+    motion, frames = kata.arranged(order, {})
+    lasting = np.diff(motion.times[frames])
+    assert counts["seconds_still"] == pytest.approx(lasting.sum() - lasting[moving].sum(), abs=1e-9)
 
 
 @given(order=orders)
@@ -467,7 +505,14 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     assert done.code == 0
     assert "note: no corpus says which transitions are abrupt" in done.err
     assert "not judged" in done.out
+    done = run("vary", "clip.json", "--attractor", "lorenz", "--skip", 0, "--length", 80, "-o", "out.json")
+    counts = run("review", "out.json", "--json").json["counts"]
+    assert 4 * counts["stays"] > 79
+    said = f"{counts['stays']} of 79 steps stay in their posture, {counts['seconds_still']:.1f} s"
+    assert f"note: {said}: another --start, a larger --skip or --step moves it" in done.err
+    assert said in done.out.splitlines()
     done = run("vary", "clip.json", "--nudge", 0, "-o", "out.json")
+    assert "stay" not in done.out + done.err
     assert "note: it does not leave the piece's order" in done.err
 
 

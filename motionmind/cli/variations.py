@@ -29,7 +29,7 @@ from motionmind.cli.options import (
     searching,
     settings,
 )
-from motionmind.cli.printing import Interruption, note, print_review, progress
+from motionmind.cli.printing import Interruption, count, note, print_review, progress
 from motionmind.cli.sources import clips_in, frames_of, holds_clips, in_corpus, movement
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from motionmind.motion import Motion
     from motionmind.variation.variation import Variation
 
+_STILL = 0.25  # of the steps: where more of them stay, the variation stands still to the eye
 _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
@@ -174,6 +175,12 @@ def vary(
         note("it does not leave the piece's order: a larger --nudge or --length lets it")
     elif engine is None:
         note("no corpus says which transitions are abrupt, and none is smoothed: --corpus names one")
+    counts = result.report()["counts"]
+    if counts["stays"] > _STILL * (counts["postures"] - 1):
+        note(
+            f"{counts['stays']} of {count(counts['postures'] - 1, 'step')} stay in their posture, "
+            f"{counts['seconds_still']:.1f} s: another --start, a larger --skip or --step moves it"
+        )
     if not as_json:
         click.echo(f"written   {', '.join(map(click.format_filename, files))}")
     if interruption.asked:

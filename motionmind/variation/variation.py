@@ -128,7 +128,7 @@ class Variation:
 
     def report(self) -> dict[str, Any]:
         """What it is made of, as plain values for JSON: all but the movement."""
-        seams = [_plain(seam) for seam in self.seams]
+        seams, stays = [_plain(seam) for seam in self.seams], np.flatnonzero(np.diff(self.postures) == 0)
         return {
             "piece": {"name": self.piece.motion.name, "postures": len(self.piece), "facing": self.piece.facing},
             "course": {
@@ -145,6 +145,8 @@ class Variation:
                 "attested": sum(seam.join is not None and not seam.join.is_abrupt for seam in self.seams),
                 "abrupt": sum(seam.is_abrupt for seam in self.seams),
                 "unjudged": sum(seam.join is None for seam in self.seams),
+                "stays": len(stays),
+                "seconds_still": float(self.piece.lasting[self.postures[stays]].sum()),
             },
             "seams": seams,
             "edits": len(self.edits),
