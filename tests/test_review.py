@@ -325,6 +325,7 @@ def test_what_changes_nothing_is_said(run: Run, file: Path, arguments: tuple[obj
         (("--undo",), "there is no edit to undo"),
         (("--smooth", "nothing"), "no corpus 'nothing'"),
         (("--strict",), "--strict is for --smooth"),
+        (("--alternatives", "2"), "--alternatives is for --smooth"),
         (("-o", "out.json"), "-o is for what was edited"),
         (("--approve", "all", "-o", "out.bvh"), "the name must end in one of .json"),
     ],

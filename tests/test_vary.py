@@ -146,9 +146,7 @@ def test_a_pieces_own_insertions_are_marked_where_the_whole_of_them_comes(
 
 
 @given(order=orders)
-def test_what_stays_is_counted_with_the_time_that_it_takes(
-    kata: Piece, smoothed: Variation, order: np.ndarray
-) -> None:
+def test_what_stays_is_counted_with_the_time_that_it_takes(kata: Piece, smoothed: Variation, order: np.ndarray) -> None:
     counts = Variation(kata, smoothed.course, order).report()["counts"]
     moving = [n for n, (i, k) in enumerate(pairwise(order)) if i != k]
     assert counts["stays"] == len(order) - 1 - len(moving)
@@ -219,6 +217,19 @@ def test_the_same_asked_twice_is_the_same_to_the_byte(kata: Piece, karate: Engin
 def test_what_cannot_be_asked_is_refused(kata: Piece, options: dict[str, object], message: str) -> None:
     with pytest.raises(MotionMindError, match=message):
         vary(kata, **options)  # type: ignore[arg-type]
+
+
+def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate: Engine) -> None:
+    for engine in (None, karate):
+        with pytest.raises(MotionMindError, match="alternatives must be a whole number from 1, not -3"):
+            vary(kata, engine, nudge=0.0, alternatives=-3)
+        with pytest.raises(TypeError, match="'novelti'; did you mean novelty"):
+            vary(kata, engine, nudge=0.0, novelti=1.0)
+        with pytest.raises(TypeError, match="'unlike'"):
+            vary(kata, engine, nudge=0.0, unlike=[])
+    still = vary(kata, nudge=0.0)
+    with pytest.raises(TypeError, match="'nonsense'"):
+        still.smooth(karate, nonsense=3)
 
 
 # --- what is abrupt -------------------------------------------------------------------------------------------------
@@ -546,11 +557,18 @@ def test_what_the_documents_show_runs(run: Run) -> None:
         (("macarena", "--parameter", "rho"), "--parameter rho: give NAME=VALUE"),
         (("macarena", "--parameter", "rho=1"), "lorenz (sigma 16, rho 1, beta 4)"),
         (("macarena", "--nudge", "far"), "'far' is no number"),
+        (("clip.json", "--strict", "--hold", "left_ankle"), "--hold is for --corpus, which is not given"),
+        (("clip.json", "--alternatives", "3"), "--alternatives is for --corpus, which is not given"),
+        (("clip.json", "--lambda", "2"), "--lambda is for --corpus, which is not given"),
+        (("macarena", "--unit", "cm"), "macarena: --unit is for a file of movement"),
+        (("karate/heian-shodan", "--source-fps", "30"), "--source-fps is for a file of movement"),
+        (("some.score", "--joints", "some.toml"), "some.score: --joints is for a file of movement"),
         (("macarena", "--corpus", "nothing"), "no corpus 'nothing'"),
         (("macarena", "--rate", "0.0001", "--via", "x.json"), "x.json: cannot be read"),
     ],
 )
 def test_bad_input_is_one_line(run: Run, tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+    write_motion("clip.json", ballet_clip("adagio").slice(0, 30))
     done = run("vary", *arguments, "-o", "out.json")
     assert done.code == 2
     assert message in done.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +96,10 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 @searching
 @reading
 @HOME
+@click.pass_context
 def vary(
+    context: click.Context,
+    /,
     source: Path,
     output: Path,
     report: Path | None,
@@ -140,9 +144,12 @@ def vary(
     wanted = [(output, MOVEMENT + PICTURES), *([(report, ())] if report else [])]
     check_outputs(wanted, [source, *vias])
     flow = flow_of(attractor, **settings(parameter))
-    options = asked(options)
-    motion, own = _piece(source, clip, home, joints, unit=unit, asf=asf, source_fps=source_fps)
+    wishes = asked(options)
+    motion, own = _piece(source, clip, home, joints=joints, unit=unit, asf=asf, source_fps=source_fps)
     judge = corpus or own
+    wish = _given(context, ["alternatives", *options.keys() - {"fps"}])
+    if wish and not judge:
+        raise click.UsageError(f"{wish} is for --corpus, which is not given", context)
     engine = _engine(judge, home) if judge else None
     if rate is None and engine and not holds_clips(source, home):
         rate = engine.corpus.rate
@@ -163,7 +170,7 @@ def vary(
             alternatives=alternatives,
             told=interruption.told,
             watch=interruption.watch,
-            **options,
+            **wishes,
         )
     files = [path for path, _ in wanted]
     with all_or_none(files):
@@ -184,7 +191,7 @@ def vary(
     if not as_json:
         click.echo(f"written   {', '.join(map(click.format_filename, files))}")
     if interruption.asked:
-        click.get_current_context().exit(INTERRUPTED)
+        context.exit(INTERRUPTED)
 
 
 @app.command(epilog=example("motionmind review variation.json --approve 6,7 --discard 8 --list"))
@@ -239,11 +246,9 @@ def review(
         raise click.UsageError("--cut says what, and --paste where to: give both", context)
     if (replace is None) != (alternative is None):
         raise click.UsageError("--replace says where, and --alternative what by: give both", context)
-    asking = [name for name in options if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if asking and not smooth:
-        raise click.UsageError(
-            f"--{asking[0].strip('_').replace('_', '-')} is for --smooth, which is not given", context
-        )
+    wish = _given(context, ["alternatives", *options])
+    if wish and not smooth:
+        raise click.UsageError(f"{wish} is for --smooth, which is not given", context)
     from motionmind.variation.variation_json import read_variation, write_variation
 
     edits = undo or cut or smooth or replace or approve or discard
@@ -310,14 +315,23 @@ def attractor(variation: Path, output: Path) -> None:
     click.echo(f"{output}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
 
 
-def _piece(
-    source: Path, clip: str | None, home: Path | None, joints: Path | None, **given: Any
-) -> tuple[Motion, str | None]:
+def _given(context: click.Context, names: Collection[str]) -> str | None:
+    """The first of some options that stands on the command line, as it is written there; None where none does."""
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
+            return option.opts[0]
+    return None
+
+
+def _piece(source: Path, clip: str | None, home: Path | None, **given: Any) -> tuple[Motion, str | None]:
     """The movement to vary, and the corpus that it is a clip of, if any."""
     many = holds_clips(source, home)
     if clip and not many:
         raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    found = clips_in(source, (clip,) if clip else (), home) if many else [movement(source, joints, **given)]
+    for name, value in given.items():
+        if many and value is not None:
+            raise MotionMindError(f"{source}: --{name.replace('_', '-')} is for a file of movement, which this is not")
+    found = clips_in(source, (clip,) if clip else (), home) if many else [movement(source, **given)]
     if len(found) != 1:
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
     return found[0], in_corpus(source, home)[0] if many and source.suffix.lower() != ".score" else None

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import signature
 from typing import Any
 
 import msgspec
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.engine import Engine
 from motionmind.errors import NoPathError, SkeletonError
+from motionmind.formats.text import meant
 from motionmind.motion import Motion, Posture
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween import Bridge, Tween, Wait
@@ -201,6 +203,20 @@ def judge(piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, postur
     return [Join(i, k, name, court.breaks(*piece.ends(i, k), float(piece.lasting[i]))) for i, k in pairs]
 
 
+def check_asked(alternatives: int, asked: Mapping[str, Any]) -> None:
+    """Whether seams can be smoothed so, before it shows that any are to be.
+
+    Raises:
+        MotionMindError: `alternatives` is out of its range.
+        TypeError: `Engine.tween` takes no argument of a name in `asked`.
+    """
+    whole("alternatives", alternatives, 1)
+    known = signature(Engine.tween).parameters.keys() - {"self", "a", "b", "unlike"}
+    for name in asked:
+        if name not in known:
+            raise TypeError(f"seams are not smoothed by an argument {name!r}{meant(name, known)}")
+
+
 def smooth(
     piece: Piece,
     joins: Iterable[Join],
@@ -222,7 +238,6 @@ def smooth(
         watch: as for `Engine.tween`; once it returns True, what is left stays pending.
         asked: the other arguments of `Engine.tween`.
     """
-    alternatives = whole("alternatives", alternatives, 1)
     joins, ended = list(joins), False
 
     def watching(so_far: Progress) -> bool:

@@ -31,7 +31,7 @@ from motionmind.variation.review import (
     begun,
     edited,
 )
-from motionmind.variation.seams import Join, Told, judge, smooth
+from motionmind.variation.seams import Join, Told, check_asked, judge, smooth
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -198,7 +198,9 @@ class Variation:
         Raises:
             SkeletonError: the piece is on another skeleton than the corpus.
             MotionMindError: an argument is out of its range.
+            TypeError: there is no such argument.
         """
+        check_asked(alternatives, asked)
         stands = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
         known = {(seam.start, seam.end): seam.join for seam in self.seams}  # once however often it comes
         left = [pair for pair, join in known.items() if pair not in stands and (join is None or join.is_abrupt)]
@@ -264,7 +266,11 @@ def vary(
     step: float | None = None,
     transient: int | None = None,
     length: int | None = None,
-    **smoothing: Any,
+    alternatives: int = ALTERNATIVES,
+    posturewise: bool = False,
+    told: Told | None = None,
+    watch: Watch | None = None,
+    **asked: Any,
 ) -> Variation:
     """A variation of a piece: its postures in the order in which a trajectory passes the sites of another one.
 
@@ -278,12 +284,14 @@ def vary(
         step: of the integration; the flow's own where None.
         transient: steps that are dropped at first; the flow's own where None.
         length: postures of the variation; as many as the piece's where None.
-        smoothing: see `Variation.smooth`: alternatives, posturewise, told, watch, and what `Engine.tween` takes.
+        alternatives: see `Variation.smooth`, as are `posturewise`, `told`, `watch` and what else is `asked`.
 
     Raises:
         MotionMindError: an argument is out of its range, or a trajectory diverges or settles.
         SkeletonError: the piece is on another skeleton than the corpus.
+        TypeError: there is no such argument.
     """
+    check_asked(alternatives, asked)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
     if not isinstance(flow, Flow):
         raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
@@ -310,5 +318,7 @@ def vary(
     if engine is None:
         return variation
     # What it begins with is no edit, and cannot be undone.
-    edits = variation.smooth(engine, **smoothing).edits
+    edits = variation.smooth(
+        engine, alternatives=alternatives, posturewise=posturewise, told=told, watch=watch, **asked
+    ).edits
     return replace(variation, joins=tuple(join for edit in edits if isinstance(edit, Smooth) for join in edit.joins))
