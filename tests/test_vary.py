@@ -26,6 +26,7 @@ from motionmind.formats import lost, read_motion, write_motion
 from motionmind.motion import Insertion, Motion
 from motionmind.search.solve import Progress
 from motionmind.variation.piece import Piece
+from motionmind.variation.review import Smooth
 from motionmind.variation.seams import BODY, Join, judge
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
@@ -425,6 +426,48 @@ def test_what_is_no_variation_is_refused(smoothed: Variation, tmp_path: Path) ->
         path.write_text(whole.replace(old, new, 1))
         with pytest.raises(FormatError, match=message):
             read_variation(path)
+
+
+def test_insertions_that_do_not_lead_where_they_should_are_refused(smoothed: Variation, tmp_path: Path) -> None:
+    path = tmp_path / "variation.json"
+    joins = tuple(join for join in smoothed.joins if len(join.candidates) == 2)[:2]
+    write_variation(path, replace(smoothed, joins=joins, edits=(Smooth(joins),)))
+    whole = json.loads(path.read_text())
+    first, join = 1, joins[1]
+    last = len(smoothed.piece) - 1
+    turned = Rotation.from_rotvec([1e-3, 0.0, 0.0])
+
+    def turn(motion: dict[str, list[list[list[float]]]]) -> None:
+        motion["rotations"][-1][3] = (turned * Rotation.from_quat(motion["rotations"][-1][3])).as_quat().tolist()
+
+    def move(motion: dict[str, list[list[float]]]) -> None:
+        motion["root"][0][0] += 1e-3
+
+    def flip(motion: dict[str, list[list[list[float]]]]) -> None:
+        motion["rotations"][0][3] = [-x for x in motion["rotations"][0][3]]
+
+    for where in ("joins", "edits[0].joins"):
+        for changed, message in (
+            (turn, f"{where}[{first}].candidates[1]: it does not end at posture {join.end} of the piece"),
+            (move, f"{where}[{first}].candidates[1]: it does not start at posture {join.start} of the piece"),
+            (flip, None),
+            ({"end": last + 1}, f"{where}[{first}]: from posture {join.start} to {last + 1} there is no seam"),
+            ({"end": join.start}, f"{where}[{first}]: from posture {join.start} to {join.start} there is no seam"),
+            ({"start": 5, "end": 6}, f"{where}[{first}]: from posture 5 to 6 there is no seam"),
+        ):
+            file = json.loads(json.dumps(whole))
+            section = file["variation"]
+            there = (section if where == "joins" else section["edits"][0])["joins"][first]
+            if isinstance(changed, dict):
+                there.update(changed)
+            else:
+                changed(there["candidates"][1]["motion"])
+            path.write_text(json.dumps(file))
+            if message is None:
+                read_variation(path)
+                continue
+            with pytest.raises(FormatError, match=re.escape(f"variation.json: variation: {message}")):
+                read_variation(path)
 
 
 def test_damaged_files_are_refused_or_read(

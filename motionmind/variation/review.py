@@ -139,7 +139,7 @@ class State:
         found = []
         for at, (one, other) in enumerate(pairwise(self.sequence)):
             start, end = int(self.order[one]), int(self.order[other])
-            if _is_seam(start, end):
+            if is_seam(start, end):
                 verdict = self.verdicts[one, other]
                 join = self.joins.get((start, end))
                 found.append(Seam(verdict.number, at, start, end, join, verdict.decision, verdict.chosen))
@@ -239,11 +239,11 @@ def _numbered(state: State) -> State:
     """The state with a verdict on each seam: new ones are open, and get the next numbers."""
     verdicts = dict(state.verdicts)
     for pair in pairwise(state.sequence):
-        if _is_seam(*state.order[list(pair)]) and pair not in verdicts:
+        if is_seam(*state.order[list(pair)]) and pair not in verdicts:
             verdicts[pair] = Verdict(len(verdicts) + 1)
     return replace(state, verdicts=verdicts)
 
 
-def _is_seam(start: int, end: int) -> bool:
+def is_seam(start: int, end: int) -> bool:
     """Whether posture `end` of a piece following on its posture `start` is another transition than the piece's own."""
     return end not in (start, start + 1)
