@@ -95,7 +95,7 @@ def test_trajectories_pass_the_sites_and_what_is_nearest_is_the_files_order(port
     order = portrait.variation.order
     assert (len(portrait.sites), len(portrait.points)) == (131, 180)
     assert np.array_equal(cKDTree(portrait.sites).query(portrait.points)[1], order)
-    assert np.array_equal(portrait.points[0] - portrait.sites[0], portrait.variation.course.nudge)
+    assert np.array_equal(portrait.points[0], portrait.sites[0] + portrait.variation.course.nudge)
     assert portrait.parting is not None
     assert np.array_equal(order[: portrait.parting], np.arange(portrait.parting))
     assert order[portrait.parting] != portrait.parting

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionmind.chaos.flows import FLOWS
@@ -49,41 +50,60 @@ cuts = st.tuples(places, places, st.integers(0, LENGTH)).filter(lambda cut: not 
 edits = st.lists(
     st.one_of(
         st.tuples(st.sampled_from(["approve", "discard", "replace"]), st.integers(0, 100)),
+        st.tuples(st.just("smooth"), st.integers(1, 3)),
         cuts.map(lambda cut: ("cut", (min(cut[:2]), max(cut[:2]), cut[2]))),
     ),
     max_size=6,
 )
 
 
-def edit(variation: Variation, what: str, how: object) -> Variation:
-    """An edit of any kind; `how` picks one of the seams there are, or says what to cut."""
+def edit(variation: Variation, engine: Engine, what: str, how: object) -> Variation:
+    """An edit of any kind; `how` picks one of the seams there are, or says what to cut, or the most moves."""
     if what == "cut":
         return variation.cut(*how)  # type: ignore[misc]
+    if what == "smooth":
+        return variation.smooth(engine, alternatives=1, max_moves=how)
+    if what == "replace":
+        many = [seam for seam in variation.seams if seam.join and len(seam.join.candidates) > 1]
+        seam = many[how % len(many)]  # type: ignore[operator]
+        return variation.replace(seam.number, 3 - seam.chosen)
     numbers = inserted(variation)
     if not numbers:
         return variation
     number = numbers[how % len(numbers)]  # type: ignore[operator]
-    return variation.replace(number, 1) if what == "replace" else getattr(variation, what)(number)
+    found: Variation = getattr(variation, what)(number)
+    return found
 
 
+def seen(variation: Variation) -> list[object]:
+    """All that a reviewer sees of it, and which movement it is that stands at each seam."""
+    report = {key: value for key, value in variation.report().items() if key != "edits"}
+    return [report, [id(seam.insertion) for seam in variation.seams]]
+
+
+@settings(max_examples=60)
 @given(edits=edits)
-def test_undo_takes_back_one_edit_after_another(variation: Variation, edits: list[tuple[str, object]]) -> None:
+def test_undo_takes_back_one_edit_after_another(
+    variation: Variation, karate: Engine, edits: list[tuple[str, object]]
+) -> None:
     states = [variation]
     for what, how in edits:
-        after = edit(states[-1], what, how)
+        after = edit(states[-1], karate, what, how)
+        assert (seen(after) == seen(states[-1])) == (after is states[-1])  # what changes nothing is no edit
         if after is not states[-1]:
             states.append(after)
     found = states[-1]
     for before in states[-2::-1]:
         found = found.undo()
         assert found.report() == before.report()
+        assert seen(found) == seen(before)
     with pytest.raises(MotionMindError, match="there is no edit to undo"):
         found.undo()
 
 
 def test_undone_movement_is_what_it_was_to_the_last_bit(variation: Variation) -> None:
-    first, second, *_ = inserted(variation)
-    one = variation.discard(first).replace(second, 1).cut(4, 9, 30).undo().undo().undo().motion()
+    first, second, *_ = (seam.number for seam in variation.seams if seam.join and len(seam.join.candidates) == 2)
+    one = variation.discard(first).replace(second, 2).cut(4, 9, 30).undo().undo().undo().motion()
     assert np.array_equal(one.rotations, variation.motion().rotations)
     assert np.array_equal(one.times, variation.motion().times)
 
@@ -154,12 +174,71 @@ def test_new_seams_are_not_judged_until_they_are_smoothed(variation: Variation, 
     assert not [seam for seam in smoothed.cut(0, 0, LENGTH).cut(LENGTH - 1, LENGTH - 1, 0).seams if seam.join is None]
 
 
+def test_what_changes_nothing_is_no_edit(variation: Variation) -> None:
+    first = inserted(variation)[0]
+    approved = variation.approve(first)
+    for one, again in (
+        (variation, variation.approve()),
+        (variation, variation.discard()),
+        (variation, variation.cut(0, 19, 20)),
+        (variation, variation.cut(0, 0, 0)),
+        (variation, variation.replace(first, 1)),
+        (approved, approved.approve(first)),
+    ):
+        assert again is one
+
+
+def test_nobody_has_approved_what_is_put_in_later(variation: Variation, karate: Engine) -> None:
+    bare = vary(variation.piece, flow=FLOWS["rossler"], nudge=1.0, length=LENGTH)
+    found = bare.approve(*(seam.number for seam in bare.seams)).smooth(karate, alternatives=1)
+    assert {seam.decision for seam in found.seams if seam.insertion} == {"open"}
+    assert {seam.decision for seam in found.seams if not seam.insertion} <= {"approved"}
+    assert {seam.decision for seam in found.undo().seams} == {"approved"}
+
+
+def test_a_discarded_insertion_is_made_anew_and_is_open(variation: Variation, karate: Engine) -> None:
+    transitions = [(seam.start, seam.end) for seam in variation.seams]
+    gone = next(
+        seam
+        for seam in variation.seams
+        if seam.join and len(seam.join.candidates) == 2 and transitions.count((seam.start, seam.end)) == 1
+    )
+    kept = next(number for number in inserted(variation) if number != gone.number)
+    without = variation.approve(kept).replace(gone.number, 2).discard(gone.number)
+    found = without.smooth(karate, alternatives=1, novelty=1.0)
+    now = {seam.number: seam for seam in found.seams}
+    assert (now[gone.number].decision, now[gone.number].chosen) == ("open", 1)
+    assert now[gone.number].join.asked["novelty"] == 1.0  # type: ignore[union-attr]
+    assert now[gone.number].insertion is not gone.insertion
+    others = {number: seam.insertion for number, seam in now.items() if number != gone.number}
+    assert others == {seam.number: seam.insertion for seam in without.seams if seam.number != gone.number}
+    assert now[kept].decision == "approved"
+    assert seen(found.undo()) == seen(without)
+    # Where nothing is found what there was stays, as an alternative to come back to.
+    assert without.smooth(karate, strict=True, max_moves=1) is without
+
+
+def test_what_stands_elsewhere_is_not_made_anew(variation: Variation, karate: Engine) -> None:
+    seam = next(one for one in variation.seams if one.insertion)
+    order = np.array([seam.start, seam.end, seam.start, seam.end])
+    twice = replace(variation, order=order, joins=()).smooth(karate, alternatives=1)
+    first, *_, last = (one.number for one in twice.seams if (one.start, one.end) == (seam.start, seam.end))
+    some = twice.discard(first)
+    assert some.smooth(karate, novelty=1.0) is some
+    both = some.discard(last).smooth(karate, novelty=1.0)
+    assert [one.decision for one in both.seams if one.number in (first, last)] == ["open", "open"]
+
+
 REFUSED: list[tuple[Callable[[Variation], object], str]] = [
     (lambda v: v.approve(999), "no seam 999; there are 1, 2"),
     (lambda v: v.discard(999), "no seam 999"),
     (lambda v: v.replace(inserted(v)[0], 9), "has alternatives 1 to"),
     (lambda v: v.cut(5, 200, 1), "cannot cut 5..200: postures are 0 to 89"),
     (lambda v: v.cut(9, 5, 1), "cannot cut 9..5"),
+    (lambda v: v.cut(1.5, 2, 5), "a posture's number must be a whole number, not 1.5"),  # type: ignore[arg-type]
+    (lambda v: v.approve(1, True), "a seam's number must be a whole number, not True"),
+    (lambda v: v.discard(1.0), "a seam's number must be a whole number"),  # type: ignore[arg-type]
+    (lambda v: v.replace(inserted(v)[0], "2"), "an alternative's number must be"),  # type: ignore[arg-type]
     (lambda v: v.cut(5, 9, 7), "cannot paste before 7: it is itself among 5..9"),
     (lambda v: v.cut(5, 9, 91), "cannot paste before 91"),
     (lambda v: v.cut(5, 9, 60).discard(max(s.number for s in v.cut(5, 9, 60).seams)), "has no insertion to discard"),
@@ -190,7 +269,8 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
     original = file.read_bytes()
     listed = run("review", file, "--list")
     assert listed.code == 0
-    assert len(listed.out.splitlines()) == 4 + 1 + len(variation.seams)
+    stays = bool(variation.report()["counts"]["stays"])
+    assert len(listed.out.splitlines()) == 4 + stays + 1 + len(variation.seams)
     assert file.read_bytes() == original
     for arguments in (
         ("--approve", f"{first},{second}"),
@@ -215,6 +295,26 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
 
 
 @pytest.mark.parametrize(
+    ("arguments", "messages"),
+    [
+        (("--cut", "0..19", "--paste", 20), ["nothing changed"]),
+        (
+            ("--smooth", "karate"),
+            ["nothing is left to smooth: --discard what is to be made anew", "nothing changed"],
+        ),
+    ],
+)
+def test_what_changes_nothing_is_said(run: Run, file: Path, arguments: tuple[object, ...], messages: list[str]) -> None:
+    before = file.read_bytes()
+    done = run("review", file, *arguments)
+    assert (done.code, done.out) == (0, "")
+    assert done.err.splitlines() == [f"note: {message}" for message in messages]
+    assert file.read_bytes() == before
+    assert run("review", file, "--approve", "all").out.startswith("written")
+    assert run("review", file, "--approve", "all").err == "note: nothing changed\n"
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("--approve", "999"), "no seam 999"),
@@ -225,6 +325,7 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
         (("--undo",), "there is no edit to undo"),
         (("--smooth", "nothing"), "no corpus 'nothing'"),
         (("--strict",), "--strict is for --smooth"),
+        (("--alternatives", "2"), "--alternatives is for --smooth"),
         (("-o", "out.json"), "-o is for what was edited"),
         (("--approve", "all", "-o", "out.bvh"), "the name must end in one of .json"),
     ],

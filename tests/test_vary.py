@@ -6,6 +6,7 @@ import json
 import random
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,9 +23,10 @@ from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.engine import Engine
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lost, read_motion, write_motion
-from motionmind.motion import Motion
+from motionmind.motion import Insertion, Motion
 from motionmind.search.solve import Progress
 from motionmind.variation.piece import Piece
+from motionmind.variation.review import Smooth
 from motionmind.variation.seams import BODY, Join, judge
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
@@ -61,6 +63,10 @@ def smoothed(kata: Piece, karate: Engine) -> Variation:
 @pytest.fixture(scope="module")
 def recording() -> Motion:
     return ballet_clip("jump").resample(30.0)
+
+
+def inserted(variation: Variation) -> list[int]:
+    return [seam.number for seam in variation.seams if seam.insertion]
 
 
 def same(one: Motion, other: Motion) -> bool:
@@ -115,6 +121,41 @@ def test_steps_are_the_pieces_in_the_bodys_heading_and_nothing_teleports(kata: P
         np.testing.assert_allclose(step, turn.apply(own.root[k] - own.root[i])[[0, 2]], atol=1e-9)
 
 
+@given(order=orders, spans=st.lists(st.tuples(st.integers(0, 107), st.integers(1, 5)), max_size=12))
+def test_a_pieces_own_insertions_are_marked_where_the_whole_of_them_comes(
+    kata: Piece, order: np.ndarray, spans: list[tuple[int, int]]
+) -> None:
+    ranges, end = [], 0
+    for begin, moves in sorted(spans):
+        if begin >= end and begin + moves < len(kata):
+            ranges.append(range(begin, end := begin + moves + 1))
+    times = kata.motion.times
+    marks = tuple(Insertion(times[span.start : span.stop], (("pelvis", 0),)) for span in ranges)
+    piece = Piece(replace(kata.motion, insertions=marks), kata.frames)
+    order = np.concatenate([order, np.arange(30, 80)])
+    motion, frames = piece.arranged(order, {})
+    here = [
+        (n, span)
+        for n, first in enumerate(order)
+        for span in ranges
+        if span.start == first and np.array_equal(order[n : n + len(span)], span)
+    ]
+    assert len(motion.insertions) == len(here)
+    for mark, (n, span) in zip(motion.insertions, here, strict=True):
+        np.testing.assert_allclose(mark.times, motion.times[frames[n : n + len(span)]], atol=1e-9)
+        assert mark.bridged == (("pelvis", 0),)
+
+
+@given(order=orders)
+def test_what_stays_is_counted_with_the_time_that_it_takes(kata: Piece, smoothed: Variation, order: np.ndarray) -> None:
+    counts = Variation(kata, smoothed.course, order).report()["counts"]
+    moving = [n for n, (i, k) in enumerate(pairwise(order)) if i != k]
+    assert counts["stays"] == len(order) - 1 - len(moving)
+    motion, frames = kata.arranged(order, {})
+    lasting = np.diff(motion.times[frames])
+    assert counts["seconds_still"] == pytest.approx(lasting.sum() - lasting[moving].sum(), abs=1e-9)
+
+
 @given(order=orders)
 def test_a_posture_lasts_as_long_as_in_the_piece(kata: Piece, order: np.ndarray) -> None:
     motion, frames = kata.arranged(order, {})
@@ -162,11 +203,34 @@ def test_the_same_asked_twice_is_the_same_to_the_byte(kata: Piece, karate: Engin
         ({"length": 0}, "length must be a whole number from 1"),
         ({"nudge": (1.0, 2.0)}, "nudge"),
         ({"start": (1.0,)}, "lorenz starts at 3 finite numbers"),
+        ({"start": "x"}, "start must be finite numbers, not 'x'"),
+        ({"nudge": "x"}, "nudge must be finite numbers, not 'x'"),
+        ({"nudge": ((1.0,), (1.0, 2.0))}, "nudge must be finite numbers"),
+        ({"step": "x"}, "step must be a finite number, not 'x'"),
+        ({"step": (0.1,)}, "step must be a finite number"),
+        ({"step": True}, "step must be"),
+        ({"length": True}, "length must be a whole number from 1 to 1000000, not True"),
+        ({"skip": np.float64(10.0)}, "skip must be a whole number"),
+        ({"transient": 10.5}, "transient must be a whole number from 0, not 10.5"),
+        ({"flow": "lorenz"}, "flow must be a Flow, such as flow_of"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(kata: Piece, options: dict[str, object], message: str) -> None:
     with pytest.raises(MotionMindError, match=message):
         vary(kata, **options)  # type: ignore[arg-type]
+
+
+def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate: Engine) -> None:
+    for engine in (None, karate):
+        with pytest.raises(MotionMindError, match="alternatives must be a whole number from 1, not -3"):
+            vary(kata, engine, nudge=0.0, alternatives=-3)
+        with pytest.raises(TypeError, match="'novelti'; did you mean novelty"):
+            vary(kata, engine, nudge=0.0, novelti=1.0)
+        with pytest.raises(TypeError, match="'unlike'"):
+            vary(kata, engine, nudge=0.0, unlike=[])
+    still = vary(kata, nudge=0.0)
+    with pytest.raises(TypeError, match="'nonsense'"):
+        still.smooth(karate, nonsense=3)
 
 
 # --- what is abrupt -------------------------------------------------------------------------------------------------
@@ -364,6 +428,48 @@ def test_what_is_no_variation_is_refused(smoothed: Variation, tmp_path: Path) ->
             read_variation(path)
 
 
+def test_insertions_that_do_not_lead_where_they_should_are_refused(smoothed: Variation, tmp_path: Path) -> None:
+    path = tmp_path / "variation.json"
+    joins = tuple(join for join in smoothed.joins if len(join.candidates) == 2)[:2]
+    write_variation(path, replace(smoothed, joins=joins, edits=(Smooth(joins),)))
+    whole = json.loads(path.read_text())
+    first, join = 1, joins[1]
+    last = len(smoothed.piece) - 1
+    turned = Rotation.from_rotvec([1e-3, 0.0, 0.0])
+
+    def turn(motion: dict[str, list[list[list[float]]]]) -> None:
+        motion["rotations"][-1][3] = (turned * Rotation.from_quat(motion["rotations"][-1][3])).as_quat().tolist()
+
+    def move(motion: dict[str, list[list[float]]]) -> None:
+        motion["root"][0][0] += 1e-3
+
+    def flip(motion: dict[str, list[list[list[float]]]]) -> None:
+        motion["rotations"][0][3] = [-x for x in motion["rotations"][0][3]]
+
+    for where in ("joins", "edits[0].joins"):
+        for changed, message in (
+            (turn, f"{where}[{first}].candidates[1]: it does not end at posture {join.end} of the piece"),
+            (move, f"{where}[{first}].candidates[1]: it does not start at posture {join.start} of the piece"),
+            (flip, None),
+            ({"end": last + 1}, f"{where}[{first}]: from posture {join.start} to {last + 1} there is no seam"),
+            ({"end": join.start}, f"{where}[{first}]: from posture {join.start} to {join.start} there is no seam"),
+            ({"start": 5, "end": 6}, f"{where}[{first}]: from posture 5 to 6 there is no seam"),
+        ):
+            file = json.loads(json.dumps(whole))
+            section = file["variation"]
+            there = (section if where == "joins" else section["edits"][0])["joins"][first]
+            if isinstance(changed, dict):
+                there.update(changed)
+            else:
+                changed(there["candidates"][1]["motion"])
+            path.write_text(json.dumps(file))
+            if message is None:
+                read_variation(path)
+                continue
+            with pytest.raises(FormatError, match=re.escape(f"variation.json: variation: {message}")):
+                read_variation(path)
+
+
 def test_damaged_files_are_refused_or_read(
     kata: Piece, karate: Engine, tmp_path: Path, mutate: Callable[[str, random.Random], bytes]
 ) -> None:
@@ -383,6 +489,36 @@ def test_damaged_files_are_refused_or_read(
         except MotionMindError:
             refused += 1
     assert 50 < refused < 300
+
+
+def test_numpys_numbers_are_written_as_what_they_are(kata: Piece, karate: Engine, tmp_path: Path) -> None:
+    whole = {"skip": 3, "transient": 500, "length": 30}
+    asked = {"step": 0.01, "nudge": 0.5, "start": (1.0, 2.0, 20.0)}
+    once = vary(kata, karate, **whole, **asked, alternatives=1, seed=2, novelty=0.5, moves=(3, 4))  # type: ignore[arg-type]
+    assert inserted(once)
+    again = vary(
+        kata,
+        karate,
+        **{name: np.int64(value) for name, value in whole.items()},
+        **{name: np.array(value)[()] for name, value in asked.items()},
+        alternatives=np.int64(1),
+        seed=np.int64(2),
+        novelty=np.float64(0.5),
+        moves=(np.int64(3), np.int64(4)),
+    )
+    seam = inserted(once)[0]
+    write_variation(tmp_path / "a.json", once.approve(seam).cut(1, 2, 9).replace(seam, 1))
+    one, two, nine = np.array([1, 2, 9])
+    write_variation(tmp_path / "b.json", again.approve(np.int64(seam)).cut(one, two, nine).replace(np.int64(seam), one))
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert read_variation(tmp_path / "a.json").course.nudge == (0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("nudge", [0.1, (0.1, -0.3, 1e-9)])
+def test_a_course_holds_the_nudge_that_was_asked(kata: Piece, nudge: float | tuple[float, ...]) -> None:
+    course = vary(kata, nudge=nudge).course
+    assert course.nudge == (nudge if isinstance(nudge, tuple) else (nudge, 0.0, 0.0))
+    assert np.array_equal(vary(kata, nudge=course.nudge).order, vary(kata, nudge=nudge).order)
 
 
 def test_what_a_conversion_loses_is_said(smoothed: Variation, tmp_path: Path) -> None:
@@ -423,7 +559,14 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     assert done.code == 0
     assert "note: no corpus says which transitions are abrupt" in done.err
     assert "not judged" in done.out
+    done = run("vary", "clip.json", "--attractor", "lorenz", "--skip", 0, "--length", 80, "-o", "out.json")
+    counts = run("review", "out.json", "--json").json["counts"]
+    assert 4 * counts["stays"] > 79
+    said = f"{counts['stays']} of 79 steps stay in their posture, {counts['seconds_still']:.1f} s"
+    assert f"note: {said}: another --start, a larger --skip or --step moves it" in done.err
+    assert said in done.out.splitlines()
     done = run("vary", "clip.json", "--nudge", 0, "-o", "out.json")
+    assert "stay" not in done.out + done.err
     assert "note: it does not leave the piece's order" in done.err
 
 
@@ -457,11 +600,18 @@ def test_what_the_documents_show_runs(run: Run) -> None:
         (("macarena", "--parameter", "rho"), "--parameter rho: give NAME=VALUE"),
         (("macarena", "--parameter", "rho=1"), "lorenz (sigma 16, rho 1, beta 4)"),
         (("macarena", "--nudge", "far"), "'far' is no number"),
+        (("clip.json", "--strict", "--hold", "left_ankle"), "--hold is for --corpus, which is not given"),
+        (("clip.json", "--alternatives", "3"), "--alternatives is for --corpus, which is not given"),
+        (("clip.json", "--lambda", "2"), "--lambda is for --corpus, which is not given"),
+        (("macarena", "--unit", "cm"), "macarena: --unit is for a file of movement"),
+        (("karate/heian-shodan", "--source-fps", "30"), "--source-fps is for a file of movement"),
+        (("some.score", "--joints", "some.toml"), "some.score: --joints is for a file of movement"),
         (("macarena", "--corpus", "nothing"), "no corpus 'nothing'"),
         (("macarena", "--rate", "0.0001", "--via", "x.json"), "x.json: cannot be read"),
     ],
 )
 def test_bad_input_is_one_line(run: Run, tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+    write_motion("clip.json", ballet_clip("adagio").slice(0, 30))
     done = run("vary", *arguments, "-o", "out.json")
     assert done.code == 2
     assert message in done.err

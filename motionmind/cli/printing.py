@@ -149,6 +149,11 @@ def print_review(found: dict[str, Any]) -> None:
         f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')}: {counts['inserted']} with an "
         f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
+    if counts["stays"]:
+        click.echo(
+            f"{counts['stays']} of {count(counts['postures'] - 1, 'step')} stay in their posture, "
+            f"{counts['seconds_still']:.1f} s"
+        )
     click.echo("seam  postures   of the piece  decision   transition")
     begins = [0, *(seam["at"] + 1 for seam in found["seams"])]
     ends = [*(seam["at"] for seam in found["seams"]), counts["postures"] - 1]

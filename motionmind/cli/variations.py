@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,7 @@ from motionmind.cli.options import (
     searching,
     settings,
 )
-from motionmind.cli.printing import Interruption, note, print_review, progress
+from motionmind.cli.printing import Interruption, count, note, print_review, progress
 from motionmind.cli.sources import clips_in, frames_of, holds_clips, in_corpus, movement
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from motionmind.motion import Motion
     from motionmind.variation.variation import Variation
 
+_STILL = 0.25  # of the steps: where more of them stay, the variation stands still to the eye
 _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
@@ -94,7 +96,10 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 @searching
 @reading
 @HOME
+@click.pass_context
 def vary(
+    context: click.Context,
+    /,
     source: Path,
     output: Path,
     report: Path | None,
@@ -139,9 +144,12 @@ def vary(
     wanted = [(output, MOVEMENT + PICTURES), *([(report, ())] if report else [])]
     check_outputs(wanted, [source, *vias])
     flow = flow_of(attractor, **settings(parameter))
-    options = asked(options)
-    motion, own = _piece(source, clip, home, joints, unit=unit, asf=asf, source_fps=source_fps)
+    wishes = asked(options)
+    motion, own = _piece(source, clip, home, joints=joints, unit=unit, asf=asf, source_fps=source_fps)
     judge = corpus or own
+    wish = _given(context, ["alternatives", *options.keys() - {"fps"}])
+    if wish and not judge:
+        raise click.UsageError(f"{wish} is for --corpus, which is not given", context)
     engine = _engine(judge, home) if judge else None
     if rate is None and engine and not holds_clips(source, home):
         rate = engine.corpus.rate
@@ -162,7 +170,7 @@ def vary(
             alternatives=alternatives,
             told=interruption.told,
             watch=interruption.watch,
-            **options,
+            **wishes,
         )
     files = [path for path, _ in wanted]
     with all_or_none(files):
@@ -174,10 +182,16 @@ def vary(
         note("it does not leave the piece's order: a larger --nudge or --length lets it")
     elif engine is None:
         note("no corpus says which transitions are abrupt, and none is smoothed: --corpus names one")
+    counts = result.report()["counts"]
+    if counts["stays"] > _STILL * (counts["postures"] - 1):
+        note(
+            f"{counts['stays']} of {count(counts['postures'] - 1, 'step')} stay in their posture, "
+            f"{counts['seconds_still']:.1f} s: another --start, a larger --skip or --step moves it"
+        )
     if not as_json:
         click.echo(f"written   {', '.join(map(click.format_filename, files))}")
     if interruption.asked:
-        click.get_current_context().exit(INTERRUPTED)
+        context.exit(INTERRUPTED)
 
 
 @app.command(epilog=example("motionmind review variation.json --approve 6,7 --discard 8 --list"))
@@ -188,7 +202,9 @@ def vary(
     "--cut", type=Span(), metavar="A..B", help="Postures to take out, as --list numbers them, and to --paste."
 )
 @click.option("--paste", type=click.IntRange(min=0), metavar="N", help="The posture before which they go.")
-@click.option("--smooth", metavar="CORPUS", help="Judge and smooth the seams that are not yet, by this corpus.")
+@click.option(
+    "--smooth", metavar="CORPUS", help="Judge and smooth, by this corpus, the seams that are not yet or are discarded."
+)
 @click.option("--replace", type=COUNT, metavar="SEAM", help="Seam at which --alternative is to stand.")
 @click.option("--alternative", type=COUNT, metavar="K", help="Which of the movements found for it.")
 @click.option("--approve", type=Numbers(), metavar="SEAMS", help="Seams that are good, as 1,3; or all.")
@@ -230,18 +246,16 @@ def review(
         raise click.UsageError("--cut says what, and --paste where to: give both", context)
     if (replace is None) != (alternative is None):
         raise click.UsageError("--replace says where, and --alternative what by: give both", context)
-    asking = [name for name in options if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if asking and not smooth:
-        raise click.UsageError(
-            f"--{asking[0].strip('_').replace('_', '-')} is for --smooth, which is not given", context
-        )
+    wish = _given(context, ["alternatives", *options])
+    if wish and not smooth:
+        raise click.UsageError(f"{wish} is for --smooth, which is not given", context)
     from motionmind.variation.variation_json import read_variation, write_variation
 
     edits = undo or cut or smooth or replace or approve or discard
     if output and not edits:
         raise click.UsageError("-o is for what was edited, and nothing is", context)
     check_outputs([(output, (".json",))] if output else [], [])
-    found = read_variation(file)
+    found = before = read_variation(file)
     for _ in range(undo):
         found = found.undo()
     if cut and paste is not None:
@@ -250,20 +264,31 @@ def review(
     if smooth:
         wishes, engine = asked(options), _engine(smooth, home)
         with interruption:
-            found = found.smooth(
+            smoothed = found.smooth(
                 engine, alternatives=alternatives, told=interruption.told, watch=interruption.watch, **wishes
             )
+        if smoothed is found and not interruption.asked:
+            is_left = any(seam.is_abrupt for seam in found.seams)
+            note(
+                "nothing new was found for what is left to smooth"
+                if is_left
+                else "nothing is left to smooth: --discard what is to be made anew"
+            )
+        found = smoothed
     if replace and alternative:
         found = found.replace(replace, alternative)
     if approve:
         found = found.approve(*_meant(found, approve))
     if discard:
         found = found.discard(*_meant(found, discard))
-    if edits:
+    is_written = found.edits != before.edits or output is not None
+    if is_written:
         write_variation(output or file, found)
     if listing or as_json or not edits:
         _tell(found, as_json)
-    if edits and not as_json:
+    if edits and found.edits == before.edits:
+        note("nothing changed")
+    if is_written and not as_json:
         click.echo(f"written   {click.format_filename(output or file)}")
     if interruption.asked:
         context.exit(INTERRUPTED)
@@ -290,14 +315,23 @@ def attractor(variation: Path, output: Path) -> None:
     click.echo(f"{output}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
 
 
-def _piece(
-    source: Path, clip: str | None, home: Path | None, joints: Path | None, **given: Any
-) -> tuple[Motion, str | None]:
+def _given(context: click.Context, names: Collection[str]) -> str | None:
+    """The first of some options that stands on the command line, as it is written there; None where none does."""
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
+            return option.opts[0]
+    return None
+
+
+def _piece(source: Path, clip: str | None, home: Path | None, **given: Any) -> tuple[Motion, str | None]:
     """The movement to vary, and the corpus that it is a clip of, if any."""
     many = holds_clips(source, home)
     if clip and not many:
         raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    found = clips_in(source, (clip,) if clip else (), home) if many else [movement(source, joints, **given)]
+    for name, value in given.items():
+        if many and value is not None:
+            raise MotionMindError(f"{source}: --{name.replace('_', '-')} is for a file of movement, which this is not")
+    found = clips_in(source, (clip,) if clip else (), home) if many else [movement(source, **given)]
     if len(found) != 1:
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
     return found[0], in_corpus(source, home)[0] if many and source.suffix.lower() != ".score" else None

@@ -7,7 +7,7 @@ it was in the body's heading, and nothing teleports: a chunk begins where the on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
-from motionmind.motion import FASTEST, Motion, Posture
+from motionmind.motion import FASTEST, Insertion, Motion, Posture
+from motionmind.variation.arguments import number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_ROUNDING = 1e-9  # seconds
 ALONE = 1.0  # seconds that a posture lasts where the piece has no other
 
 
@@ -88,7 +90,7 @@ class Piece:
         """
         if rate is None:
             return cls(motion, np.arange(len(motion)), facing)
-        if not 0.0 < rate <= FASTEST:
+        if not 0.0 < number("rate", rate) <= FASTEST:
             raise MotionMindError(
                 f"a rate must be a number of postures a second above 0, at most {FASTEST:g}, not {rate}"
             )
@@ -126,6 +128,13 @@ class Piece:
             return np.zeros(len(self))
         return rot.heading(self.motion.rotations[self.frames, 0])
 
+    def _marks(self, frames: slice) -> Iterator[Insertion]:
+        """The piece's own insertions that lie wholly within some of its frames."""
+        times = self.motion.times[frames]
+        for mark in self.motion.insertions:
+            if times[0] - _ROUNDING <= mark.times[0] and mark.times[-1] <= times[-1] + _ROUNDING:
+                yield mark
+
     def arranged(self, order: Ints, insertions: Mapping[int, Motion]) -> Arranged:
         """The piece's postures in another order.
 
@@ -133,6 +142,8 @@ class Piece:
             order: postures [L], any number of them.
             insertions: what leads from the n-th posture of the order to the next one, by n, from and to `ends`; where
                 there is nothing, and the order leaves the piece's, the one posture just follows on the other.
+
+        What the engine had put into the piece is marked where the whole of it comes.
         """
         leaps = np.flatnonzero(np.diff(order) != 1) + 1
         starts, stops = np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
@@ -145,6 +156,7 @@ class Piece:
             rotations.append(place.turn(motion.rotations[here]))
             root.append(place.move(motion.root[here]))
             times.append(motion.times[here] + clock)
+            marks += [replace(mark, times=mark.times + clock) for mark in self._marks(here)]
             frames.append(self.frames[order[start:stop]] - here.start + count)
             count += here.stop - here.start
             if stop == len(order):

@@ -53,7 +53,8 @@ class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unkno
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """Seams that had not been judged or smoothed are."""
+    """Seams that had not been judged or smoothed are, or whose insertion had been discarded; nobody has approved what
+    stands there now."""
 
     joins: tuple[Join, ...]
 
@@ -138,11 +139,18 @@ class State:
         found = []
         for at, (one, other) in enumerate(pairwise(self.sequence)):
             start, end = int(self.order[one]), int(self.order[other])
-            if _is_seam(start, end):
+            if is_seam(start, end):
                 verdict = self.verdicts[one, other]
                 join = self.joins.get((start, end))
                 found.append(Seam(verdict.number, at, start, end, join, verdict.decision, verdict.chosen))
         return tuple(found)
+
+    def shows(self, other: State) -> bool:
+        """Whether another state is the same to whoever looks: its postures, its seams and what stands there."""
+        mine, theirs = (
+            [(seam.number, seam.join, seam.decision, seam.chosen) for seam in state.seams] for state in (self, other)
+        )
+        return np.array_equal(self.postures, other.postures) and mine == theirs
 
     def seam(self, number: int) -> Seam:
         """The seam of that number; MotionMindError names those there are."""
@@ -175,7 +183,17 @@ def edited(state: State, edit: Edit) -> State:
         case Cut():
             return _numbered(replace(state, sequence=_moved(state.sequence, edit)))
         case Smooth(joins):
-            return replace(state, joins={**state.joins, **{(join.start, join.end): join for join in joins}})
+            return _smoothed(state, {(join.start, join.end): join for join in joins})
+
+
+def _smoothed(state: State, joins: Mapping[tuple[int, int], Join]) -> State:
+    """The state with what is said of transitions now; what was decided stands only where there was and is nothing."""
+    verdicts = dict(state.verdicts)
+    for (one, other), verdict in verdicts.items():
+        join = joins.get((int(state.order[one]), int(state.order[other])))
+        if join and (join.candidates or verdict.decision == "discarded"):
+            verdicts[one, other] = Verdict(verdict.number)
+    return replace(state, joins={**state.joins, **joins}, verdicts=verdicts)
 
 
 def _with_candidates(state: State, number: int, what: str) -> tuple[Candidate, ...]:
@@ -221,11 +239,11 @@ def _numbered(state: State) -> State:
     """The state with a verdict on each seam: new ones are open, and get the next numbers."""
     verdicts = dict(state.verdicts)
     for pair in pairwise(state.sequence):
-        if _is_seam(*state.order[list(pair)]) and pair not in verdicts:
+        if is_seam(*state.order[list(pair)]) and pair not in verdicts:
             verdicts[pair] = Verdict(len(verdicts) + 1)
     return replace(state, verdicts=verdicts)
 
 
-def _is_seam(start: int, end: int) -> bool:
+def is_seam(start: int, end: int) -> bool:
     """Whether posture `end` of a piece following on its posture `start` is another transition than the piece's own."""
     return end not in (start, start + 1)

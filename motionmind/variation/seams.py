@@ -10,17 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import signature
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.engine import Engine
-from motionmind.errors import MotionMindError, NoPathError, SkeletonError
+from motionmind.errors import NoPathError, SkeletonError
+from motionmind.formats.text import meant
 from motionmind.motion import Motion, Posture
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween import Bridge, Tween, Wait
+from motionmind.variation.arguments import whole
 from motionmind.variation.piece import Piece
 
 Floats = NDArray[np.float64]
@@ -128,6 +132,13 @@ class Join:
         """Whether it is abrupt and the engine was not asked yet."""
         return self.is_abrupt and not self.candidates and not self.failure
 
+    def tells_more_than(self, other: Join | None) -> bool:
+        """Whether there is more in it than in what was known of the same transition, if anything."""
+        if other is None or self.candidates or not self.is_abrupt:
+            return True
+        said = other.corpus, other.breaks, other.failure
+        return not other.candidates and not self.is_pending and (self.corpus, self.breaks, self.failure) != said
+
 
 @dataclass(frozen=True, eq=False)
 class Judge:
@@ -192,6 +203,20 @@ def judge(piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, postur
     return [Join(i, k, name, court.breaks(*piece.ends(i, k), float(piece.lasting[i]))) for i, k in pairs]
 
 
+def check_asked(alternatives: int, asked: Mapping[str, Any]) -> None:
+    """Whether seams can be smoothed so, before it shows that any are to be.
+
+    Raises:
+        MotionMindError: `alternatives` is out of its range.
+        TypeError: `Engine.tween` takes no argument of a name in `asked`.
+    """
+    whole("alternatives", alternatives, 1)
+    known = signature(Engine.tween).parameters.keys() - {"self", "a", "b", "unlike"}
+    for name in asked:
+        if name not in known:
+            raise TypeError(f"seams are not smoothed by an argument {name!r}{meant(name, known)}")
+
+
 def smooth(
     piece: Piece,
     joins: Iterable[Join],
@@ -213,8 +238,6 @@ def smooth(
         watch: as for `Engine.tween`; once it returns True, what is left stays pending.
         asked: the other arguments of `Engine.tween`.
     """
-    if not (isinstance(alternatives, int) and alternatives >= 1):
-        raise MotionMindError(f"alternatives must be a whole number from 1, not {alternatives}")
     joins, ended = list(joins), False
 
     def watching(so_far: Progress) -> bool:
@@ -241,7 +264,8 @@ def smooth(
             ways: dict[bytes, Tween] = {}
             for tween in found:  # a corpus may know one way only: then the next one is the same
                 ways.setdefault(tween.path.tobytes(), tween)
-            joins[number] = replace(join, candidates=tuple(map(Candidate.of, ways.values())), asked=found[0].asked)
+            plain = msgspec.to_builtins(found[0].asked, enc_hook=np.generic.item)
+            joins[number] = replace(join, candidates=tuple(map(Candidate.of, ways.values())), asked=plain)
         if ended:
             break
     return tuple(joins)

@@ -17,6 +17,7 @@ from motionmind.engine import Engine
 from motionmind.errors import MotionMindError
 from motionmind.motion import Motion
 from motionmind.search.solve import Watch
+from motionmind.variation.arguments import number, numbers, whole
 from motionmind.variation.piece import Arranged, Piece
 from motionmind.variation.review import (
     Approve,
@@ -30,7 +31,7 @@ from motionmind.variation.review import (
     begun,
     edited,
 )
-from motionmind.variation.seams import Join, Told, judge, smooth
+from motionmind.variation.seams import Join, Told, check_asked, judge, smooth
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -50,7 +51,7 @@ class Course:
         flow: the flow's name.
         parameters: of the flow.
         start: of the piece's trajectory, before its transient [d].
-        nudge: how far from there, once the transient is over, the variation's trajectory begins [d].
+        nudge: how far from there, once the transient is over, the variation's trajectory begins [d], as it was asked.
         skip: points of the trajectories that are left out between two postures.
         step: of the integration.
         transient: steps that are dropped of the piece's trajectory at first.
@@ -74,7 +75,8 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """A variation and its review. Nothing changes it: what edits it returns another one.
+    """A variation and its review. Nothing changes it: what edits it returns another one, or itself where the edit
+    changes nothing, which is no edit then.
 
     Attributes:
         piece: what it is a variation of.
@@ -126,7 +128,7 @@ class Variation:
 
     def report(self) -> dict[str, Any]:
         """What it is made of, as plain values for JSON: all but the movement."""
-        seams = [_plain(seam) for seam in self.seams]
+        seams, stays = [_plain(seam) for seam in self.seams], np.flatnonzero(np.diff(self.postures) == 0)
         return {
             "piece": {"name": self.piece.motion.name, "postures": len(self.piece), "facing": self.piece.facing},
             "course": {
@@ -143,6 +145,8 @@ class Variation:
                 "attested": sum(seam.join is not None and not seam.join.is_abrupt for seam in self.seams),
                 "abrupt": sum(seam.is_abrupt for seam in self.seams),
                 "unjudged": sum(seam.join is None for seam in self.seams),
+                "stays": len(stays),
+                "seconds_still": float(self.piece.lasting[self.postures[stays]].sum()),
             },
             "seams": seams,
             "edits": len(self.edits),
@@ -152,20 +156,20 @@ class Variation:
 
     def approve(self, *seams: int) -> Variation:
         """These seams are good as they are."""
-        return self._after(Approve(seams))
+        return self._after(Approve(_numbers(seams)))
 
     def discard(self, *seams: int) -> Variation:
         """Without the insertions at these seams; MotionMindError where there is none."""
-        return self._after(Discard(seams))
+        return self._after(Discard(_numbers(seams)))
 
     def replace(self, seam: int, alternative: int) -> Variation:
         """With another of the movements that the engine found for a seam, counted from 1; it is open again."""
-        return self._after(Replace(seam, alternative))
+        return self._after(Replace(whole("a seam's number", seam), whole("an alternative's number", alternative)))
 
     def cut(self, first: int, last: int, before: int) -> Variation:
         """With postures `first` to `last` before posture `before` instead, all as they are numbered now, from 0;
         `before` may be the number of postures, which is the end. Seams keep their numbers, new ones get the next."""
-        return self._after(Cut(first, last, before))
+        return self._after(Cut(*(whole("a posture's number", posture) for posture in (first, last, before))))
 
     def smooth(
         self,
@@ -177,7 +181,11 @@ class Variation:
         watch: Watch | None = None,
         **asked: Any,
     ) -> Variation:
-        """With the seams judged, and smoothed by the engine, that no corpus was asked about or that were not smoothed.
+        """With the seams judged, and smoothed by the engine, that no corpus was asked about, that were not smoothed, or
+        whose insertions are discarded.
+
+        What is found for these is open again. A transition that comes more than once is made anew where all its
+        insertions are discarded, and keeps what it had where nothing is found.
 
         Args:
             engine: the corpus that says which of them are abrupt, and smooths those.
@@ -190,14 +198,17 @@ class Variation:
         Raises:
             SkeletonError: the piece is on another skeleton than the corpus.
             MotionMindError: an argument is out of its range.
+            TypeError: there is no such argument.
         """
-        left = [seam for seam in self.seams if seam.join is None or (seam.join.is_abrupt and not seam.join.candidates)]
-        pairs = dict.fromkeys((seam.start, seam.end) for seam in left)  # once however often it comes
-        judged = judge(self.piece, pairs, engine, posturewise)
-        if not judged:
-            return self
+        check_asked(alternatives, asked)
+        stands = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
+        known = {(seam.start, seam.end): seam.join for seam in self.seams}  # once however often it comes
+        left = [pair for pair, join in known.items() if pair not in stands and (join is None or join.is_abrupt)]
+        judged = judge(self.piece, left, engine, posturewise)
         asked = {"posturewise": posturewise, **asked}
-        return self._after(Smooth(smooth(self.piece, judged, engine, alternatives, told=told, watch=watch, **asked)))
+        found = smooth(self.piece, judged, engine, alternatives, told=told, watch=watch, **asked)
+        news = tuple(join for join in found if join.tells_more_than(known[join.start, join.end]))
+        return self._after(Smooth(news)) if news else self
 
     def undo(self) -> Variation:
         """Without the last edit; MotionMindError where there is none."""
@@ -206,7 +217,12 @@ class Variation:
         return replace(self, edits=self.edits[:-1])
 
     def _after(self, edit: Edit) -> Variation:
-        return replace(self, edits=(*self.edits, edit))
+        after = replace(self, edits=(*self.edits, edit))
+        return self if self._state.shows(after._state) else after
+
+
+def _numbers(seams: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(whole("a seam's number", seam) for seam in seams)
 
 
 def _plain(seam: Seam) -> dict[str, Any]:
@@ -250,7 +266,11 @@ def vary(
     step: float | None = None,
     transient: int | None = None,
     length: int | None = None,
-    **smoothing: Any,
+    alternatives: int = ALTERNATIVES,
+    posturewise: bool = False,
+    told: Told | None = None,
+    watch: Watch | None = None,
+    **asked: Any,
 ) -> Variation:
     """A variation of a piece: its postures in the order in which a trajectory passes the sites of another one.
 
@@ -264,33 +284,41 @@ def vary(
         step: of the integration; the flow's own where None.
         transient: steps that are dropped at first; the flow's own where None.
         length: postures of the variation; as many as the piece's where None.
-        smoothing: see `Variation.smooth`: alternatives, posturewise, told, watch, and what `Engine.tween` takes.
+        alternatives: see `Variation.smooth`, as are `posturewise`, `told`, `watch` and what else is `asked`.
 
     Raises:
         MotionMindError: an argument is out of its range, or a trajectory diverges or settles.
         SkeletonError: the piece is on another skeleton than the corpus.
+        TypeError: there is no such argument.
     """
+    check_asked(alternatives, asked)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    length = len(piece) if length is None else length
-    for name, value, least in (("skip", skip, 0), ("length", length, 1)):
-        if not (isinstance(value, int | np.integer) and least <= value <= LONGEST):
-            raise MotionMindError(f"{name} must be a whole number from {least} to {LONGEST}, not {value}")
-    found = itinerary(
-        flow, len(piece), length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient
-    )
+    if not isinstance(flow, Flow):
+        raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
+    skip = whole("skip", skip, 0, LONGEST)
+    length = whole("length", len(piece) if length is None else length, 1, LONGEST)
+    step = number("step", flow.step if step is None else step)
+    transient = whole("transient", flow.transient if transient is None else transient, 0)
+    start = numbers("start", flow.start if start is None else start)
+    away = numbers("nudge", nudge)
+    if np.ndim(nudge) == 0:
+        away += (0.0,) * (len(flow.start) - 1)
+    found = itinerary(flow, len(piece), length, nudge=away, start=start, every=skip + 1, step=step, transient=transient)
     course = Course(
         flow.name,
         dict(flow.parameters),
-        tuple(map(float, flow.start if start is None else start)),
-        tuple(map(float, found.points[0] - found.sites[0])),
+        start,
+        away,
         skip,
-        flow.step if step is None else step,
-        flow.transient if transient is None else transient,
+        step,
+        transient,
         round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=step, transient=transient), 4),
     )
     variation = Variation(piece, course, found.indices)
     if engine is None:
         return variation
     # What it begins with is no edit, and cannot be undone.
-    edits = variation.smooth(engine, **smoothing).edits
+    edits = variation.smooth(
+        engine, alternatives=alternatives, posturewise=posturewise, told=told, watch=watch, **asked
+    ).edits
     return replace(variation, joins=tuple(join for edit in edits if isinstance(edit, Smooth) for join in edit.joins))

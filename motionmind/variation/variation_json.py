@@ -31,14 +31,14 @@ from motionmind.formats.files import FilePath, read_bytes
 from motionmind.formats.motion_json import FramesSchema, InsertionSchema, MotionSchema, motion_of, write_motion_json
 from motionmind.motion import Motion
 from motionmind.search.solve import Status
-from motionmind.skeleton import Skeleton
 from motionmind.tween import Bridge, Wait
 from motionmind.variation.piece import Piece
-from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth
+from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam
 from motionmind.variation.seams import Break, Candidate, Join
 from motionmind.variation.variation import Course, Variation
 
 VERSION = 1
+_ROUNDING = 1e-6  # of a quaternion and of metres: how far a candidate's ends may be from the piece's postures
 _Index = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 
 
@@ -120,10 +120,12 @@ def read_variation(path: FilePath) -> Variation:
         motion = motion_of(schema.piece.motion, skeleton, path, mend=False)
         piece = Piece(motion, np.array(schema.piece.frames), schema.piece.facing)
         edits: list[Edit] = [
-            Smooth(_joins(edit.joins, skeleton, path)) if isinstance(edit, SmoothSchema) else edit
-            for edit in schema.edits
+            Smooth(_joins(edit.joins, f"edits[{number}].joins", piece, path))
+            if isinstance(edit, SmoothSchema)
+            else edit
+            for number, edit in enumerate(schema.edits)
         ]
-        joins = _joins(schema.joins, skeleton, path)
+        joins = _joins(schema.joins, "joins", piece, path)
         return Variation(piece, schema.course, np.array(schema.order), joins, tuple(edits))
     except FormatError:
         raise
@@ -175,18 +177,30 @@ def _join(join: Join) -> JoinSchema:
     return JoinSchema(join.start, join.end, join.corpus, join.breaks, candidates, join.failure, dict(join.asked))
 
 
-def _joins(schemas: list[JoinSchema], skeleton: Skeleton, path: FilePath) -> tuple[Join, ...]:
+def _joins(schemas: list[JoinSchema], where: str, piece: Piece, path: FilePath) -> tuple[Join, ...]:
+    """The joins in one of the file's lists; FormatError names the place in it of what does not fit the piece."""
     found = []
-    for join in schemas:
-        candidates = []
-        for way in join.candidates:
-            motion = motion_of(way.motion, skeleton, path, mend=False)
-            states = len(way.path[0]) if way.path else 0
-            if len(motion.insertions) != 1 or len(way.path) < 2 or any(len(row) != states for row in way.path):
-                here = f"from posture {join.start} to {join.end}"
-                raise FormatError(f"variation: a candidate {here} is no insertion with its path of states", path=path)
-            certificate = way.status, way.cost, way.lower_bound, way.attested, way.bridges, way.waits
-            candidates.append(Candidate(motion, np.array(way.path, dtype=np.int32), *certificate))
-        asked = (join.corpus, join.breaks, tuple(candidates), join.failure, join.asked)
-        found.append(Join(join.start, join.end, *asked))
+    for number, join in enumerate(schemas):
+        here = f"{where}[{number}]"
+        if max(join.start, join.end) >= len(piece) or not is_seam(join.start, join.end):
+            fault = f"from posture {join.start} to {join.end} there is no seam: the piece has 0 to {len(piece) - 1}"
+            raise FormatError(f"variation: {here}: {fault}", path=path)
+        ways = enumerate(join.candidates)
+        candidates = tuple(_candidate(way, join, f"{here}.candidates[{k}]", piece, path) for k, way in ways)
+        found.append(Join(join.start, join.end, join.corpus, join.breaks, candidates, join.failure, join.asked))
     return tuple(found)
+
+
+def _candidate(way: CandidateSchema, join: JoinSchema, where: str, piece: Piece, path: FilePath) -> Candidate:
+    motion = motion_of(way.motion, piece.motion.skeleton, path, mend=False)
+    states = len(way.path[0]) if way.path else 0
+    if len(motion.insertions) != 1 or len(way.path) < 2 or any(len(row) != states for row in way.path):
+        raise FormatError(f"variation: {where}: this is no insertion with its path of states", path=path)
+    for what, frame, end in zip(("start", "end"), (0, -1), piece.ends(join.start, join.end), strict=True):
+        rotations, root = motion.rotations[frame], motion.root[frame]
+        apart = np.minimum(np.abs(rotations - end.rotations), np.abs(rotations + end.rotations))  # q and -q are one
+        if max(apart.max(), np.abs(root - end.root).max()) > _ROUNDING:
+            posture = getattr(join, what)
+            raise FormatError(f"variation: {where}: it does not {what} at posture {posture} of the piece", path=path)
+    certificate = way.status, way.cost, way.lower_bound, way.attested, way.bridges, way.waits
+    return Candidate(motion, np.array(way.path, dtype=np.int32), *certificate)
