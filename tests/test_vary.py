@@ -623,3 +623,9 @@ def test_the_exponent_is_reported_and_says_how_fast_trajectories_part(kata: Piec
     found = vary(kata, flow=flow_of("lorenz", rho=45.92), skip=4, step=0.005)
     assert found.course.exponent == pytest.approx(2.16 * np.log(2.0), rel=0.03)  # Wolf et al., Physica D 16:285 (1985)
     assert found.report()["course"]["parting"] == pytest.approx(found.course.exponent * 5 * 0.005)
+
+
+def test_the_exponent_is_the_flows_however_small_the_step(kata: Piece) -> None:
+    usual, tiny = (vary(kata, flow=flow_of("rossler"), step=step, length=5).course for step in (None, 1e-6))
+    assert tiny.exponent == usual.exponent
+    assert tiny.parting == pytest.approx(usual.parting * 1e-6 / usual.step)

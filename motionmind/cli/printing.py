@@ -143,7 +143,7 @@ def print_review(found: dict[str, Any]) -> None:
         f"({values}), nudge {nudge}, skip {course['skip']}"
     )
     click.echo(
-        f"Lyapunov exponent {course['exponent']:.3g}: trajectories part by {course['parting']:.2g} nats a posture"
+        f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
     )
     click.echo(
         f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')}: {counts['inserted']} with an "

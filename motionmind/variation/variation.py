@@ -312,7 +312,8 @@ def vary(
         skip,
         step,
         transient,
-        round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=step, transient=transient), 4),
+        # With the flow's own step and transient at least: tiny ones do not come to the attractor in so many steps.
+        round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step)), 4),
     )
     variation = Variation(piece, course, found.indices)
     if engine is None:
