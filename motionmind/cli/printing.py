@@ -150,10 +150,7 @@ def print_review(found: dict[str, Any]) -> None:
         f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
     if counts["stays"]:
-        click.echo(
-            f"{counts['stays']} of {count(counts['postures'] - 1, 'step')} stay in their posture, "
-            f"{counts['seconds_still']:.1f} s"
-        )
+        click.echo(stillness(counts))
     click.echo("seam  postures   of the piece  decision   transition")
     begins = [0, *(seam["at"] + 1 for seam in found["seams"])]
     ends = [*(seam["at"] for seam in found["seams"]), counts["postures"] - 1]
@@ -162,6 +159,12 @@ def print_review(found: dict[str, Any]) -> None:
         row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}"
         decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
         click.echo(f"{row}  {decision:9}  {_transition(seam)}" if seam else row.rstrip())
+
+
+def stillness(counts: dict[str, Any]) -> str:
+    """How many of a variation's steps stay in their posture, and for how long: "32 of 79 steps stay, 6.4 s"."""
+    stays, steps = counts["stays"], count(counts["postures"] - 1, "step")
+    return f"{stays} of {steps} stay{'s' * (stays == 1)}, {counts['seconds_still']:.1f} s"
 
 
 def _stretch(first: int, last: int) -> str:

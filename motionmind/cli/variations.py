@@ -30,7 +30,7 @@ from motionmind.cli.options import (
     searching,
     settings,
 )
-from motionmind.cli.printing import Interruption, count, note, print_review, progress
+from motionmind.cli.printing import Interruption, note, print_review, progress, stillness
 from motionmind.cli.sources import clips_in, frames_of, holds_clips, in_corpus, movement
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -184,10 +184,7 @@ def vary(
         note("no corpus says which transitions are abrupt, and none is smoothed: --corpus names one")
     counts = result.report()["counts"]
     if counts["stays"] > _STILL * (counts["postures"] - 1):
-        note(
-            f"{counts['stays']} of {count(counts['postures'] - 1, 'step')} stay in their posture, "
-            f"{counts['seconds_still']:.1f} s: another --start, a larger --skip or --step moves it"
-        )
+        note(f"{stillness(counts)}: another --start, a larger --skip or --step moves it")
     if not as_json:
         click.echo(f"written   {', '.join(map(click.format_filename, files))}")
     if interruption.asked:

@@ -40,6 +40,7 @@ NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewher
 SKIP = 10
 ALTERNATIVES = 3
 EXPONENT_STEPS = 300_000
+MOST_STEPS = 1_000_000_000  # of a transient, which take some minutes
 LONGEST = 1_000_000  # postures that a variation may have
 
 
@@ -298,7 +299,7 @@ def vary(
     skip = whole("skip", skip, 0, LONGEST)
     length = whole("length", len(piece) if length is None else length, 1, LONGEST)
     step = number("step", flow.step if step is None else step)
-    transient = whole("transient", flow.transient if transient is None else transient, 0)
+    transient = whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
     start = numbers("start", flow.start if start is None else start)
     away = numbers("nudge", nudge)
     if np.ndim(nudge) == 0:
