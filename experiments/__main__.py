@@ -50,14 +50,14 @@ def listed(known: list[str]) -> None:
     """Print each folder's question, and its command."""
     for folder in sorted(path for path in harness.HERE.iterdir() if (path / "README.md").exists()):
         title = (folder / "README.md").read_text().splitlines()[0].lstrip("# ")
-        click.echo(f"{folder.name:14}{title}")
+        click.echo(f"{folder.name:16}{title}")
         if folder.name in known:
-            click.echo(f"{'':14}  python -m experiments {folder.name}")
-            continue
+            click.echo(f"{'':16}  python -m experiments {folder.name}")
         for script in sorted(folder.glob("*.py")):
             lines = (ast.get_docstring(ast.parse(script.read_text())) or "").splitlines()
-            for line in (line for line in lines if line.startswith("python ")):
-                click.echo(f"{'':14}  {line}")
+            for line in map(str.strip, lines):
+                if line.startswith("python "):
+                    click.echo(f"{'':16}  {line}")
 
 
 if __name__ == "__main__":

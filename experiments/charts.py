@@ -14,7 +14,8 @@ LEFT, RIGHT, TOP, BOTTOM = 52, 12, 30, 42
 
 @dataclass
 class Panel:
-    """One pair of axes, with series of points [(x, y), ...] by name; `log` has x on a logarithmic axis."""
+    """One pair of axes, with series of points [(x, y), ...] by name; `log` has x on a logarithmic axis. Where x is
+    but a place it is not `numbered`."""
 
     title: str
     x: str
@@ -22,6 +23,7 @@ class Panel:
     series: dict[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     log: bool = False
     joined: bool = True
+    numbered: bool = True
 
 
 def svg(panels: Sequence[Panel], columns: int = 3) -> str:
@@ -54,8 +56,8 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
     xs = [math.log10(x) if panel.log else x for x, _ in points]
     ys = [y for _, y in points]
     x_ticks, y_ticks = _ticks(min(xs), max(xs)), _ticks(min(ys), max(ys))
-    if panel.log:  # the numbers that there are say more than powers of ten
-        x_ticks = sorted(set(xs))
+    if panel.log:
+        x_ticks = _apart(sorted(set(xs)))
     x0, x1 = min(xs[0], *x_ticks, *xs), max(*x_ticks, *xs)
     y0, y1 = y_ticks[0], y_ticks[-1]
 
@@ -69,10 +71,10 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
         _, y = at(x0, tick)
         out.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="#e4e4e4"/>')
         out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
-    for tick in x_ticks:
+    for tick in x_ticks if panel.numbered else ():
         x, _ = at(tick, y0)
         shown = 10.0**tick if panel.log else tick
-        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.3g}</text>')
+        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.4g}</text>')
     middle = (LEFT + WIDTH - RIGHT) / 2
     out.append(f'<text x="{middle}" y="{HEIGHT - 10}" text-anchor="middle" fill="#666">{escape(panel.x)}</text>')
     out.append(
@@ -92,9 +94,21 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
 def _ticks(low: float, high: float) -> list[float]:
     """Some five round numbers that reach from below `low` to above `high`."""
     if high - low < 1e-12:
-        low, high = low - 0.5, high + 0.5
+        half = 0.05 * abs(low) or 0.5
+        low, high = low - half, high + half
     rough = (high - low) / 5.0
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(power * factor for factor in (1.0, 2.0, 2.5, 5.0, 10.0) if power * factor >= rough * 0.999)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return [k * step for k in range(first, last + 1)]
+
+
+def _apart(values: list[float]) -> list[float]:
+    """Those of increasing values that can be written side by side: on a logarithmic axis the numbers that there are
+    say more than powers of ten."""
+    room = 30.0 / (WIDTH - LEFT - RIGHT) * (values[-1] - values[0])
+    kept = values[:1]
+    for value in values[1:]:
+        if value - kept[-1] >= room:
+            kept.append(value)
+    return kept

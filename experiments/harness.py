@@ -14,6 +14,7 @@ import csv
 import io
 import json
 import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
@@ -60,16 +61,21 @@ def answer(name: str, setting: Setting, executor: Executor, folder: Path) -> lis
     left = [key for key in wanted if key not in done]
     with (
         unfinished.open("a") as keep,
-        click.progressbar(length=len(wanted), label=f"{name:14}", file=click.get_text_stream("stderr")) as bar,
+        click.progressbar(length=len(wanted), label=f"{name:14}", file=sys.stderr) as bar,
     ):
         bar.update(len(done))
+        keep.write("\n")  # what was being written when a run was broken off has no end
         running = {executor.submit(_work, name, wanted[key]): key for key in left}
         for future in as_completed(running):
+            bar.update(1)
+            if future.exception():
+                continue  # the others are worth keeping
             key = running[future]
             done[key] = future.result()
             keep.write(json.dumps([key, done[key]]) + "\n")
             keep.flush()
-            bar.update(1)
+    for future in running:
+        future.result()
     rows: list[Row] = [row for key in wanted for row in done[key]]
     (folder / "found.csv").write_text(table(rows))
     (folder / "found.svg").write_text(module.chart(rows))
@@ -95,7 +101,7 @@ def _kept(path: Path) -> Iterator[tuple[str, list[Row]]]:
         try:
             key, rows = json.loads(line)
         except ValueError:
-            continue  # the line that was being written when the run was broken off
+            continue
         yield key, rows
 
 

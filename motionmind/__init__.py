@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from motionmind.chaos.flows import Flow, flow_of
     from motionmind.discretize import make as make_discretization
     from motionmind.engine import Engine
     from motionmind.errors import (
@@ -33,6 +34,10 @@ if TYPE_CHECKING:
     from motionmind.retarget import to_human23
     from motionmind.skeleton import Skeleton, human23, human44
     from motionmind.tween import Bridge, Source, Tween, Wait
+    from motionmind.variation.piece import Piece
+    from motionmind.variation.review import Seam
+    from motionmind.variation.variation import Variation, vary
+    from motionmind.variation.variation_json import read_variation, write_variation
 
 __version__ = "0.1.0"
 
@@ -40,33 +45,42 @@ __all__ = [
     "Bridge",
     "CorpusError",
     "Engine",
+    "Flow",
     "FormatError",
     "Insertion",
     "Motion",
     "MotionMindError",
     "MotionMindWarning",
     "NoPathError",
+    "Piece",
     "Posture",
+    "Seam",
     "Skeleton",
     "SkeletonError",
     "Source",
     "Tween",
+    "Variation",
     "Wait",
     "compose",
     "contact_sheet",
+    "flow_of",
     "human23",
     "human44",
     "make_discretization",
     "own_skeleton",
     "read_motion",
     "read_posture",
+    "read_variation",
     "to_human23",
+    "vary",
     "write_motion",
     "write_picture",
     "write_posture",
+    "write_variation",
 ]
 
 _HOMES = {
+    "chaos.flows": ("Flow", "flow_of"),
     "discretize": ("make_discretization",),
     "engine": ("Engine",),
     "errors": (
@@ -86,6 +100,10 @@ _HOMES = {
     "retarget": ("to_human23",),
     "skeleton": ("Skeleton", "human23", "human44"),
     "tween": ("Bridge", "Source", "Tween", "Wait"),
+    "variation.piece": ("Piece",),
+    "variation.review": ("Seam",),
+    "variation.variation": ("Variation", "vary"),
+    "variation.variation_json": ("read_variation", "write_variation"),
 }
 _RENAMED = {"make_discretization": "make"}
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind.discretize import StateSpace
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, NoPathError
 from motionmind.search.problem import Ints, Model, costs_to_go, with_waits
 from motionmind.search.solve import Via, feasible
 from motionmind.tween import Posed
@@ -44,7 +44,8 @@ def restrictions(
         avoid: joints, each with a state, by its number or its name, that it is not in.
 
     Raises:
-        MotionMindError: no such joint or state, or A and B differ where a joint is to be held.
+        MotionMindError: no such joint or state.
+        NoPathError: A and B differ where a joint is to be held.
     """
     out = []
     for joint, end in pin.items():
@@ -56,7 +57,7 @@ def restrictions(
         lane = space.index(joint)
         if start[lane] != goal[lane]:
             a, b = (space.label(lane, int(end[lane])) for end in (start, goal))
-            raise MotionMindError(f"hold {joint}: A and B differ there, {a} and {b}, so that it cannot be held")
+            raise NoPathError(f"hold {joint}: A and B differ there, {a} and {b}, so that it cannot be held")
         out.append(Restriction(f"hold {joint}", _only(space, lane, int(start[lane]))))
     for joint, wanted in avoid:
         lane = space.index(joint)

@@ -33,7 +33,7 @@ from motionmind.search.posturewise import Bodies, find_bodies, solve_posturewise
 from motionmind.search.problem import Model, places, with_waits
 from motionmind.search.progression import of_moves
 from motionmind.search.sample import drawn
-from motionmind.search.solve import Certificate, Rules, Via, Watch, solve
+from motionmind.search.solve import MOST_STATES, Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
 from motionmind.tween import Floats, Posed, Tween, explain
 
@@ -340,6 +340,13 @@ class Engine(Learned):
     def _of_moves(self, posed: Posed, lambda_: float) -> tuple[Posed, Coordination]:
         """The same problem with moves for states, and how these go together."""
         held = with_waits(posed.model, posed.goal, posed.rules.wait)
+        count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each lane's states
+        if count.max() > MOST_STATES:
+            joint = self.grammar.lanes[int(count.argmax())]
+            raise MotionMindError(
+                f"coordination progression: {joint} has {count.max()} states and moves, and the search takes up to "
+                f"{MOST_STATES}; build the corpus with a coarser tolerance for it, or ask for strict"
+            )
         moves = self.corpus.moves
         net = fit_progression(
             self.grammar.coordination.parents,

@@ -12,6 +12,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
+from numba.extending import register_jitable
 
 _F = TypeVar("_F", bound=Callable[..., object])
 config: Any = numba.config
@@ -26,6 +27,29 @@ def jit(function: _F) -> _F:
     config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent)
     try:
         return cast(_F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    finally:
+        config.CACHE_DIR = theirs
+
+
+def either(function: _F) -> _F:
+    """A function for compiled code to call, and for Python, where nothing is compiled."""
+    registered: _F = register_jitable(function)
+    return registered
+
+
+def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> Any:
+    """`function` compiled for numba's `signature` alone, and told by its address: one compiled loop serves all such.
+
+    A loop that is given a function of `jit` would be compiled for it anew in every process. An exception inside is
+    lost. `keep` stores it on disk: for functions of this package, which may be closures over others and over values.
+
+    Raises:
+        numba.core.errors.NumbaError: it cannot be compiled.
+    """
+    theirs = config.CACHE_DIR
+    config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent) if keep else theirs
+    try:
+        return numba.cfunc(signature, cache=keep, error_model="numpy")(function)
     finally:
         config.CACHE_DIR = theirs
 

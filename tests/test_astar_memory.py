@@ -141,6 +141,35 @@ def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pyte
             assert found[-1].status == "optimal"
 
 
+@pytest.mark.parametrize("budget", [30, 45, 70])
+def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_stays(budget: int) -> None:
+    """Or all but the way to the node that is being expanded: so forgetting is paid for by the nodes then made anew."""
+    times = 0
+    for case in cases():
+        path, nodes = np.zeros(len(case.grid.dom_ptr) - 1, np.int64), astar._root(case.grid, case.bound, budget)
+        for _ in range(300):
+            if nodes.tally[astar._HEAPED] == 0 or nodes.tally[astar._FREE] < 8:
+                break
+            node = int(nodes.heap[0])
+            astar._close(nodes, node)
+            astar._expand(case.grid, case.cut, nodes, node, np.inf, path)
+            astar._release(nodes, node)
+        if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
+            continue
+        current = int(nodes.heap[0])
+        astar._close(nodes, current)
+        before = {float(nodes.key[node]) for node in nodes.heap[: nodes.tally[astar._HEAPED]]}
+        assert astar._forget(nodes, current)
+        opened = nodes.heap[: nodes.tally[astar._HEAPED]]
+        assert nodes.tally[astar._NODES] <= max(astar.KEPT * budget, case.depth)
+        assert nodes.tally[astar._NODES] + nodes.tally[astar._FREE] == budget
+        assert min(nodes.key[opened]) == min(before)
+        assert {float(key) for key in nodes.key[opened]} <= before
+        assert (nodes.slot[opened] == np.arange(len(opened))).all()
+        times += 1
+    assert times > 3
+
+
 # --- against the search in plain Python -------------------------------------------------------------------------------
 
 

@@ -95,7 +95,7 @@ EXAMPLES = [command.epilog.split("\n")[-1].strip() for command in COMMANDS.value
 def test_there_are_the_commands_that_the_documents_name() -> None:
     assert {" ".join(path) for path in COMMANDS} == {
         *("tween", "posture", "convert", "corpus", "corpus build", "corpus list", "corpus info", "corpus check"),
-        *("compose", "library", "sheet", "render", "explain", "graph", "measure"),
+        *("compose", "library", "sheet", "render", "explain", "graph", "measure", "vary", "review", "attractor"),
     }
 
 
@@ -117,7 +117,7 @@ def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", clip("plies"))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 15
+    assert len(EXAMPLES) == 18
     for line in EXAMPLES:
         program, *words = shlex.split(line)
         assert program == "motionmind"

@@ -45,3 +45,37 @@ def test_compiled_code_is_known_to_be_there_once_it_is(tmp_path: Path, monkeypat
         assert not door.is_compiled("search")
     finally:
         door._folder.cache_clear()
+
+
+@door.jit
+def applied(function: object, times: int) -> float:
+    value = 1.0
+    for _ in range(times):
+        value = function(value)  # type: ignore[operator]
+    return value
+
+
+@door.either
+def halved(x: float) -> float:
+    return 0.5 * x
+
+
+def test_one_loop_serves_all_pointers_of_a_signature() -> None:
+    from numba import types
+
+    number = types.float64
+    functions = [lambda x: x + 1.0, lambda x: 3.0 * x, lambda x: halved(x) - 1.0]
+    for function in functions:
+        expected = 1.0
+        for _ in range(5):
+            expected = function(expected)
+        assert applied(door.pointer(function, number(number), keep=False), 5) == expected
+    assert len(applied.signatures) == 1  # type: ignore[attr-defined]
+
+
+def test_what_cannot_be_compiled_is_no_pointer() -> None:
+    from numba import types
+    from numba.core.errors import NumbaError
+
+    with pytest.raises(NumbaError):
+        door.pointer(lambda x: {"x": x}, types.float64(types.float64), keep=False)

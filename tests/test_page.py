@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -30,7 +29,6 @@ from motionmind.render.page import packed, page, write_page
 from motionmind.skeleton import Skeleton, human23, human44
 
 CORPORA = Path(__file__).parents[1] / "corpora"
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 640, "height": 480}
 seeds = st.integers(0, 2**32 - 1)
 
@@ -95,18 +93,6 @@ class Opened:
     @property
     def time(self) -> float:
         return float(self.get("motionmind.player.time"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium is installed")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

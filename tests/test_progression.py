@@ -408,6 +408,14 @@ def test_whole_postures_have_no_progressions(engine: Engine) -> None:
         join(engine, posturewise=True)
 
 
+def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionmind.engine.MOST_STATES", 50)
+    with pytest.raises(
+        MotionMindError, match=r"has \d+ states and moves, and the search takes up to 50; build the corpus"
+    ):
+        join(engine)
+
+
 def test_the_command_line_finds_the_same_and_writes_its_problem(run: Run, engine: Engine, tmp_path: Path) -> None:
     problem = tmp_path / "problem.cfn"
     a, b = POSTURES / "arabesque.json", POSTURES / "fifth.json"

@@ -50,7 +50,7 @@ def test_the_commands_for_ones_own_movement_run(elsewhere: dict[str, str], tmp_p
     shutil.copy(tmp_path / "adagio.bvh", tmp_path / "clip.bvh")
     (tmp_path / "corpora").symlink_to(ROOT / "corpora")
     commands = [command for command in COMMANDS[2:] if command.startswith("motionmind ")]
-    assert len(commands) == 11
+    assert len(commands) == 15
     for command in commands:
         done = subprocess.run(
             command, shell=True, cwd=tmp_path, env=elsewhere, capture_output=True, text=True, check=False
@@ -73,7 +73,7 @@ def test_the_gallery_shows_what_its_commands_make(elsewhere: dict[str, str], tmp
     text = gallery.read_text()
     commands = [line.strip() for line in re.findall(r"^    (motionmind \S.*)$", text, re.M)]
     shown = [gallery.parent / path for path in re.findall(r"^!\[.*\]\((.*)\)$", text, re.M)]
-    assert len(commands) == 8
+    assert len(commands) == 10
     for command in commands:
         done = subprocess.run(
             command, shell=True, cwd=tmp_path, env=elsewhere, capture_output=True, text=True, check=False

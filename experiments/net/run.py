@@ -13,7 +13,7 @@ from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, RECORDED, movement, recorded, without
 from motionmind import Skeleton
 from motionmind import rotations as rot
-from motionmind.metrics import Judge, find_feet, find_floor, find_judge, l2q
+from motionmind.metrics import Judge, angular_speed, find_feet, find_floor, find_judge, l2q
 from motionmind.notation.body_file import body as anatomy
 from motionmind.render.anatomy import body_of
 
@@ -65,6 +65,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
             )
             made[scheme] = tween.motion.rotations, tween.motion.root
         for kind, (rotations, root) in made.items():
+            legs, others = collides(piece.skeleton, rotations, root)
             turned = [piece.skeleton.global_rotations(q[1:-1]) for q in (real.rotations, rotations)]
             out.append(
                 {
@@ -73,7 +74,10 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
                     "window": int(number),
                     "kind": kind,
                     "taken": int(who.takes(rotations[:FRAMES], name, sequence)),
-                    "collides": collides(piece.skeleton, rotations, root).mean(),
+                    "distance": who.distance(rotations[:FRAMES], name, sequence),
+                    "speed": angular_speed(rotations, FPS).mean(),
+                    "legs_collide": legs.mean(),
+                    "others_collide": others.mean(),
                     "off_balance_cm": off_balance(piece.skeleton, rotations, root),
                     "l2q": l2q(*turned),
                 }
@@ -97,13 +101,17 @@ def judge(data: str | None, name: str) -> Judge:
 # --- what bodies cannot do --------------------------------------------------------------------------------------------
 
 
-def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> NDArray[np.bool_]:
-    """Whether two parts of the body that are apart when it rests reach into each other by more than 1 cm [T]."""
+def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether the legs, or any two other parts that are apart when the body rests, reach into each other by more than
+    1 cm: two [T]."""
     body = body_of(skeleton)
     rest = _deepest(skeleton, np.tile(rot.IDENTITY, (1, len(skeleton), 1)), np.zeros((1, 3)))[0]
     parts = np.array(body.parts[: len(body.cones)])
     apart = (rest < 0.0) & (parts[:, None] != parts[None, :])
-    return np.any(_deepest(skeleton, rotations, root)[:, apart] > DEEP, axis=1)
+    leg = np.array([part.endswith(("thigh", "kneecap", "shank", "foot")) for part in parts])
+    legs = leg[:, None] & leg[None, :]
+    deep = _deepest(skeleton, rotations, root) > DEEP
+    return np.any(deep[:, apart & legs], axis=1), np.any(deep[:, apart & ~legs], axis=1)
 
 
 def _deepest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
@@ -140,43 +148,72 @@ def off_balance(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 # --- what is told -----------------------------------------------------------------------------------------------------
 
 
-def means(rows: list[Row]) -> list[Row]:
-    out = []
-    for kind in dict.fromkeys(row["kind"] for row in rows):
-        mine = [row for row in rows if row["kind"] == kind]
-        out.append({"kind": kind, "windows": len(mine)} | {k: _mean(mine, k) for k in list(rows[0])[4:]})
-    return out
-
-
-def _mean(rows: list[Row], key: str) -> float:
-    found = [row[key] for row in rows if np.isfinite(row[key])]
-    return float(np.mean(found)) if found else float("nan")
+MEASURES = {
+    "taken": ("taken for the corpus", "{:.0%}"),
+    "distance": ("distance in style", "{:.2f}"),
+    "speed": ("angular speed, rad/s", "{:.2f}"),
+    "legs_collide": ("frames in which legs collide", "{:.1%}"),
+    "others_collide": ("or other parts", "{:.1%}"),
+    "off_balance_cm": ("off balance, cm", "{:.1f}"),
+    "l2q": ("L2Q", "{:.3f}"),
+}
+BOOTSTRAPS = 2000
+COMPARED = (("posture", "none"), ("progression", "none"), ("progression", "posture"), ("posture", "slerp"))
 
 
 def chart(rows: list[Row]) -> str:
     panels = []
-    for title, key in (
-        ("taken for the corpus", "taken"),
-        ("frames with a collision", "collides"),
-        ("cm off balance", "off_balance_cm"),
-        ("L2Q", "l2q"),
-    ):
-        panel = Panel(title, "", "", joined=False)
-        for place, row in enumerate(means(rows)):
-            panel.series[row["kind"]] = [(float(place), row[key])]
+    for key, (title, _) in MEASURES.items():
+        panel = Panel(title, "a dot a sequence, at the right their mean", "", joined=False, numbered=False)
+        for place, kind in enumerate(("danced", "slerp", *SCHEMES)):
+            by_sequence = _by_sequence(rows, kind, key)
+            found = [(place + 0.3 * n / len(by_sequence), _mean(v)) for n, v in enumerate(by_sequence.values())]
+            panel.series[kind] = [*found, (place + 0.5, _mean([v for values in by_sequence.values() for v in values]))]
         panels.append(panel)
-    return svg(panels, columns=4)
+    return svg(panels)
 
 
 def tell(rows: list[Row]) -> str:
-    return markdown(
-        {
-            "": lambda r: r["kind"],
-            "windows": lambda r: r["windows"],
-            "taken for the corpus": lambda r: f"{r['taken']:.0%}",
-            "frames with a collision": lambda r: f"{r['collides']:.1%}",
-            "off balance": lambda r: f"{r['off_balance_cm']:.1f} cm",
-            "L2Q": lambda r: f"{r['l2q']:.3f}",
-        },
-        means(rows),
+    kinds = list(dict.fromkeys(row["kind"] for row in rows))
+    first = [
+        {"kind": kind} | {key: _mean([r[key] for r in rows if r["kind"] == kind]) for key in MEASURES} for kind in kinds
+    ]
+    columns = {"": lambda r: r["kind"]} | {
+        title: lambda r, key=key, how=how: how.format(r[key]) for key, (title, how) in MEASURES.items()
+    }
+    second = [
+        {"kind": f"{one} less {other}"} | {key: _difference(rows, one, other, key) for key in MEASURES}
+        for one, other in COMPARED
+    ]
+    between = {"": lambda r: r["kind"]} | {
+        title: lambda r, key=key, how=how: "{} ({} to {})".format(*map(how.format, r[key]))
+        for key, (title, how) in MEASURES.items()
+    }
+    windows = len(rows) // len(kinds)
+    return (
+        f"{windows} windows of {len({row['sequence'] for row in rows})} sequences.\n\n{markdown(columns, first)}\n\n"
+        f"Differences, with 95 % intervals by drawing sequences again:\n\n{markdown(between, second)}"
     )
+
+
+def _by_sequence(rows: list[Row], kind: str, key: str) -> dict[str, list[float]]:
+    out: dict[str, list[float]] = {}
+    for row in rows:
+        if row["kind"] == kind:
+            out.setdefault(row["sequence"], []).append(row[key])
+    return out
+
+
+def _difference(rows: list[Row], one: str, other: str, key: str) -> tuple[float, float, float]:
+    """The mean over windows of one kind less another, and its 95 % interval over sequences."""
+    mine, theirs = _by_sequence(rows, one, key), _by_sequence(rows, other, key)
+    found = [np.subtract(mine[sequence], theirs[sequence]) for sequence in mine]
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(len(found), size=(BOOTSTRAPS, len(found)))
+    means = [_mean(np.concatenate([found[n] for n in row]).tolist()) for row in drawn]
+    return _mean(np.concatenate(found).tolist()), *np.nanpercentile(means, [2.5, 97.5])
+
+
+def _mean(values: list[float]) -> float:
+    found = [value for value in values if np.isfinite(value)]
+    return float(np.mean(found)) if found else float("nan")

@@ -3,7 +3,8 @@
     python experiments/search/memory.py PATH/TO/cmu-05
 
 One pair of postures at 10 a second and 5 degrees, under a bound that is made poor, so that A* fills its budget; each
-budget in a process of its own. Growth is of the resident memory, from after a first search that loads all code.
+budget in a process of its own. Growth is of the resident memory, from after a first search that loads all code. There
+is one expansion for every two nodes, each with about eight children, so that memory fills several times over.
 """
 
 import argparse
@@ -11,6 +12,7 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
@@ -19,12 +21,12 @@ from motionmind.search import astar, bound, strips
 from motionmind.search.costs import price
 from motionmind.search.problem import build_grid, costs_to_go, with_waits
 
-BUDGETS = (1_000, 10_000, 100_000, 1_000_000)
+BUDGETS = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 MOVES = 12
 
 
-def grown(folder: Path, budget: int) -> tuple[int, int]:
-    """Nodes held at most, and bytes by which the process grew."""
+def grown(folder: Path, budget: int) -> tuple[int, int, int]:
+    """Nodes held at most, bytes by which the process grew, and nanoseconds of processor time that an expansion took."""
     clips = (own_skeleton(read_motion(file)) for file in sorted(folder.glob("*.bvh")))
     engine = Engine.fit(clips, name="memory", rate=10.0, skip=1, discretization=make_discretization("codebook", 5.0))
     model = price(engine.grammar, "conditional", 1.0, 1.0)
@@ -35,12 +37,14 @@ def grown(folder: Path, budget: int) -> tuple[int, int]:
 
     def search(nodes: int) -> int:
         path, on = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(grid, cut, strips.proven(cut), np.inf, path, nodes, 2 * nodes, on)[3]
+        return astar.search(grid, cut, strips.proven(cut), np.inf, path, nodes, nodes // 2, on)[3]
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = process_time()
     most = search(budget)
-    return most, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    taken = process_time() - began
+    return most, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before), round(2e9 * taken / budget)
 
 
 def main() -> None:
@@ -52,12 +56,15 @@ def main() -> None:
         print(*grown(options.folder, options.budget))
         return
     a_node = 1e6 / astar.nodes_in(1_000_000, 24)
-    print("| budget, nodes | held at most | reckoned | grown | grown / reckoned |\n|---|---|---|---|---|")
+    print("| budget, nodes | held at most | reckoned | grown | grown / reckoned | an expansion |")
+    print("|---|---|---|---|---|---|")
     for budget in BUDGETS:
         command = [sys.executable, __file__, str(options.folder), "--budget", str(budget)]
-        most, size = map(int, subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+        ran = subprocess.run(command, capture_output=True, text=True, check=True)
+        most, size, ns = map(int, ran.stdout.split())
         reckoned = budget * a_node
-        print(f"| {budget:,} | {most:,} | {reckoned / 1e6:.1f} MB | {size / 1e6:.1f} MB | {size / reckoned:.2f} |")
+        print(f"| {budget:,} | {most:,} | {reckoned / 1e6:.1f} MB | {size / 1e6:.1f} MB", end=" | ")
+        print(f"{size / reckoned:.2f} | {ns / 1e3:.1f} µs |")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ import motionmind.cli.corpora
 import motionmind.cli.looks
 import motionmind.cli.measures
 import motionmind.cli.pictures
-import motionmind.cli.scores  # noqa: F401 (each adds its commands)
+import motionmind.cli.scores
+import motionmind.cli.variations  # noqa: F401 (each adds its commands)
 from motionmind.cli.commands import INTERRUPTED, app
 from motionmind.cli.printing import Notes, say
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError

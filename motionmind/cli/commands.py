@@ -12,24 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, read, read_mapping, write
+from motionmind.cli.files import MOVEMENT, all_or_none, asked, check_outputs, read, read_mapping, write
 from motionmind.cli.options import (
     COUNT,
     FILE,
     HOME,
-    NATS,
     OUTPUTS,
     RATE,
     InOrder,
-    Moves,
-    Number,
-    Size,
-    avoided,
     example,
     numbered,
     passing,
-    pins,
     reading,
+    searching,
 )
 from motionmind.cli.printing import Interruption, count, note, print_alternatives, print_tween, progress
 from motionmind.errors import MotionMindError, NoPathError
@@ -66,62 +61,9 @@ def app(context: click.Context) -> None:
 @click.option("--corpus", required=True, metavar="NAME", help="Corpus whose style it takes, by name or folder.")
 @click.option("-o", "--output", type=FILE, help=f"Where it goes: {OUTPUTS}.")
 @click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
-@click.option(
-    "--moves", type=Moves(), metavar="N", help="Number of moves, or a range, 6..10  [default: the search finds it]"
-)
-@click.option("--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find.")
-@click.option(
-    "--duration", type=Number(min=0, min_open=True), metavar="SECONDS", help="How long it lasts; and so how many moves."
-)
-@click.option(
-    "--pin", multiple=True, metavar="JOINT[=B]", help="In A's state until the last move; =B: in B's from the first on."
-)
-@click.option(
-    "--hold",
-    multiple=True,
-    metavar="JOINTS",
-    help="In their state all the way, where A and B agree; with commas between.",
-)
-@click.option("--avoid", multiple=True, metavar="JOINT=STATE", help="Not in this state on the way, by number or name.")
-@click.option(
-    "--via", multiple=True, metavar="FILE[@N]", help="A posture to pass through, at move N or any; several in order."
-)
-@click.option("--alternatives", type=COUNT, metavar="K", help="So many tweens that differ: out-1.json, out-2.json, ...")
-@click.option(
-    "--diversity", type=NATS, default=2.0, help="Nats for each joint's move that an alternative shares with one before."
-)
-@click.option("--sample", is_flag=True, help="Draw a path at random, the likelier the cheaper, instead of the best.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, help="What it is drawn by.")
-@click.option("--strict", is_flag=True, help="No bridges: every move attested, or exit code 3.")
-@click.option("--posturewise", is_flag=True, help="Only whole postures in the order of the corpus, as in 1998.")
-@click.option(
-    "--node-budget", type=COUNT, metavar="N", help="Nodes that the search may hold at once  [default: 200000]"
-)
-@click.option("--memory", type=Size(), metavar="SIZE", help="What these may take, as 200MB, instead of their number.")
 @click.option("--problem", type=FILE, help="Where the problem that was solved goes: .cfn, for toulbar2.")
-@click.option(
-    "--weights", type=click.Choice(["conditional", "printed"]), default="conditional", help="How transitions weigh."
-)
-@click.option(
-    "--novelty", type=Number(min=0, max=1), default=0.0, help="0: the frequent is cheap; 1: all that is attested alike."
-)
-@click.option(
-    "--coordination",
-    type=click.Choice(["posture", "progression", "none"]),
-    default="posture",
-    help="How joints coordinate.",
-)
-@click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of what that costs.")
-@click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal.")
-@click.option("--tau", type=NATS, default=1.0, help="Nats for each move.")
-@click.option("--bridge-price", type=NATS, default=1.0, help="Nats for each degree of an unattested move.")
-@click.option("--fps", type=RATE, default=30.0, help="Frames a second of the motion.")
-@click.option(
-    "--follow/--mean",
-    default=None,
-    help="The motion keeps to the path's states, or is the mean of the corpus's ways  [default: --mean, unless more "
-    "than a length is asked of the path]",
-)
+@click.option("--alternatives", type=COUNT, metavar="K", help="So many tweens that differ: out-1.json, out-2.json, ...")
+@searching
 @HOME
 def tween(
     a: Path,
@@ -132,12 +74,6 @@ def tween(
     problem: Path | None,
     home: Path | None,
     alternatives: int | None,
-    node_budget: int | None,
-    memory: int | None,
-    pin: tuple[str, ...],
-    hold: tuple[str, ...],
-    avoid: tuple[str, ...],
-    via: tuple[str, ...],
     **options: Any,
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
@@ -153,24 +89,18 @@ def tween(
     from motionmind.formats import read_posture, write_atomically
     from motionmind.jit import is_compiled
 
-    if node_budget is not None and memory is not None:
-        raise MotionMindError("--memory says how many nodes there may be, and so does --node-budget: give one of them")
-    if node_budget is not None:
-        options["node_budget"] = node_budget
-    stops = passing(via)
-    options |= {"memory": memory, "pin": pins(pin), "avoid": avoided(avoid)}
-    options["hold"] = [joint for word in hold for joint in word.split(",")]
-
     alone = report == Path("-")
     wanted = ((output, MOVEMENT + PICTURES), (None if alone else report, ()), (problem, (".cfn",)))
     numbers = range(1, (alternatives or 1) + 1)
     places = [
         [(numbered(path, number, alternatives), suffixes) for path, suffixes in wanted if path] for number in numbers
     ]
-    check_outputs([place for group in places for place in group], [a, b, *(path for path, _ in stops)])
+    check_outputs(
+        [place for group in places for place in group], [a, b, *(path for path, _ in passing(options["via"]))]
+    )
+    options = asked(options)
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
-    options["via"] = [read_posture(path) if move is None else (read_posture(path), move) for path, move in stops]
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")
     found: list[Tween] = []
@@ -284,7 +214,7 @@ def convert(
         write_papers(output, motion, form=form)
     else:
         write_motion(output, motion, unit=out_unit or "cm")
-    if missing := lost(motion, output):
+    if missing := lost(motion, output, source=file):
         note(f"{output}: no place for {'; '.join(missing)}")
     click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from motionmind.cli.options import avoided, passing, pins
 from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -105,3 +106,22 @@ def all_or_none(files: Sequence[Path]) -> Iterator[None]:
         for file in new:
             file.unlink(missing_ok=True)
         raise
+
+
+def asked(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the options of `searching` ask of `Engine.tween`; the postures to pass through are read from their files."""
+    from motionmind.formats import read_posture
+
+    if given["node_budget"] is not None and given["memory"] is not None:
+        raise MotionMindError("--memory says how many nodes there may be, and so does --node-budget: give one of them")
+    stops = [(read_posture(path), move) for path, move in passing(given["via"])]
+    found = {
+        **given,
+        "pin": pins(given["pin"]),
+        "avoid": avoided(given["avoid"]),
+        "hold": [joint for word in given["hold"] for joint in word.split(",")],
+        "via": [posture if move is None else (posture, move) for posture, move in stops],
+    }
+    if given["node_budget"] is None:
+        del found["node_budget"]
+    return found

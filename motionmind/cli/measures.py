@@ -39,8 +39,8 @@ def measure(
     """Measure movement, beside the range of a corpus's own.
 
     FILE is any movement: a tween, a recording. How it moves is seen at 30 frames a second; what it says, in the
-    corpus's states. The range is from the 5th to the 95th percentile of the corpus's clips, in pieces as long; what is
-    beyond it is marked.
+    corpus's states. The range is from the 5th to the 95th percentile of the corpus's clips, in pieces as long, or of a
+    tenth of it; what is beyond it is marked.
     """
     import numpy as np
 
@@ -74,7 +74,7 @@ def measure(
 
 def _line(name: str, figure: Figure, width: int) -> str:
     beyond = "<" if figure.value < figure.low else ">" if figure.value > figure.high else " "
-    low, high = (f"{number:.4g}" for number in (figure.low, figure.high))
+    low, high = ("-" if math.isnan(number) else f"{number:.4g}" for number in (figure.low, figure.high))
     unit = f" ({figure.unit})" * bool(figure.unit)
     return f"{name:{width}}  {figure.value:8.4g} {beyond}  {low:>6} to {high:8}  {figure.about}{unit}"
 

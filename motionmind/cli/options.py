@@ -52,6 +52,50 @@ class Moves(click.ParamType["int | tuple[int, int]"]):
         return least if len(words) == 1 else (least, most)
 
 
+class Point(click.ParamType["tuple[float, ...]"]):
+    """Coordinates, "0.01" or "1,1,20"."""
+
+    name = "point"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """The numbers."""
+        try:
+            found = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            found = ()
+        if not (found and all(map(math.isfinite, found))):
+            self.fail(f"{value!r} is no number such as 0.01, and no point such as 1,1,20.", param, ctx)
+        return found
+
+
+class Span(click.ParamType["tuple[int, int]"]):
+    """A posture's number, "10", or the first and the last of several, "10..14"."""
+
+    name = "span"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """The first and the last."""
+        words = str(value).split("..")
+        if len(words) > 2 or not all(word.isdecimal() for word in words):
+            self.fail(f"{value!r} is no posture's number such as 10, and no range such as 10..14.", param, ctx)
+        return int(words[0]), int(words[-1])
+
+
+class Numbers(click.ParamType["tuple[int, ...] | str"]):
+    """Numbers, "2" or "1,3", or "all"."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...] | str:
+        """The numbers, or "all"."""
+        words = str(value).split(",")
+        if words == ["all"]:
+            return "all"
+        if not all(word.isdecimal() for word in words):
+            self.fail(f"{value!r} is no number such as 2, no list such as 1,3, and not all.", param, ctx)
+        return tuple(map(int, words))
+
+
 class Size(click.ParamType[int]):
     """Bytes, as 200MB; units are powers of 1000."""
 
@@ -67,6 +111,7 @@ class Size(click.ParamType[int]):
 
 
 FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
+ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
 EXISTING = click.Path(exists=True, dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
 COUNT = click.IntRange(min=1)
@@ -98,6 +143,104 @@ def reading(command: _Command) -> _Command:
             "one  [default: told from the body's height]",
         ),
         click.option("--joints", type=FILE, help="Whose joints they are: a TOML or JSON file, your joint = human23's."),
+    ):
+        command = option(command)
+    return command
+
+
+def searching(command: _Command) -> _Command:
+    """Options of the commands that ask the engine for movement, which `Engine.tween` explains."""
+    for option in reversed(
+        (
+            click.option(
+                "--moves",
+                type=Moves(),
+                metavar="N",
+                help="Number of moves, or a range, 6..10  [default: the search finds it]",
+            ),
+            click.option(
+                "--max-moves", type=COUNT, metavar="N", default=60, help="Greatest number of moves that it may find."
+            ),
+            click.option(
+                "--duration",
+                type=Number(min=0, min_open=True),
+                metavar="SECONDS",
+                help="How long it lasts; and so how many moves.",
+            ),
+            click.option(
+                "--pin",
+                multiple=True,
+                metavar="JOINT[=B]",
+                help="In A's state until the last move; =B: in B's from the first on.",
+            ),
+            click.option(
+                "--hold",
+                multiple=True,
+                metavar="JOINTS",
+                help="In their state all the way, where A and B agree; with commas between.",
+            ),
+            click.option(
+                "--avoid", multiple=True, metavar="JOINT=STATE", help="Not in this state on the way, by number or name."
+            ),
+            click.option(
+                "--via",
+                multiple=True,
+                metavar="FILE[@N]",
+                help="A posture to pass through, at move N or any; several in order.",
+            ),
+            click.option(
+                "--diversity",
+                type=NATS,
+                default=2.0,
+                help="Nats for each joint's move that an alternative shares with one before.",
+            ),
+            click.option(
+                "--sample", is_flag=True, help="Draw a path at random, the likelier the cheaper, instead of the best."
+            ),
+            click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, help="What it is drawn by."),
+            click.option("--strict", is_flag=True, help="No bridges: only moves that the corpus attests."),
+            click.option(
+                "--posturewise", is_flag=True, help="Only whole postures in the order of the corpus, as in 1998."
+            ),
+            click.option(
+                "--node-budget",
+                type=COUNT,
+                metavar="N",
+                help="Nodes that the search may hold at once  [default: 200000]",
+            ),
+            click.option(
+                "--memory", type=Size(), metavar="SIZE", help="What these may take, as 200MB, instead of their number."
+            ),
+            click.option(
+                "--weights",
+                type=click.Choice(["conditional", "printed"]),
+                default="conditional",
+                help="How transitions weigh.",
+            ),
+            click.option(
+                "--novelty",
+                type=Number(min=0, max=1),
+                default=0.0,
+                help="0: the frequent is cheap; 1: all that is attested alike.",
+            ),
+            click.option(
+                "--coordination",
+                type=click.Choice(["posture", "progression", "none"]),
+                default="posture",
+                help="How joints coordinate.",
+            ),
+            click.option("--lambda", "lambda_", type=NATS, default=1.0, help="Factor of what that costs."),
+            click.option("--beta", type=NATS, default=1.0, help="Nats for each move that a joint waits at its goal."),
+            click.option("--tau", type=NATS, default=1.0, help="Nats for each move."),
+            click.option("--bridge-price", type=NATS, default=1.0, help="Nats for each degree of an unattested move."),
+            click.option("--fps", type=RATE, default=30.0, help="Frames a second of the motion."),
+            click.option(
+                "--follow/--mean",
+                default=None,
+                help="The motion keeps to the path's states, or is the mean of the corpus's ways  [default: --mean, "
+                "unless more than a length is asked of the path]",
+            ),
+        )
     ):
         command = option(command)
     return command
@@ -136,6 +279,18 @@ def mixture(given: Sequence[str]) -> dict[str, float]:
         if corpus in found:
             raise MotionMindError(f"--mix {word}: {corpus} is given twice")
         found[corpus] = value
+    return found
+
+
+def settings(given: Sequence[str]) -> dict[str, float]:
+    """What a flow's parameters are, from words such as "rho=28"."""
+    found: dict[str, float] = {}
+    for word in given:
+        name, equals, value = word.partition("=")
+        try:
+            found[name] = float(value if equals else "")
+        except ValueError:
+            raise MotionMindError(f"--parameter {word}: give NAME=VALUE, such as rho=28") from None
     return found
 
 

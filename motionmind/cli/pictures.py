@@ -5,31 +5,29 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from motionmind.cli.commands import app
-from motionmind.cli.files import all_or_none, check_outputs, read, read_mapping
-from motionmind.cli.options import COUNT, FILE, HOME, RATE, example, reading
+from motionmind.cli.files import all_or_none, check_outputs
+from motionmind.cli.options import ANY, COUNT, FILE, HOME, RATE, example, reading
 from motionmind.cli.printing import count
+from motionmind.cli.sources import clips_in, frames_of, holds_clips, movement
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.motion import Motion
 
-_ANY = click.Path(readable=False, path_type=Path)  # a file or a folder
-
 
 @app.command(epilog=example("motionmind sheet corpora/ballet/centre.score --clip adagio -o adagio.png"))
-@click.argument("source", type=_ANY)
+@click.argument("source", type=ANY)
 @click.option(
     "-o",
     "--output",
-    type=_ANY,
+    type=ANY,
     required=True,
     help="Where the picture goes: .png; or a folder for a picture of each clip.",
 )
@@ -71,22 +69,22 @@ def sheet(
     """Draw the postures of clips from the front, from the side, and their feet from above.
 
     Each has its frame's number, which posture --frame takes, and its time. SOURCE is a file of movement, a score, or a
-    corpus by its name or folder; scores and corpora hold clips, of which --clip takes some.
+    corpus by its name or folder; scores and corpora hold clips, of which --clip takes some. CORPUS/CLIP is one clip.
     """
     from motionmind.formats import write_atomically
     from motionmind.render.sheet import check_frames, contact_sheet, png
 
-    many = _holds_clips(source, home)
+    many = holds_clips(source, home)
     folder = output if many and (output.is_dir() or not output.suffix) else None
     if not folder:
         check_outputs([(output, (".png",))], [source])
     if names and not many:
         raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    motions = _clips(source, names, home) if many else [_movement(source, **as_given)]
+    motions = clips_in(source, names, home) if many else [movement(source, **as_given)]
     if not folder and len(motions) != 1:
         raise MotionMindError(f"{output}: {source} holds {len(motions)} clips; choose one by --clip, or give a folder")
     frames = [
-        _spread(_range(motion.name if folder else source, len(motion), start, end), every, postures)
+        _spread(frames_of(motion.name if folder else source, len(motion), start, end), every, postures)
         for motion in motions
     ]
     for motion, drawn in zip(motions, frames, strict=True):
@@ -101,7 +99,7 @@ def sheet(
 
 
 @app.command(epilog=example("motionmind render clip.bvh -o clip.html"))
-@click.argument("source", type=_ANY)
+@click.argument("source", type=ANY)
 @click.option(
     "-o", "--output", type=FILE, required=True, help="Where it goes: .png, .gif, .mp4, .svg (a film too) or .html."
 )
@@ -124,66 +122,27 @@ def render(
 ) -> None:
     """Draw movement: as a picture, a film, or a page to play it in.
 
-    SOURCE is a file of movement, a score, or a corpus by its name or folder. .png is one posture, or a sheet of up to
-    48 of them, evenly spread (the command sheet has more to choose); .html is a page that plays the movement in any
-    browser, from disk, offline. What the engine inserted is drawn in violet, a joint that it bridged has a green ball.
+    SOURCE is a file of movement, a score, a corpus by its name or folder, or CORPUS/CLIP. .png is one posture, or a
+    sheet of up to 48 of them, evenly spread (the command sheet has more to choose); .html is a page that plays the
+    movement in any browser, from disk, offline. What the engine inserted is drawn in violet, a joint that it bridged
+    has a green ball.
     """
     from motionmind.render.pictures import write_picture
 
     seen = {key: options.pop(key) for key in ("fps", "view", "size")}
     check_outputs([(output, PICTURES)], [source])
-    many = _holds_clips(source, home)
+    many = holds_clips(source, home)
     if name and not many:
         raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    found = _clips(source, (name,) if name else (), home) if many else [_movement(source, **options)]
+    found = clips_in(source, (name,) if name else (), home) if many else [movement(source, **options)]
     if len(found) != 1:
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
-    motion, frames = found[0], _range(source, len(found[0]), start, end)
+    motion, frames = found[0], frames_of(source, len(found[0]), start, end)
     part = motion.slice(frames.start, frames.stop)
     write_picture(output, part, first=frames.start, **seen)
     seconds = part.times[-1] - part.times[0]
     kilobytes = output.stat().st_size / 1000
     click.echo(f"{output}: {count(len(part), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
-
-
-def _holds_clips(source: Path, home: Path | None) -> bool:
-    """Whether it is a score, or a corpus's name or folder; not a file of one movement, whose name says its format."""
-    from motionmind.corpus.store import known
-
-    return source.suffix.lower() in (".score", "") or source.is_dir() or str(source) in known(home)
-
-
-def _movement(path: Path, joints: Path | None, **source: Any) -> Motion:
-    from motionmind.learned import own_skeleton
-
-    return own_skeleton(read(path, **source), read_mapping(joints))
-
-
-def _clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motion]:
-    """The clips of a score or of a corpus, those that are wanted or all of them."""
-    if source.suffix.lower() == ".score":
-        from motionmind.notation.compose import motions
-        from motionmind.notation.read import read_score
-
-        score = read_score(source)
-        written = {clip.name: clip for clip in score.clips}
-        return motions(score, [written[name] for name in _chosen(source, list(written), wanted)])
-    from motionmind.learned import Learned
-
-    corpus = Learned.load(str(source), home).corpus
-    clips = {clip.label: clip for clip in corpus.clips}
-    return [replace(corpus.motion(clips[name]), name=name) for name in _chosen(source, list(clips), wanted)]
-
-
-def _chosen(source: Path, names: Sequence[str], wanted: Sequence[str]) -> Sequence[str]:
-    from motionmind.formats.text import listed, meant
-
-    if not names:
-        raise MotionMindError(f"{source}: holds no clips")
-    for name in wanted:
-        if name not in names:
-            raise MotionMindError(f"{source}: no clip {name!r}{meant(name, names)}; there are {listed(names, 60)}")
-    return list(dict.fromkeys(wanted)) or names
 
 
 def _files_in(folder: Path, motions: Sequence[Motion], source: Path) -> list[Path]:
@@ -201,17 +160,6 @@ def _files_in(folder: Path, motions: Sequence[Motion], source: Path) -> list[Pat
             if made:
                 folder.rmdir()
         raise
-
-
-def _range(clip: Path | str, length: int, start: int, end: int) -> range:
-    """The frames from `start` to `end`, both among them, of a clip of `length` frames; negative from the end."""
-    first, last = (frame + length if frame < 0 else frame for frame in (start, end))
-    for frame, given in ((first, start), (last, end)):
-        if not 0 <= frame < length:
-            raise MotionMindError(f"{clip}: frames are 0 to {length - 1}, there is no frame {given}")
-    if last < first:
-        raise MotionMindError(f"{clip}: --to {end} lies before --from {start}")
-    return range(first, last + 1)
 
 
 def _spread(frames: range, every: int | None, postures: int | None) -> Sequence[int]:

@@ -63,6 +63,7 @@ class Interruption:
     def __init__(self) -> None:
         self.asked = False
         self._said = monotonic()
+        self._doing = ""
 
     def __enter__(self) -> Interruption:
         self._before = signal.signal(signal.SIGINT, self._ask)
@@ -78,8 +79,15 @@ class Interruption:
         if sys.stderr.isatty() and monotonic() > self._said + 1.0:
             self._said = monotonic()
             best = f"best so far {so_far.cost:.3f}" if so_far.cost < math.inf else "no path yet"
-            click.echo(f"\r\x1b[2K{best}, proven {so_far.lower_bound:.3f} nats (Ctrl-C ends here)", err=True, nl=False)
+            line = f"{self._doing}{best}, proven {so_far.lower_bound:.3f} nats (Ctrl-C ends here)"
+            click.echo(f"\r\x1b[2K{line}", err=True, nl=False)
         return self.asked
+
+    def told(self, done: int, of: int) -> None:
+        """Say on a terminal which of several searches begins, after so many are done."""
+        self._doing = f"transition {done + 1} of {of}: "
+        if sys.stderr.isatty():
+            click.echo(f"\r\x1b[2K{self._doing}", err=True, nl=False)
 
     def _ask(self, *_: object) -> None:
         self.asked = True
@@ -129,6 +137,65 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
         )
     if files:
         click.echo(f"written   {', '.join(map(click.format_filename, files))}")
+
+
+def print_review(found: dict[str, Any]) -> None:
+    """A variation (`Variation.report`): what it was made by, then a line for each stretch of the piece and its seam."""
+    course, counts = found["course"], found["counts"]
+    values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
+    nudge = ", ".join(f"{x:g}" for x in course["nudge"])
+    click.echo(
+        f"{found['piece']['name'] or 'piece'}, {count(found['piece']['postures'], 'posture')}, by {course['flow']} "
+        f"({values}), nudge {nudge}, skip {course['skip']}"
+    )
+    click.echo(
+        f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
+    )
+    click.echo(
+        f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')}: {counts['inserted']} with an "
+        f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
+    )
+    if counts["stays"]:
+        click.echo(stillness(counts))
+    click.echo("seam  postures   of the piece  decision   transition")
+    begins = [0, *(seam["at"] + 1 for seam in found["seams"])]
+    ends = [*(seam["at"] for seam in found["seams"]), counts["postures"] - 1]
+    for seam, first, last in zip([None, *found["seams"]], begins, ends, strict=True):
+        here, there = _stretch(first, last), _stretch(found["order"][first], found["order"][last])
+        row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}"
+        decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
+        click.echo(f"{row}  {decision:9}  {_transition(seam)}" if seam else row.rstrip())
+
+
+def stillness(counts: dict[str, Any]) -> str:
+    """How many of a variation's steps stay in their posture, and for how long: "32 of 79 steps stay, 6.4 s"."""
+    stays, steps = counts["stays"], count(counts["postures"] - 1, "step")
+    return f"{stays} of {steps} stay{'s' * (stays == 1)}, {counts['seconds_still']:.1f} s"
+
+
+def _stretch(first: int, last: int) -> str:
+    return str(first) if first == last else f"{first}..{last}"
+
+
+def _transition(seam: dict[str, Any]) -> str:
+    """What is known of a seam, in words."""
+    if seam["corpus"] is None:
+        return "not judged"
+    if not seam["breaks"]:
+        return f"attested by {seam['corpus']}"
+    ordered = sorted(seam["breaks"], key=lambda one: -float(one["degrees"]))
+    worst, others = ordered[0], [one["joint"] for one in ordered[1:]]
+    faults = ["not attested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
+    why = f"{worst['joint']} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
+    if not seam["candidates"]:
+        left = "no way found" if seam["failure"] else "not smoothed"
+        return f"abrupt, {left}: {', '.join([why, *others])}"
+    why += f", and {len(others)} more" * bool(others)
+    one = seam["candidates"][seam["chosen"] - 1]
+    made = f"{count(one['moves'], 'move')} in {one['seconds']:.2f} s, {one['status']}, {one['attested']:.0%} attested"
+    bridges = f", {count(len(one['bridges']), 'bridge')}" * bool(one["bridges"])
+    which = f"{made}{bridges}, {seam['chosen']} of {len(seam['candidates'])}"
+    return f"abrupt, was {which}: {why}" if seam["decision"] == "discarded" else f"{which}: {why}"
 
 
 def _attesters(result: Tween) -> str:

@@ -14,17 +14,23 @@ from motionmind.skeleton import BODIES, Skeleton
 _TINY = 1e-6  # seconds and metres
 
 
-def lost(motion: Motion, path: FilePath) -> list[str]:
+def lost(motion: Motion, path: FilePath, source: FilePath | None = None) -> list[str]:
     """What of `motion` a file at `path` has no place for, as phrases: "times", "the body's proportions".
 
-    Only what this motion has is named. JSON holds all of it. Names are no loss: in formats without them the file's
+    Where it was read from the file `source`, also what that held beside the movement.
+
+    Only what this motion has is named. JSON holds all movement. Names are no loss: in formats without them the file's
     name is the motion's. What no file of the format could be made of (uneven times in BVH and .npz, a body that is
     none of SMPL's in .npz) is refused by those who write it.
     """
     suffix = Path(path).suffix.lower()
-    if suffix == ".json":
-        return []
     found = []
+    if source is not None and Path(source).suffix.lower() == ".json":
+        from motionmind.formats.motion_json import holds_variation
+
+        found += ["the variation's original, alternatives and decisions"] * holds_variation(source)
+    if suffix == ".json":
+        return found
     if suffix == ".txt":
         if len(motion) > 1:
             found.append("times")

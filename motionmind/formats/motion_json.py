@@ -22,10 +22,14 @@ JSON. What the engine put in, if it did, is listed by the times of the postures 
 the joints' moves that no corpus attests:
 
     "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
+
+A variation's file is its movement as it stands, with one field more, `variation`, which holds all the rest
+(`motionmind.variation.variation_json`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import chain
 
 import msgspec
@@ -33,8 +37,9 @@ import numpy as np
 
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, write_atomically
+from motionmind.formats.files import FilePath, read_bytes, write_atomically
 from motionmind.motion import Insertion, Motion
+from motionmind.skeleton import Skeleton
 
 
 class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
@@ -44,18 +49,33 @@ class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
     bridged: list[tuple[str, int]] = []  # msgspec gives each object its own
 
 
-class MotionSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """The file, version 1."""
+class FramesSchema(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """Movement on a skeleton that the file names elsewhere."""
 
-    format: str
-    version: int
-    skeleton: str | _json.SkeletonSchema
     times: list[float]
     root: list[_json.Vector]
     rotations: list[list[_json.Quaternion]]
     name: str = ""
     insertions: list[InsertionSchema] = []
+
+
+class MotionSchema(FramesSchema, forbid_unknown_fields=True, kw_only=True):
+    """The file, version 1."""
+
+    format: str
+    version: int
+    skeleton: str | _json.SkeletonSchema
     moves: list[float] = []  # one insertion's times, as tweens were written before they had bridges
+    variation: msgspec.Raw = msgspec.Raw()  # what else a variation's file holds
+
+
+class _More(msgspec.Struct):
+    variation: msgspec.Raw = msgspec.Raw()
+
+
+def holds_variation(path: FilePath) -> bool:
+    """Whether the JSON at `path` holds a variation with its movement."""
+    return bool(bytes(_json.decode(read_bytes(path), _More, path).variation))
 
 
 def motion_from_json(data: bytes, path: FilePath) -> Motion:
@@ -72,7 +92,16 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
     if kind != _json.MOTION:
         raise FormatError(f"this holds a posture, where a motion ({_json.MOTION!r}) was expected", path=path)
     schema = _json.decode(data, MotionSchema, path)
-    skeleton = _json.to_skeleton(schema.skeleton, path)
+    if schema.moves:
+        schema.insertions.append(InsertionSchema(schema.moves))
+    return motion_of(schema, _json.to_skeleton(schema.skeleton, path), path)
+
+
+def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend: bool = True) -> Motion:
+    """The motion of a skeleton that a file describes; FormatError as `motion_from_json`.
+
+    Without `mend` quaternions stay as they are, to the last bit, for files that were written in full.
+    """
     frames, joints = len(schema.times), len(skeleton)
     if frames == 0:
         raise FormatError("times: a motion has one frame at least", path=path)
@@ -90,8 +119,6 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
     rotations = np.fromiter(numbers, dtype=np.float64, count=frames * joints * 4).reshape(frames, joints, 4)
     root = np.array(schema.root, dtype=np.float64)
     times = np.array(schema.times, dtype=np.float64)
-    if schema.moves:
-        schema.insertions.append(InsertionSchema(schema.moves))
     for what, array in (
         ("root", root),
         ("times", times),
@@ -102,7 +129,8 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
     if len(late):
         frame = late[0] + 1
         raise FormatError(f"times: {times[frame]:g} of frame {frame} is not after {times[frame - 1]:g}", path=path)
-    rotations = _json.unit_rotations(rotations, skeleton.names, path)
+    if mend:
+        rotations = _json.unit_rotations(rotations, skeleton.names, path)
     try:
         insertions = tuple(Insertion(np.array(one.times), tuple(one.bridged)) for one in schema.insertions)
         return Motion(skeleton, rotations, root, times, schema.name, insertions)
@@ -112,8 +140,11 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
         raise FormatError(str(error), path=path) from error
 
 
-def write_motion_json(path: FilePath, motion: Motion) -> None:
-    """Write `motion` as JSON; read back, no number is off by more than 1e-9. MotionMindError if it cannot be."""
+def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] | None = None) -> None:
+    """Write `motion` as JSON; read back, no number is off by more than 1e-9. MotionMindError if it cannot be.
+
+    `more` are fields that the file holds as well, as JSON.
+    """
     times = _json.rounded(motion.times)
     if np.any(np.diff(times) <= 0.0):  # steps finer than what is rounded to
         times = motion.times
@@ -130,6 +161,7 @@ def write_motion_json(path: FilePath, motion: Motion) -> None:
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
         rows = ",\n".join(_compact(row) for row in _json.rounded(array).tolist())
         fields.append(f'"{what}": [\n{rows}\n]')
+    fields += [f'"{what}": {value.decode()}' for what, value in (more or {}).items()]
     write_atomically(path, ("{\n" + ",\n".join(fields) + "\n}\n").encode())
 
 

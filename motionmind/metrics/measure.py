@@ -28,6 +28,7 @@ RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
 _SHORTEST = 4  # frames that a jerk needs
 _PIECE, _MARGIN = 32, 8  # keys that are splined at a time, and those on either side that bear on them
 _MOST = 100  # pieces of the corpus that are measured
+_PARTS = 10  # at least so many are made of all its movement
 _KEYED = 2.0  # frames in the time of a move; fewer are keyframes
 _HUMAN = 1.0  # metres; limits of skating are for bodies as high as this at least
 
@@ -38,7 +39,7 @@ class Figure:
 
     Attributes:
         value: what it is; NaN where it has no meaning, as the smoothness of rest.
-        low: 5th percentile of the corpus's own movement, in pieces that last as long.
+        low: 5th percentile of the corpus's own movement, in pieces; NaN where that has none.
         high: 95th percentile.
         unit: of all three; "" where they are numbers or shares.
         about: what it says, in words.
@@ -78,8 +79,8 @@ def measure(motion: Motion, learned: Learned, path: Path | None = None) -> dict[
 
     How it moves is seen at 30 frames a second, keyframes joined by splines, as tweens join them. What it says in states
     is seen at the corpus's own postures a second; keyframes as they are, and what the engine made at the times of its
-    moves. The corpus's range is that of its own clips, in pieces as long as the movement, or as the clip if that is
-    shorter; of what is copied it is what each has from the other clips.
+    moves. The corpus's range is that of its own clips, in pieces as long as the movement, or as the clip or a tenth of
+    the corpus if that is shorter; of what is copied it is what each has from the other clips.
 
     Args:
         motion: on the corpus's skeleton, or on one that maps to it.
@@ -108,7 +109,9 @@ def measure(motion: Motion, learned: Learned, path: Path | None = None) -> dict[
     seen = [features(clip.rotations) for clip in clips]
     own = _motion_figures(sampled, _style(seen, None)) | _path_figures(path, habits, phrases, None)
     rows: dict[str, list[float]] = {name: [] for name in own}
-    for found in (*_usual_motion(clips, seen, len(sampled)), *_usual_paths(learned, len(path), habits, phrases)):
+    frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
+    postures = min(len(path), max(len(corpus) // _PARTS, 2))
+    for found in (*_usual_motion(clips, seen, frames), *_usual_paths(learned, postures, habits, phrases)):
         for name, value in found.items():
             rows.setdefault(name, []).append(value)
     out = {}
@@ -215,7 +218,11 @@ def _usual_paths(learned: Learned, postures: int, habits: Habits, phrases: Phras
     states, clips = np.asarray(learned.states), learned.corpus.clips
     for number, start in _pieces([len(clip) for clip in clips], postures, 2):
         path = states[clips[number].start : clips[number].stop][start : start + postures]
-        yield _path_figures(path, habits, phrases, number)
+        found = _path_figures(path, habits, phrases, number)
+        del found["moves"]  # which is how long the piece was made
+        if len(clips) == 1:  # there is no other to copy from
+            found = {name: value for name, value in found.items() if not name.endswith("run") and "copied" not in name}
+        yield found
 
 
 def _pieces(lengths: Sequence[int], size: int, least: int) -> list[tuple[int, int]]:

@@ -24,29 +24,26 @@ Sequences = Mapping[str, Sequence[Floats]]  # the unbroken pieces [T, J, 4] of e
 
 RATE = 30.0
 WINDOW = 18  # frames, 0.6 s; each begins half a window after the one before
-_STILL = 0.05, 0.5  # rad/s, rad/s^2: less is rest
+_STEP = 2  # frames over which speed and its change are taken
+_STILL = 0.2, 2.0  # rad/s, rad/s^2: much less is hardly seen
 _SHRINKAGE = 0.3
 _OWN = 0.95  # of a corpus's own movement is taken for it, if no other corpus is nearer
 
 
 def features(rotations: Floats) -> Floats:
     """What is seen of movement [T, J, 4] at 30 frames a second, in each window [W, 2 J]: the logarithms of the root
-    mean square of each joint's angular velocity, rad/s, and of its angular acceleration, rad/s^2."""
-    velocity = rot.log(rot.inv_mul(rotations[:-1], rotations[1:])) * RATE
-    change = np.diff(velocity, axis=0) * RATE
+    mean square of each joint's angular velocity, rad/s, and of its angular acceleration, rad/s^2.
+
+    Both are differences over two frames, so that the noise of recordings, which is from frame to frame, decides less.
+    """
+    seconds = _STEP / RATE
+    velocity = rot.log(rot.inv_mul(rotations[:-_STEP], rotations[_STEP:])) / seconds
+    change = (velocity[_STEP:] - velocity[:-_STEP]) / seconds
     starts = range(0, len(rotations) - WINDOW + 1, WINDOW // 2)
-    ends = (WINDOW - 1, WINDOW - 2)
-    rows = [
-        [
-            np.sqrt(np.sum(x[start : start + end] ** 2, axis=-1).mean(axis=0))
-            for x, end in zip((velocity, change), ends, strict=True)
-        ]
-        for start in starts
-    ]
-    shape = (len(rows), 2, rotations.shape[1])
-    return np.asarray(
-        np.log(np.array(rows).reshape(shape) + np.array(_STILL)[:, None]).reshape(len(rows), 2 * shape[2])
-    )
+    pairs = (velocity, WINDOW - _STEP), (change, WINDOW - 2 * _STEP)
+    found = [[np.mean(np.sum(x[s : s + n] ** 2, axis=-1), axis=0) for x, n in pairs] for s in starts]
+    size = np.sqrt(np.array(found).reshape(len(starts), 2, rotations.shape[1]))
+    return np.asarray(np.log(size + np.array(_STILL)[:, None]).reshape(len(starts), 2 * rotations.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +95,13 @@ class Judge:
     def takes(self, rotations: Floats, corpus: str, sequence: str) -> bool:
         """Whether movement [frames, J, 4] that stands for a part of a corpus's sequence is taken for the corpus's."""
         styles = self.without[corpus, sequence]
-        distances = styles.distances(rotations)
-        own = styles.names.index(corpus)
-        return bool(distances.argmin() == own and distances[own] <= self.limits[corpus])
+        nearest = styles.names[int(styles.distances(rotations).argmin())]
+        return nearest == corpus and self.distance(rotations, corpus, sequence) <= 1.0
+
+    def distance(self, rotations: Floats, corpus: str, sequence: str) -> float:
+        """How far such movement is from how the corpus's joints move: 1 for the most that is taken for it."""
+        styles = self.without[corpus, sequence]
+        return float(styles.distances(rotations)[styles.names.index(corpus)] / self.limits[corpus])
 
     def held_out(self, corpus: str) -> Iterator[tuple[str, Floats]]:
         """A corpus's own movement, with its sequence, in pieces of as many frames [frames, J, 4]."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind.chaos.baselines import limbs
 from motionmind.corpus.corpus import Corpus
-from motionmind.skeleton import Skeleton
 
 Path = NDArray[np.int32]
 Ints = NDArray[np.int64]
@@ -18,24 +18,13 @@ LONGEST = 5  # states that n-grams have at most
 _SEVERAL = -1  # in place of the one clip that has an n-gram
 
 
-def limbs(skeleton: Skeleton) -> list[list[int]]:
-    """The joints in limbs: the longest chains in which each joint has one child. In human23: pelvis, two legs, back,
-    neck and head, two arms."""
-    found: list[list[int]] = []
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0 and len(skeleton.children(parent)) == 1:
-            next(limb for limb in found if limb[-1] == parent).append(joint)
-        else:
-            found.append([joint])
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Phrasebook:
     """What a corpus says word by word.
 
     Attributes:
-        groups: the joints of each part of the body that is looked at: "joint", "limb" and "body".
+        groups: the joints of each part of the body that is looked at: "joint", "limb" (the trunk is one) and
+            "body".
         grams: the sequences of states of each part, and the clip that has each, or that several have.
         places: in which of the corpus's postures each whole posture occurs.
         clip_of: the clip of each posture [N].
@@ -82,7 +71,8 @@ class Phrasebook:
 def find_phrases(corpus: Corpus, states: NDArray[np.int32]) -> Phrasebook:
     """What a corpus, with its postures' states [N, L], says word by word."""
     joints = list(range(len(corpus.skeleton)))
-    groups = {"joint": [[joint] for joint in joints], "limb": limbs(corpus.skeleton), "body": [joints]}
+    parts = [part.tolist() for part in limbs(corpus.skeleton).values()]
+    groups = {"joint": [[joint] for joint in joints], "limb": parts, "body": [joints]}
     grams: list[dict[bytes, int]] = [{} for _ in range(LONGEST)]
     places: dict[bytes, list[int]] = {}
     for number, clip in enumerate(corpus.clips):

@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from io import BytesIO
 from math import ceil, hypot, sqrt
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +17,12 @@ from motionmind.corpus.corpus import FACING
 from motionmind.errors import MotionMindError
 from motionmind.formats.files import FilePath, write_atomically
 from motionmind.render.ground import PAPER
+from motionmind.render.plate import LETTER, Colour, Point, font, hexadecimal, mixed, plain
 
 if TYPE_CHECKING:
     import networkx as nx
-    from PIL import ImageFont
 
 Array = NDArray[np.float64]
-Point = tuple[float, float]
-Colour = tuple[int, int, int]
 
 GRAPHS = (".svg", ".png", ".graphml", ".gexf")  # how the files end that `write_graph` writes
 
@@ -37,7 +33,7 @@ _ON_RING = 64.0  # pixels between states of the facing
 _SMALL, _LARGE = 5.0, 20.0  # radii of the least and of the most visited state
 _BEND = 0.14  # how far an arrow bends to its left, by its length, so that both ways can be told apart
 _MARGIN, _HEAD = 40.0, 56.0  # pixels around the picture, and for the words above it
-_LETTERS, _LETTER = 11, 0.54  # height of a name in pixels, and the width of a letter by it
+_LETTERS = 11  # height of a name in pixels
 _TITLE = 17
 _FINE = 3  # samples to a pixel of a PNG, along each side
 _NODE: Colour = (58, 104, 160)
@@ -125,7 +121,7 @@ def draw(graph: nx.DiGraph) -> Drawing:
     arrows = tuple(_arrow(graph, a, b, place, radius) for a, b in pairs)
     ends = [(*circle.at, circle.radius) for circle in circles]
     right = max([x + r for x, _, r in ends] + [at[0] + _long(n) for n, at in zip(names, words_at, strict=True) if at]
-                + [_LETTER * _TITLE * len(heading), _long(legend) + _MARGIN], default=0.0)  # fmt: skip
+                + [LETTER * _TITLE * len(heading), _long(legend) + _MARGIN], default=0.0)  # fmt: skip
     bottom = max([y + r for _, y, r in ends], default=_MARGIN + _HEAD)
     return Drawing(ceil(right + _MARGIN), ceil(bottom + _MARGIN), heading, legend, circles, arrows)
 
@@ -136,33 +132,33 @@ def svg(drawing: Drawing) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {drawing.width} {drawing.height}"'
         f' width="{drawing.width}" height="{drawing.height}" role="img"'
         f' font-family="system-ui,Helvetica,Arial,sans-serif" font-size="{_LETTERS}">',
-        f"<title>{_plain(drawing.heading)}</title>",
-        f'<rect width="100%" height="100%" fill="{_hex(PAPER)}"/>',
-        f'<text x="{_MARGIN:g}" y="{_MARGIN:g}" font-size="{_TITLE}" fill="{_hex(_WORDS)}">'
-        f"{_plain(drawing.heading)}</text>",
-        f'<text x="{_MARGIN:g}" y="{_MARGIN + 20:g}" fill="{_hex(_PALE)}">{_plain(drawing.legend)}</text>',
-        f'<g fill="none" stroke="{_hex(_ARROW)}" stroke-linecap="round">',
+        f"<title>{plain(drawing.heading)}</title>",
+        f'<rect width="100%" height="100%" fill="{hexadecimal(PAPER)}"/>',
+        f'<text x="{_MARGIN:g}" y="{_MARGIN:g}" font-size="{_TITLE}" fill="{hexadecimal(_WORDS)}">'
+        f"{plain(drawing.heading)}</text>",
+        f'<text x="{_MARGIN:g}" y="{_MARGIN + 20:g}" fill="{hexadecimal(_PALE)}">{plain(drawing.legend)}</text>',
+        f'<g fill="none" stroke="{hexadecimal(_ARROW)}" stroke-linecap="round">',
     ]
     for arrow in drawing.arrows:
         (a, b), (c, d), (e, f) = arrow.curve
         head = " ".join(f"{x:.1f},{y:.1f}" for x, y in arrow.head)
         text.append(
-            f'<g opacity="{arrow.opacity:.2f}"><title>{_plain(arrow.title)}</title>'
+            f'<g opacity="{arrow.opacity:.2f}"><title>{plain(arrow.title)}</title>'
             f'<path d="M{a:.1f} {b:.1f}Q{c:.1f} {d:.1f} {e:.1f} {f:.1f}" stroke-width="{arrow.width:.2f}"/>'
-            f'<polygon points="{head}" fill="{_hex(_ARROW)}" stroke="none"/></g>'
+            f'<polygon points="{head}" fill="{hexadecimal(_ARROW)}" stroke="none"/></g>'
         )
     text.append("</g>")
     for circle in drawing.circles:
         (x, y), ring = circle.at, _ring(circle)
         text.append(
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{circle.radius - 0.5 * ring:.2f}" fill="{_hex(_NODE)}"'
-            f' stroke="{_hex(_STAY)}" stroke-width="{ring:.2f}"><title>{_plain(circle.title)}</title></circle>'
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{circle.radius - 0.5 * ring:.2f}" fill="{hexadecimal(_NODE)}"'
+            f' stroke="{hexadecimal(_STAY)}" stroke-width="{ring:.2f}"><title>{plain(circle.title)}</title></circle>'
         )
-    text.append(f'<g fill="{_hex(_WORDS)}" stroke="{_hex(PAPER)}" stroke-width="3" paint-order="stroke">')
+    text.append(f'<g fill="{hexadecimal(_WORDS)}" stroke="{hexadecimal(PAPER)}" stroke-width="3" paint-order="stroke">')
     for circle in drawing.circles:
         if circle.words_at:
             x, y = circle.words_at
-            text.append(f'<text x="{x:.1f}" y="{y:.1f}" dy=".35em" pointer-events="none">{_plain(circle.name)}</text>')
+            text.append(f'<text x="{x:.1f}" y="{y:.1f}" dy=".35em" pointer-events="none">{plain(circle.name)}</text>')
     return "\n".join([*text, "</g>", "</svg>"]) + "\n"
 
 
@@ -174,7 +170,7 @@ def png(drawing: Drawing) -> bytes:
     image = Image.new("RGB", (k * drawing.width, k * drawing.height), PAPER)
     pen = ImageDraw.Draw(image)
     for arrow in drawing.arrows:
-        ink = _mixed(_ARROW, arrow.opacity)
+        ink = mixed(_ARROW, arrow.opacity)
         pen.line([(k * x, k * y) for x, y in _along(arrow.curve)], ink, max(1, round(k * arrow.width)), joint="curve")
         pen.polygon([(k * x, k * y) for x, y in arrow.head], ink)
     for circle in drawing.circles:
@@ -185,7 +181,7 @@ def png(drawing: Drawing) -> bytes:
     words.append((drawing.heading, (_MARGIN, _MARGIN - 0.35 * _TITLE), _TITLE, _WORDS))
     words.append((drawing.legend, (_MARGIN, _MARGIN + 20 - 0.35 * _LETTERS), _LETTERS, _PALE))
     for name, (x, y), letters, ink in words:
-        pen.text((k * x, k * y), name, ink, _font(k * letters), anchor="lm", stroke_width=2 * k, stroke_fill=PAPER)
+        pen.text((k * x, k * y), name, ink, font(k * letters), anchor="lm", stroke_width=2 * k, stroke_fill=PAPER)
     data = BytesIO()
     image.resize((drawing.width, drawing.height), Image.Resampling.BOX).save(data, "PNG", optimize=True)
     return data.getvalue()
@@ -393,26 +389,4 @@ def _point(at: Any) -> Point:
 
 def _long(name: str) -> float:
     """About how many pixels a name takes."""
-    return _LETTER * _LETTERS * len(name)
-
-
-def _mixed(ink: Colour, opacity: float) -> Colour:
-    """The ink as it looks on paper."""
-    r, g, b = (round(opacity * i + (1.0 - opacity) * p) for i, p in zip(ink, PAPER, strict=True))
-    return r, g, b
-
-
-def _hex(rgb: Sequence[int]) -> str:
-    return "#" + "".join(f"{value:02x}" for value in rgb)
-
-
-def _plain(text: str) -> str:
-    """Text in XML, which has no way to write control characters."""
-    return escape(re.sub(r"[\x00-\x09\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]", " ", text))
-
-
-@cache
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    from PIL import ImageFont
-
-    return ImageFont.load_default(size)
+    return LETTER * _LETTERS * len(name)

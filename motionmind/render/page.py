@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import html
 from base64 import b64encode
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from itertools import product
@@ -37,12 +38,26 @@ _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 def page(motion: Motion, first: int = 0) -> str:
     """The page that plays `motion`, on any skeleton; `first` is its first frame's number in what it is a part of."""
+    return _filled(motion, _data(motion, first), "main")
+
+
+def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
+    """The page that plays `motion` beside something else: `beside.html`, `.css` and `.js` in a folder of `player/`, a
+    module that finds `data` as `beside` among the page's own."""
+    style, beside = (_text(f"{folder}/beside.{suffix}") for suffix in ("css", "html"))
+    return _filled(motion, {**_data(motion, 0), "beside": data}, f"{folder}/beside", style, beside)
+
+
+def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
+    """The page with all that is in it."""
     return Template(_text("page.html")).substitute(
         title=html.escape(motion.name or motion.skeleton.name),
-        style=_text("player.css"),
-        modules=_modules(),
+        style=_text("player.css") + style,
+        beside=beside,
+        modules=_modules(start),
         # numpy's numbers are floats; within a script element nothing but "<" can end it.
-        data=msgspec.json.encode(_data(motion, first), enc_hook=float).decode().replace("<", "\\u003c"),
+        data=msgspec.json.encode(data, enc_hook=float).decode().replace("<", "\\u003c"),
+        start=start,
     )
 
 
@@ -52,12 +67,13 @@ def write_page(path: FilePath, motion: Motion, first: int = 0) -> None:
 
 
 @cache
-def _modules() -> str:
-    """The import map."""
+def _modules(start: str) -> str:
+    """The import map, with the module that a page starts by."""
     sources = {f"motionmind/{file.stem}": file.read_bytes() for file in sorted(_PLAYER.glob("*.js"))}
+    sources[f"motionmind/{start}"] = (_PLAYER / f"{start}.js").read_bytes()
     for name, file in _THREE.items():
         sources[name] = (_PLAYER / "three" / file).read_bytes().replace(_CORE, b'from"three/core"')
-    urls = {name: f"data:text/javascript;charset=utf-8;base64,{_base64(source)}" for name, source in sources.items()}
+    urls = {name: f"data:text/javascript;charset=utf-8;base64,{base64_of(source)}" for name, source in sources.items()}
     return msgspec.json.encode({"imports": urls}).decode()
 
 
@@ -72,9 +88,9 @@ def _data(motion: Motion, first: int) -> dict[str, Any]:
         "skeleton": {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist()},
         "body": _body_data(body),
         "colours": {"given": COLOURS, "inserted": INSERTED, "bridged": BRIDGED, "ink": INK},
-        "times": _base64(motion.times.astype("<f8").tobytes()),
-        "root": _base64(motion.root.astype("<f4").tobytes()),
-        "rotations": _base64(packed(motion.rotations).tobytes()),
+        "times": base64_of(motion.times.astype("<f8").tobytes()),
+        "root": base64_of(motion.root.astype("<f4").tobytes()),
+        "rotations": base64_of(packed(motion.rotations).tobytes()),
         "insertions": [
             {
                 "times": one.times.tolist(),
@@ -129,5 +145,6 @@ def _text(name: str) -> str:
     return (_PLAYER / name).read_text(encoding="utf-8")
 
 
-def _base64(data: bytes) -> str:
+def base64_of(data: bytes) -> str:
+    """Bytes as a page holds them."""
     return b64encode(data).decode("ascii")

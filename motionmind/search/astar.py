@@ -4,8 +4,8 @@ A node fixes the variables up to one; its *frontier* is the last position chosen
 rest depends on, so nodes with the same variable and frontier are the same node. f grows by `strips.step`.
 
 When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
-backed up into it; it is opened again with that f, so nothing is lost from the proof. Leaves are forgotten by halves
-or so, not one by one, which keeps the cost of forgetting constant per node.
+backed up into it; it is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
+forgotten at a time, which keeps the cost of forgetting that of a few operations on the open list for each node.
 
 Sources: Standley, "Finding optimal solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition);
 Russell, "Efficient memory-bounded search methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified
@@ -25,6 +25,7 @@ from motionmind.search.strips import Strips, step
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
+KEPT = 0.75  # of the memory, when it is full and the rest is forgotten; more costs time, and less what is made again
 
 _FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what is tallied
 
@@ -149,10 +150,10 @@ def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
 def nodes_in(memory: int, lanes: int) -> int:
     """How many nodes `memory` bytes hold at least, with what finds them and what forgetting takes for a while.
 
-    A node has 44 bytes and 2 a lane, less than 8 in the buckets, whose number is a power of two, and 13 while leaves
-    are forgotten.
+    A node has 44 bytes and 2 a lane, less than 8 in the buckets, whose number is a power of two, and 1 that says
+    whether it is kept while others are forgotten.
     """
-    return memory // (44 + 2 * lanes + 8 + 13)
+    return memory // (44 + 2 * lanes + 8 + 1)
 
 
 @jit
@@ -167,29 +168,62 @@ def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
 
 @jit
 def _forget(nodes: _Nodes, current: int) -> bool:
-    """Forget the leaves that are worse than the mean (of equals half), their keys backed up; whether there were any."""
-    leaves = np.empty(nodes.tally[_HEAPED], np.int32)
-    count = 0
-    for k in range(nodes.tally[_HEAPED]):
+    """Forget all but the best open nodes and the ways to them, as many as fit into KEPT; whether there was anything.
+
+    Leaves go first, and their keys are backed up. `current`, which is being expanded, is kept, and the way to it.
+    """
+    kept = np.zeros(len(nodes.var), np.bool_)
+    size, many = nodes.tally[_HEAPED], _mark(nodes, kept, current)
+    while nodes.tally[_HEAPED] > 0:
+        node = nodes.heap[0]
+        if many + _unmarked(nodes, kept, node) > KEPT * len(kept):
+            break
+        _close(nodes, node)
+        last = nodes.tally[_HEAPED]
+        nodes.heap[last], nodes.slot[node] = node, last  # behind the heap, where there is room now
+        many += _mark(nodes, kept, node)
+    others = bool(nodes.tally[_NODES] > many)
+    nodes.tally[_HEAPED] = 0
+    for k in range(size):
         node = nodes.heap[k]
-        if nodes.children[node] == 0 and nodes.parent[node] >= 0 and node != current:
-            leaves[count] = node
-            count += 1
-    middle = np.mean(nodes.key[leaves[:count]])
-    alike = np.all(nodes.key[leaves[:count]] <= middle)
-    for k in range(count):
-        node = leaves[k]
-        if nodes.key[node] <= middle and not (alike and k >= count // 2):
-            continue
-        parent = nodes.parent[node]
-        closed = nodes.slot[parent] < 0
-        nodes.key[parent] = nodes.key[node] if closed else min(nodes.key[parent], nodes.key[node])
-        _forsake(nodes, node)
-        if closed:
-            _open(nodes, parent)
-        else:
-            _rise(nodes, nodes.slot[parent])
-    return count > 0
+        if nodes.slot[node] < 0:
+            continue  # forgotten after its last child
+        listed = kept[node]
+        while not kept[node] and nodes.children[node] == 0:
+            parent = nodes.parent[node]
+            listed = nodes.slot[parent] < 0
+            nodes.key[parent] = nodes.key[node] if listed else min(nodes.key[parent], nodes.key[node])
+            nodes.slot[parent] = max(nodes.slot[parent], 0)
+            nodes.slot[node] = -1
+            _drop(nodes, node)
+            node = parent
+        if listed and kept[node]:
+            nodes.heap[nodes.tally[_HEAPED]], nodes.slot[node] = node, nodes.tally[_HEAPED]
+            nodes.tally[_HEAPED] += 1
+    for k in range(nodes.tally[_HEAPED] // 2 - 1, -1, -1):
+        _sink(nodes, k)
+    return others
+
+
+@jit
+def _unmarked(nodes: _Nodes, kept: NDArray[np.bool_], node: int) -> int:
+    """How many of a node and its ancestors are not marked."""
+    count = 0
+    while node >= 0 and not kept[node]:
+        count += 1
+        node = nodes.parent[node]
+    return count
+
+
+@jit
+def _mark(nodes: _Nodes, kept: NDArray[np.bool_], node: int) -> int:
+    """Mark a node and its ancestors as kept; how many were not yet."""
+    count = 0
+    while node >= 0 and not kept[node]:
+        kept[node] = True
+        count += 1
+        node = nodes.parent[node]
+    return count
 
 
 @jit

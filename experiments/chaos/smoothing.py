@@ -1,0 +1,129 @@
+"""How many transitions of chaotic variations are abrupt, and how many of these the engine smooths, by which movement.
+
+python experiments/chaos/smoothing.py --csv experiments/chaos/smoothing.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from dataclasses import replace
+from itertools import pairwise, product
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from motionmind import Engine, Piece, Variation, flow_of, own_skeleton, read_motion, vary
+from motionmind.chaos.baselines import chunk_shuffled
+from motionmind.chaos.reorder import runs
+from motionmind.variation.seams import judge
+
+PIECES = (("ballet", "jump"), ("macarena", "macarena"), ("karate", "heian-shodan"), ("medley", "medley"))
+FLOWS = ("lorenz", "rossler")
+NUDGES = (0.1, 0.3, 1.0)  # a variation each
+RULES = {"posturewise": {"posturewise": True}, "strict": {"strict": True}, "bridged": {}}
+SHUFFLES, SEED = 10, 0
+RATE = 5.0  # postures a second of recordings
+LEAST = 200  # postures of a variation, or as many as the piece has if it has more
+
+
+def piece_of(engine: Engine, clip: str) -> Piece:
+    """A clip of a corpus; its postures may face anywhere where the corpus's may."""
+    found = next(one for one in engine.corpus.clips if one.name == clip)
+    return Piece.of(engine.corpus.motion(found), facing=engine.corpus.facing)
+
+
+def measure(variations: list[Variation]) -> dict[str, object]:
+    """Abrupt transitions before and after in 100 moves, the share that was solved, and what by."""
+    seams = [seam for variation in variations for seam in variation.seams]
+    joins = [seam.join for seam in seams if seam.join and seam.join.is_abrupt]
+    found = [seam.insertion for seam in seams if seam.insertion]
+    moves = sum(len(variation.postures) - 1 for variation in variations)
+    after = moves + sum(way.moves - 1 for way in found)
+    lengths = np.array([way.moves for way in found] or [0])
+    return {
+        "moves": moves,
+        "seams": len(seams),
+        "abrupt": len(joins),
+        "of_seams": round(len(joins) / max(1, len(seams)), 3),
+        "per_100": round(100 * len(joins) / moves, 1),
+        "solved": len(found),
+        "share": round(len(found) / max(1, len(joins)), 3),
+        "after_per_100": round(100 * (len(joins) - len(found)) / after, 1),
+        "least": int(lengths.min()),
+        "median": float(np.median(lengths)),
+        "most": int(lengths.max()),
+        "bridged": sum(bool(way.bridges) for way in found),
+        "bridges": sum(len(way.bridges) for way in found),
+        "joint_moves": sum(way.moves * way.path.shape[1] for way in found),
+        "proven": sum(way.status == "optimal" for way in found),
+    }
+
+
+def shuffled(variations: list[Variation], engine: Engine) -> float | None:
+    """Share of the seams that are abrupt where the piece is shuffled in chunks as long as each variation's own runs.
+
+    None where the variations do not leave the piece within as many postures as it has.
+    """
+    rng, found = np.random.default_rng(SEED), []
+    for variation in variations:
+        lengths = runs(variation.postures[: len(variation.piece)])
+        for order in (chunk_shuffled(lengths, rng) for _ in range(SHUFFLES)):
+            pairs = [(int(i), int(k)) for i, k in pairwise(order) if k != i + 1]
+            found += [join.is_abrupt for join in judge(variation.piece, pairs, engine, posturewise=False)]
+    return round(float(np.mean(found)), 3) if found else None
+
+
+def recorded(folder: Path) -> tuple[Engine, list[Piece]]:
+    """What was learned from a folder of recordings, and each of them as a piece."""
+    clips = [replace(own_skeleton(read_motion(path)), name=path.stem) for path in sorted(folder.glob("*.bvh"))]
+    clips = [clip.slice(1, len(clip)) for clip in clips]  # without the added T-pose
+    return Engine.fit(clips, name=folder.name, rate=RATE), [Piece.of(clip, RATE) for clip in clips]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--csv", type=Path, required=True, help="where the figures go")
+    parser.add_argument("--recorded", type=Path, help="a folder of BVH files, smoothed by what was learned from them")
+    arguments = parser.parse_args()
+    engines = {name: Engine.load(name) for name, _ in PIECES}
+    asked = [
+        (clip, [piece_of(engines[corpus], clip)], engines[by], NUDGES)
+        for corpus, clip in PIECES
+        for by in dict.fromkeys((corpus, "ballet"))
+    ]
+    if arguments.recorded:
+        engine, pieces = recorded(arguments.recorded)
+        asked.append((f"{len(pieces)} recordings", pieces, engine, NUDGES[:1]))
+    rows = []
+    for name, pieces, engine, nudges in asked:
+        for flow, (rule, options) in product(FLOWS, RULES.items()):
+            began = perf_counter()
+            variations = [
+                vary(
+                    piece,
+                    engine,
+                    flow=flow_of(flow),
+                    nudge=nudge,
+                    length=max(LEAST, len(piece)),
+                    alternatives=1,
+                    **options,
+                )
+                for piece in pieces
+                for nudge in nudges
+            ]
+            row = {"piece": name, "flow": flow, "by": engine.corpus.name, "rule": rule, **measure(variations)}
+            if rule == "strict":
+                row["shuffled"] = shuffled(variations, engine)
+            rows.append(row | {"seconds": round(perf_counter() - began, 1)})
+            print(rows[-1], flush=True)
+    with arguments.csv.open("w", newline="") as file:
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        table = csv.DictWriter(file, names, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

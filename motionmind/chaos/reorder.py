@@ -1,0 +1,133 @@
+"""A piece wrapped around an attractor, and reordered along another trajectory.
+
+The piece's N postures are dealt out along a trajectory, one to each point: its *sites*. Another trajectory is read
+through the sites' Voronoi cells: at each of its points the posture of the nearest site comes. The same trajectory gives
+the piece back; one that begins nearby stays with the piece until the two part, as fast as the flow's largest Lyapunov
+exponent says, and then passes from stretch to stretch of it.
+
+Source: Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800 (1998).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motionmind.chaos.flows import Flow
+from motionmind.chaos.trajectories import trajectory
+from motionmind.errors import MotionMindError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_FAR = 1e150  # beyond it squares of distances overflow
+_ROUNDING = 1e-12  # by how much two distances may differ, as a part of them, where the nearer one is looked for exactly
+
+
+@dataclass(frozen=True, eq=False)
+class Itinerary:
+    """A reordering, and the trajectories that it comes from.
+
+    Attributes:
+        sites: where the piece's postures lie [N, d].
+        points: the other trajectory [L, d].
+        indices: the posture of the piece that comes at each point [L].
+    """
+
+    sites: Floats
+    points: Floats
+    indices: Ints
+
+
+def itinerary(
+    flow: Flow,
+    count: int,
+    length: int | None = None,
+    *,
+    nudge: ArrayLike = 0.0,
+    start: ArrayLike | None = None,
+    every: int = 11,
+    step: float | None = None,
+    transient: int | None = None,
+) -> Itinerary:
+    """A reordering of `count` postures, `length` postures long, as many as the piece where None.
+
+    The nudge is added once the transient is over, to where the piece's own trajectory begins: so the variation begins
+    at the piece's first postures and leaves them gradually, the later the smaller the nudge. Added before the
+    transient, any nudge at all would be any other trajectory on the attractor: for that, call `trajectory` with
+    another start, and `reorder`.
+
+    Args:
+        flow: what to follow.
+        count: postures of the piece, N.
+        length: postures of the variation, L.
+        nudge: added to the first point, in the flow's own coordinates [d]; a number is added to the first of them.
+        start: see `trajectory`, as are `every`, `step` and `transient`.
+
+    Raises:
+        MotionMindError: an argument is out of range, or a trajectory diverges or settles.
+    """
+    sites = trajectory(flow, start, count=count, every=every, step=step, transient=transient)
+    try:
+        nudge = np.asarray(nudge, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MotionMindError(f"a nudge is a number or one for each coordinate, not {nudge!r}") from None
+    offset = nudge * np.eye(1, sites.shape[1])[0] if nudge.ndim == 0 else nudge
+    if offset.shape != sites[0].shape or not np.isfinite(offset).all():
+        raise MotionMindError(f"a nudge in {flow.name} is a finite number or {sites.shape[1]} of them, not {nudge}")
+    length = count if length is None else length
+    try:
+        points = trajectory(flow, sites[0] + offset, count=length, every=every, step=step, transient=0)
+    except MotionMindError as error:
+        raise MotionMindError(f"nudged by {', '.join(f'{x:g}' for x in offset)}: {error}") from error
+    return Itinerary(sites, points, reorder(sites, points))
+
+
+def reorder(sites: Floats, points: Floats) -> Ints:
+    """Index [L] of the site [N, d] nearest to each point [L, d]; of equally near ones the lowest.
+
+    Raises:
+        MotionMindError: there is no site, or points and sites are no finite numbers of the same dimension.
+    """
+    sites, points = checked(sites, points)
+    from scipy.spatial import cKDTree
+
+    # Of sites that coincide the first stands for all; where the first coordinates differ, no sites do.
+    labels = np.arange(len(sites))
+    if len(np.unique(sites[:, 0])) < len(sites):
+        labels = np.sort(np.unique(sites, axis=0, return_index=True)[1])
+    tree = cKDTree(sites[labels], balanced_tree=False, compact_nodes=False)
+    if len(labels) == 1:
+        return np.full(len(points), labels[0], dtype=np.int64)
+    # Points that are near each other ask for the same part of the tree: one after another they take half the time.
+    order = cKDTree(points, leafsize=64, balanced_tree=False, compact_nodes=False).indices
+    distances, found = tree.query(points[order], k=2)
+    indices = np.empty(len(points), dtype=np.int64)
+    indices[order] = labels[found[:, 0]]
+    tied = distances[:, 1] <= distances[:, 0] * (1.0 + _ROUNDING)
+    for n, reach in zip(order[tied], distances[tied, 1], strict=True):
+        near = np.sort(labels[tree.query_ball_point(points[n], reach * (1.0 + _ROUNDING))])
+        indices[n] = near[np.argmin(np.sum((sites[near] - points[n]) ** 2, axis=1))]
+    return indices
+
+
+def checked(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Sites [N, d] and points [L, d] that can be compared: finite numbers, one site at least; else MotionMindError."""
+    sites, points = np.asarray(sites, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    if sites.ndim != 2 or points.ndim != 2 or sites.shape[1] != points.shape[1] or sites.size == 0:
+        raise MotionMindError(
+            f"points of shape {list(points.shape)} cannot be told by sites of shape {list(sites.shape)}: "
+            "that takes sites [N, d], one at least, and points [L, d]"
+        )
+    if not (np.abs(sites) < _FAR).all() or not (np.abs(points) < _FAR).all():
+        raise MotionMindError(f"sites and points must be finite numbers below {_FAR:g}")
+    return sites, points
+
+
+def runs(indices: Ints) -> Ints:
+    """Lengths [R] of the stretches in which the piece's order survives: i, i + 1, i + 2 and so on; they add up to L."""
+    indices = np.asarray(indices)
+    broken = np.flatnonzero(np.diff(indices) != 1) + 1
+    return np.diff(np.concatenate([[0], broken, [len(indices)]]) if len(indices) else np.zeros(1, dtype=np.int64))

@@ -1,0 +1,218 @@
+"""What measures MotionMind: that runs are the same again, go on where they were left, and say what they found."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+pytestmark = pytest.mark.usefixtures("_importable")
+
+
+@pytest.fixture
+def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT))
+
+
+class Here(Executor):
+    """Does what it is given at once, in this process; after so many jobs it breaks down."""
+
+    def __init__(self, jobs: int = 1000) -> None:
+        self.left, self.done = jobs, 0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        if self.done == self.left:
+            future.set_exception(RuntimeError("broken off"))
+        else:
+            self.done += 1
+            future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def test_every_folder_is_listed_with_its_question_and_command() -> None:
+    listed = subprocess.run(
+        [sys.executable, "-m", "experiments"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    folders = [path.name for path in (ROOT / "experiments").iterdir() if path.is_dir() and path.name != "__pycache__"]
+    for folder in folders:
+        readme = (ROOT / "experiments" / folder / "README.md").read_text()
+        assert f"{folder:16}{readme.splitlines()[0].lstrip('# ')}" in listed
+        assert f"python -m experiments {folder}\n" in listed or f"python experiments/{folder}/" in listed
+
+
+@pytest.mark.parametrize("name", ["cliche", "turing"])
+def test_a_run_writes_its_table_plot_and_section_and_is_the_same_again(name: str, tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    rows = answer(name, Setting(quick=True, data=None), Here(), tmp_path / "once")
+    with (tmp_path / "once" / "found.csv").open() as file:
+        read = list(csv.DictReader(file))
+    assert [list(row.values()) for row in read] == [[str(value) for value in row.values()] for row in rows]
+    assert ElementTree.parse(tmp_path / "once" / "found.svg").getroot().tag.endswith("svg")
+    answer(name, Setting(quick=True, data=None), Here(), tmp_path / "again")
+    for file in ("found.csv", "found.svg", "README.md"):
+        assert (tmp_path / "once" / file).read_bytes() == (tmp_path / "again" / file).read_bytes()
+    assert not list(tmp_path.glob("*/unfinished.jsonl"))
+
+
+def test_a_run_that_was_broken_off_goes_on_where_it_was(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    setting = Setting(quick=True, data=None)
+    whole = Here()
+    answer("turing", setting, whole, tmp_path / "whole")
+    with pytest.raises(RuntimeError, match="broken off"):
+        answer("turing", setting, Here(4), tmp_path / "broken")
+    kept = (tmp_path / "broken" / "unfinished.jsonl").read_text()
+    (tmp_path / "broken" / "unfinished.jsonl").write_text(kept[:-20])  # the last line was not written to its end
+    rest = Here()
+    answer("turing", setting, rest, tmp_path / "broken")
+    assert rest.done == whole.done - len(kept.strip().splitlines()) + 1
+    for file in ("found.csv", "found.svg", "README.md"):
+        assert (tmp_path / "broken" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+
+
+def test_what_people_wrote_around_what_was_found_stays(tmp_path: Path) -> None:
+    from experiments.harness import BEGIN, END, Setting, answer
+
+    (tmp_path / "README.md").write_text(f"# Mine\n\nBefore.\n\n{BEGIN}\nwhat was there\n{END}\n\nAfter.\n")
+    answer("turing", Setting(quick=True, data=None), Here(), tmp_path)
+    text = (tmp_path / "README.md").read_text()
+    assert text.startswith(f"# Mine\n\nBefore.\n\n{BEGIN}\n")
+    assert text.endswith(f"{END}\n\nAfter.\n")
+    assert "what was there" not in text
+    assert "Simulated raters" in text
+
+
+def test_a_name_that_is_no_question_is_refused() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", "weather"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "no question 'weather'" in done.stderr
+
+
+# --- what bodies cannot do, and what is awkward -----------------------------------------------------------------------
+
+
+def standing(**turns: tuple[str, float]) -> tuple[Any, Any, Any]:
+    """A body that stands, ten times, with some joints turned about an axis by degrees; its rotations and root."""
+    from motionmind import human23
+    from motionmind import rotations as rot
+
+    body = human23()
+    rotations = np.tile(rot.IDENTITY, (10, len(body), 1))
+    for joint, (axis, degrees) in turns.items():
+        rotations[:, body.index(joint)] = rot.from_axis_angle(np.eye(3)["xyz".index(axis)], np.radians(degrees))
+    ground = -body.positions_and_tips(rotations[0], np.zeros(3))[:, 1].min()
+    return body, rotations, np.tile([0.0, ground, 0.0], (10, 1))
+
+
+def test_parts_that_reach_into_each_other_collide() -> None:
+    from experiments.net.run import collides
+
+    for turns, expected in (
+        ({}, (False, False)),
+        ({"left_hip": ("z", -12.0), "right_hip": ("z", 12.0)}, (True, False)),  # legs crossed into each other
+        ({"left_shoulder": ("z", -95.0)}, (False, True)),  # an arm through the hip
+        ({"left_shoulder": ("z", -60.0), "left_knee": ("x", 60.0)}, (False, False)),
+    ):
+        assert tuple(found.any() for found in collides(*standing(**turns))) == expected, turns
+
+
+def test_a_body_that_leans_is_off_balance() -> None:
+    from experiments.net.run import off_balance
+
+    assert off_balance(*standing()) == 0.0
+    leaning = [off_balance(*standing(left_ankle=("x", -a), right_ankle=("x", -a), pelvis=("x", a))) for a in (20, 40)]
+    assert 5.0 < leaning[0] < leaning[1]
+
+
+def test_a_move_is_awkward_that_is_faster_and_rougher_than_the_corpus() -> None:
+    from dataclasses import replace
+
+    from experiments.panel.run import awkward, material, usual
+    from motionmind.metrics.measure import at_rate
+
+    engine, _ = material(None, "adagio alone")
+    own = usual(engine)
+    assert 0.0 < own.awkward < 50.0
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    moves = clip.times
+    counts = [
+        awkward(at_rate(replace(clip, times=moves / pace)), moves / pace, own.speed, own.jerk).sum()
+        for pace in (0.5, 1.0, 2.0, 4.0)
+    ]
+    assert counts[0] == 0
+    assert counts == sorted(counts)
+    assert counts[-1] > 30
+
+
+# --- the Turing test --------------------------------------------------------------------------------------------------
+
+
+def test_ratings_are_weighed_as_textbooks_do() -> None:
+    from scipy import stats
+
+    from experiments.turing.analyse import judged
+
+    rng = np.random.default_rng(0)
+    made = np.arange(20) % 2 == 1
+    ratings = rng.integers(1, 6, size=(12, 20)).astype(float)
+    ratings[:, ~made] += 0.5
+    found = judged(ratings, made)
+    paired = stats.ttest_rel(ratings[:, ~made].mean(axis=1), ratings[:, made].mean(axis=1))
+    assert found.f1 == pytest.approx(paired.statistic**2)
+    films = stats.f_oneway(ratings[:, ~made].mean(axis=0), ratings[:, made].mean(axis=0))
+    assert found.f2 == pytest.approx(films.statistic)
+    assert found.min_f == pytest.approx(1.0 / (1.0 / found.f1 + 1.0 / found.f2))
+    assert found.p > max(paired.pvalue, films.pvalue)
+    assert found.difference - found.half == pytest.approx(paired.confidence_interval(0.95).low)
+    assert judged(ratings + 1.0, made).p == pytest.approx(found.p)
+    assert judged(ratings, ~made).difference == pytest.approx(-found.difference)
+
+
+def test_simulated_raters_who_see_no_difference_are_seldom_told_to() -> None:
+    from experiments.turing.run import work
+
+    (none,) = work(raters=10, difference=0.0, tests=300, seed=1)
+    (much,) = work(raters=40, difference=1.0, tests=50, seed=1)
+    assert none["told"] <= 0.08
+    assert much["told"] > 0.9
+    assert much["seen"] == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_box_holds_films_that_say_nothing_and_answers_that_can_be_read(tmp_path: Path) -> None:
+    from experiments.turing.analyse import read
+    from experiments.turing.box import SCALES, fill
+
+    fill(tmp_path, None, "karate", 2, 0)
+    key = json.loads((tmp_path / "key.json").read_text())
+    assert sorted(one["kind"] for one in key.values()) == ["danced", "made"]
+    page = (tmp_path / "index.html").read_text()
+    for film in key:
+        assert (tmp_path / f"{film}.gif").stat().st_size > 1000
+        assert film in page
+    assert not any(word in page for word in ('danced"', 'made"', "karate", "http"))
+    answers = []
+    for rater in "ab":
+        answers.append(tmp_path / f"answers-{rater}.json")
+        given = {film: dict.fromkeys(SCALES, 3) for film in key}
+        answers[-1].write_text(json.dumps({"rater": rater, "order": list(key), "answers": given}))
+    ratings, made = read(tmp_path / "key.json", answers)
+    assert list(ratings) == list(SCALES)
+    assert made.sum() == 1
+    with pytest.raises(SystemExit, match="two raters"):
+        read(tmp_path / "key.json", answers[:1] * 2)
