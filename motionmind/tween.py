@@ -132,7 +132,7 @@ class Tween:
     @property
     def gap(self) -> float:
         """(cost - lower bound) / cost: 0 is proven optimal."""
-        return 0.0 if self.cost <= self.lower_bound else (self.cost - self.lower_bound) / abs(self.cost)
+        return gap_of(self.cost, self.lower_bound)
 
     def report(self) -> dict[str, Any]:
         """All but the movement itself, as plain values for JSON.
@@ -189,6 +189,11 @@ class Tween:
         posed = self.posed
         vias = [Via(via.states, move) for via, move in zip(posed.vias, self.passed, strict=True)]
         return cfn(posed.model, posed.start, posed.goal, posed.rules, self.moves, self.joints, vias)
+
+
+def gap_of(cost: float, lower_bound: float) -> float:
+    """How much of a cost in nats is not proven to be needed, as a share of it: 0 where the bound meets it."""
+    return 0.0 if cost <= lower_bound else (cost - lower_bound) / abs(cost)
 
 
 def explain(

@@ -620,6 +620,13 @@ def test_bad_input_is_one_line(run: Run, tmp_path: Path, arguments: tuple[str, .
     assert not (tmp_path / "out.json").exists()
 
 
+@pytest.mark.parametrize("command", ["sheet", "render"])
+def test_pictures_too_refuse_what_is_for_files(run: Run, command: str) -> None:
+    done = run(command, "macarena", "--unit", "cm", "-o", "out.png")
+    assert done.code == 2
+    assert "macarena: --unit is for a file of movement, which this is not" in done.err
+
+
 def test_the_exponent_is_reported_and_says_how_fast_trajectories_part(kata: Piece) -> None:
     found = vary(kata, flow=flow_of("lorenz", rho=45.92), skip=4, step=0.005)
     assert found.course.exponent == pytest.approx(2.16 * np.log(2.0), rel=0.03)  # Wolf et al., Physica D 16:285 (1985)

@@ -14,7 +14,7 @@ from motionmind.cli.commands import app
 from motionmind.cli.files import all_or_none, check_outputs
 from motionmind.cli.options import ANY, COUNT, FILE, HOME, RATE, example, reading
 from motionmind.cli.printing import count
-from motionmind.cli.sources import clips_in, frames_of, holds_clips, movement
+from motionmind.cli.sources import frames_of, holds_clips, movements
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
@@ -78,9 +78,7 @@ def sheet(
     folder = output if many and (output.is_dir() or not output.suffix) else None
     if not folder:
         check_outputs([(output, (".png",))], [source])
-    if names and not many:
-        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    motions = clips_in(source, names, home) if many else [movement(source, **as_given)]
+    motions = movements(source, names, home, **as_given)
     if not folder and len(motions) != 1:
         raise MotionMindError(f"{output}: {source} holds {len(motions)} clips; choose one by --clip, or give a folder")
     frames = [
@@ -131,10 +129,7 @@ def render(
 
     seen = {key: options.pop(key) for key in ("fps", "view", "size")}
     check_outputs([(output, PICTURES)], [source])
-    many = holds_clips(source, home)
-    if name and not many:
-        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    found = clips_in(source, (name,) if name else (), home) if many else [movement(source, **options)]
+    found = movements(source, (name,) if name else (), home, **options)
     if len(found) != 1:
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
     motion, frames = found[0], frames_of(source, len(found[0]), start, end)

@@ -32,14 +32,26 @@ def in_corpus(source: Path, home: Path | None) -> tuple[str, str | None]:
     return str(source), None
 
 
-def movement(path: Path, joints: Path | None, **source: Any) -> Motion:
+def movements(source: Path, wanted: Sequence[str], home: Path | None, **given: Any) -> list[Motion]:
+    """The movement of a file, as the options of `reading` say; or the clips of a score or of a corpus, those that are
+    wanted or all of them, to which these options say nothing."""
+    many = holds_clips(source, home)
+    if wanted and not many:
+        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
+    for name, value in given.items():
+        if many and value is not None:
+            raise MotionMindError(f"{source}: --{name.replace('_', '-')} is for a file of movement, which this is not")
+    return _clips(source, wanted, home) if many else [_movement(source, **given)]
+
+
+def _movement(path: Path, joints: Path | None, **source: Any) -> Motion:
     """The movement in a file, on human23 where its joints map there, as the options of `reading` say."""
     from motionmind.learned import own_skeleton
 
     return own_skeleton(read(path, **source), read_mapping(joints))
 
 
-def clips_in(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motion]:
+def _clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motion]:
     """The clips of a score or of a corpus, those that are wanted or all of them."""
     if source.suffix.lower() == ".score":
         from motionmind.notation.compose import motions

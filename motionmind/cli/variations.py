@@ -31,7 +31,7 @@ from motionmind.cli.options import (
     settings,
 )
 from motionmind.cli.printing import Interruption, note, print_review, progress, stillness
-from motionmind.cli.sources import clips_in, frames_of, holds_clips, in_corpus, movement
+from motionmind.cli.sources import frames_of, holds_clips, in_corpus, movements
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
@@ -322,16 +322,12 @@ def _given(context: click.Context, names: Collection[str]) -> str | None:
 
 def _piece(source: Path, clip: str | None, home: Path | None, **given: Any) -> tuple[Motion, str | None]:
     """The movement to vary, and the corpus that it is a clip of, if any."""
-    many = holds_clips(source, home)
-    if clip and not many:
-        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
-    for name, value in given.items():
-        if many and value is not None:
-            raise MotionMindError(f"{source}: --{name.replace('_', '-')} is for a file of movement, which this is not")
-    found = clips_in(source, (clip,) if clip else (), home) if many else [movement(source, **given)]
+    found = movements(source, (clip,) if clip else (), home, **given)
     if len(found) != 1:
         raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
-    return found[0], in_corpus(source, home)[0] if many and source.suffix.lower() != ".score" else None
+    return found[0], in_corpus(source, home)[0] if holds_clips(
+        source, home
+    ) and source.suffix.lower() != ".score" else None
 
 
 def _facing(corpus: str, home: Path | None) -> Facing:

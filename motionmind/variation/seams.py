@@ -23,7 +23,7 @@ from motionmind.errors import NoPathError, SkeletonError
 from motionmind.formats.text import meant
 from motionmind.motion import Motion, Posture
 from motionmind.search.solve import Progress, Status, Watch
-from motionmind.tween import Bridge, Tween, Wait
+from motionmind.tween import Bridge, Tween, Wait, gap_of
 from motionmind.variation.arguments import whole
 from motionmind.variation.piece import Piece
 
@@ -97,7 +97,7 @@ class Candidate:
     @property
     def gap(self) -> float:
         """(cost - lower bound) / cost: 0 is proven optimal."""
-        return 0.0 if self.cost <= self.lower_bound else (self.cost - self.lower_bound) / abs(self.cost)
+        return gap_of(self.cost, self.lower_bound)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ Ints = NDArray[np.int64]
 NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewhere than with the first posture
 SKIP = 10
 ALTERNATIVES = 3
-EXPONENT_STEPS = 300_000
+EXPONENT_STEPS = 200_000
 MOST_STEPS = 1_000_000_000  # of a transient, which take some minutes
 LONGEST = 1_000_000  # postures that a variation may have
 
