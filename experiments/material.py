@@ -52,7 +52,8 @@ def part(whole: Corpus, clips: Sequence[int], mirror: bool = False) -> Corpus:
     """A corpus of some of the clips of another, in that order; mirrored ones too where `mirror` says so."""
     return gather(
         whole.name,
-        [whole.motion(whole.clips[number]) for number in clips],
+        [whole.recording(whole.clips[number]) for number in clips],
+        rate=whole.rate,
         facing=whole.facing,
         flips="keep",
         mirror=mirror,
@@ -68,7 +69,7 @@ def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]
         pieces = [whole.motion(clip) for clip in whole.clips]
     else:
         whole = corpus(data, name)
-        pieces = [at_rate(whole.motion(clip)) for clip in whole.clips]
+        pieces = [at_rate(whole.recording(clip)) for clip in whole.clips]
     out: dict[str, list[Motion]] = {}
     for piece in pieces:
         out.setdefault(re.sub(r"\.\d+$", "", piece.name), []).append(piece)

@@ -136,6 +136,7 @@ class Learned:
             "rotations": corpus.rotations,
             "root": corpus.root,
             "times": corpus.times,
+            "detail": corpus.detail,
             "states": self.states,
             "centres": space.centres,
         }
@@ -203,6 +204,7 @@ class Learned:
             rotations=arrays["rotations"],
             root=arrays["root"],
             times=arrays["times"],
+            detail=arrays["detail"],
             faults=manifest.faults,
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
@@ -228,7 +230,7 @@ class Learned:
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
 _PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
 _ARRAYS = (
-    *("rotations", "root", "times", "states", "centres"),
+    *("rotations", "root", "times", "detail", "states", "centres"),
     *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
 )
 

@@ -19,10 +19,10 @@ from motionmind.notation.body_file import body
 from motionmind.realise.limits import within_limits
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
-from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
 from motionmind.realise.ways import ANYWHERE, STRAIGHT_ON, likely, limbs, mean_rotations
 from motionmind.skeleton import Skeleton, human23
+from motionmind.spline import natural_spline, rotation_spline
 
 Array = NDArray[np.float64]
 Z = np.array([0.0, 0.0, 1.0])

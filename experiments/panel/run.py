@@ -118,7 +118,7 @@ class Usual:
 @lru_cache(maxsize=2)
 def usual(found: Engine) -> Usual:
     whole = found.corpus
-    clips = [at_rate(whole.motion(clip)) for clip in whole.clips]
+    clips = [at_rate(whole.recording(clip)) for clip in whole.clips]
     speed = np.percentile(np.concatenate([angular_speed(clip.rotations, FPS) for clip in clips]), RARE, axis=0)
     long = [clip.rotations for clip in clips if len(clip) > 3]
     jerk = np.percentile(np.concatenate([angular_jerk(q, FPS) for q in long]), RARE, axis=0)

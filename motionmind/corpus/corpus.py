@@ -15,6 +15,7 @@ from motionmind import rotations as rot
 from motionmind.errors import CorpusError
 from motionmind.motion import Motion
 from motionmind.skeleton import Skeleton
+from motionmind.spline import natural_spline, rotation_spline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -100,6 +101,8 @@ class Corpus:
         rotations: local rotations of all postures [N, J, 4].
         root: positions of the root joint [N, 3], metres.
         times: seconds in the clip's own recording [N], increasing within a clip.
+        detail: what the postures leave out of the recording [N, K, J, 3]: the rotation vectors, radians, by which it
+            departs from the spline through its clip's postures at K moments even in time between each and the next.
         facing: "stage" where the root's full orientation is its state, "free" where its turn about the vertical is
             taken out of it and is a lane of its own.
         rate: postures a second, None where they are keyframes with their own times.
@@ -116,6 +119,7 @@ class Corpus:
     rotations: Floats
     root: Floats
     times: Floats
+    detail: NDArray[np.float16]
     facing: Facing
     rate: float | None = None
     title: str = ""
@@ -134,6 +138,8 @@ class Corpus:
             (count,),
         ):
             raise CorpusError(f"corpus {self.name!r}: rotations, root and times are not those of {count} postures")
+        if self.detail.shape != (count, self.detail.shape[1], len(self.skeleton), 3):
+            raise CorpusError(f"corpus {self.name!r}: its detail is not that of {count} postures")
         bounds = [(clip.start, clip.stop) for clip in self.clips]
         if [0, *(stop for _, stop in bounds)] != [*(start for start, _ in bounds), count]:
             raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {count}")
@@ -217,9 +223,30 @@ class Corpus:
         return self.clips[int(self._clip_of[posture])]
 
     def motion(self, clip: Clip) -> Motion:
-        """One of the corpus's clips as a motion."""
+        """One of the corpus's clips as a motion: its postures."""
         here = slice(clip.start, clip.stop)
         return Motion(self.skeleton, self.rotations[here], self.root[here], self.times[here], clip.name)
+
+    def recording(self, clip: Clip) -> Motion:
+        """One of the corpus's clips with the detail between its postures; where there is none, its postures."""
+        postures, between = self.motion(clip), self.detail.shape[1]
+        if between == 0 or len(clip) == 1:
+            return postures
+        times = moments(postures.times, between)
+        detail = np.zeros((len(times), len(self.skeleton), 3))
+        detail[np.arange(len(times)) % (between + 1) > 0] = self.detail[clip.start : clip.stop - 1].reshape(
+            -1, len(self.skeleton), 3
+        )
+        spline = rotation_spline(postures.times, postures.rotations, times)
+        rotations = rot.normalise(rot.mul(spline, rot.exp(detail)))
+        root = natural_spline(postures.times, postures.root, times)
+        return Motion(self.skeleton, rotations, root, times, clip.name)
+
+
+def moments(times: Floats, between: int) -> Floats:
+    """Times [N] with so many more between each and the next, even in time [(N - 1) (between + 1) + 1]."""
+    share = np.arange(between + 1) / (between + 1)
+    return np.append((times[:-1, None] + share * np.diff(times)[:, None]).ravel(), times[-1])
 
 
 def _ranges(bounds: Iterable[tuple[int, int]]) -> Ints:

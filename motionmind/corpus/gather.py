@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
-from typing import Literal, TypedDict, get_args
+from typing import Literal, NamedTuple, TypedDict, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, Fault
+from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, Fault, moments
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.mirror import mirrored
 from motionmind.motion import Motion
 from motionmind.skeleton import Skeleton
+from motionmind.spline import rotation_spline
 
 Flips = Literal["drop", "keep", "split"]
 
 FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
+FINE = 30.0  # moments a second at which it is kept what lies between postures
+_COARSE = 20.0  # frames a second; a recording of fewer has nothing to keep
 
 
 class Gathering(TypedDict, total=False):
@@ -106,7 +110,10 @@ def gather(
     recordings, faults, body = _recorded(motions, rate, skip, flips, flip_degrees)
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
-    pieces = [(piece, Clip(piece.name, 0, 0, (about or {}).get(piece.name, ""))) for piece in recordings]
+    pieces = [
+        _Piece(postures, recording, Clip(postures.name, 0, 0, (about or {}).get(postures.name, "")))
+        for postures, recording in recordings
+    ]
     for other, weight in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
@@ -119,28 +126,30 @@ def gather(
         rate = _common_rate(bool(recordings), mix)
     if mirror:
         pieces += _mirror_images(pieces)
-    lengths = np.cumsum([0, *(len(piece) for piece, _ in pieces)])
+    lengths = np.cumsum([0, *(len(piece.postures) for piece in pieces)])
     if lengths[-1] == len(pieces):
         what = f" at {rate:g} postures a second" if rate else ""
         raise CorpusError(f"corpus {name!r}: no recording holds two postures{what}, so there is no move to learn")
-    heaviest = max(clip.weight for _, clip in pieces)
+    heaviest = max(piece.clip.weight for piece in pieces)
+    between = max(round(FINE / rate) - 1, 0) if rate else 0
     clips = tuple(
         replace(
-            clip,
+            piece.clip,
             start=int(start),
             stop=int(stop),
-            weight=clip.weight / heaviest,
-            reverse=clip.reverse if reverse is None else reverse,
+            weight=piece.clip.weight / heaviest,
+            reverse=piece.clip.reverse if reverse is None else reverse,
         )
-        for (_, clip), start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
+        for piece, start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
     )
     return Corpus(
         name,
         body,
         clips,
-        np.concatenate([piece.rotations for piece, _ in pieces]),
-        np.concatenate([piece.root for piece, _ in pieces]),
-        np.concatenate([piece.times for piece, _ in pieces]),
+        np.concatenate([piece.postures.rotations for piece in pieces]),
+        np.concatenate([piece.postures.root for piece in pieces]),
+        np.concatenate([piece.postures.times for piece in pieces]),
+        np.concatenate([_left_out(piece.postures, piece.recording, between) for piece in pieces]),
         facing,
         rate,
         title,
@@ -200,11 +209,32 @@ def _pace(rate: float | None) -> str:
 # --- clips, which do not know yet where they lie ----------------------------------------------------------------------
 
 
+class _Piece(NamedTuple):
+    """A clip: its postures, the recording that they are from, and what else is known of it."""
+
+    postures: Motion
+    recording: Motion
+    clip: Clip
+
+
+def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
+    """What postures leave out of a recording, as a corpus keeps it [N, between, J, 3]; none of the last posture."""
+    count, joints = len(postures), len(postures.skeleton)
+    out = np.zeros((count, between, joints, 3), np.float16)
+    if between > 0 and count > 1 and recording.fps >= _COARSE:
+        times = moments(postures.times, between)
+        spline = rotation_spline(postures.times, postures.rotations, times)
+        detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
+        out[:-1] = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
+    return out
+
+
 def _recorded(
     motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
-) -> tuple[list[Motion], list[Fault], Skeleton | None]:
-    """The recordings without what is skipped, cut at faults and even in time; the faults; the first one's body."""
-    pieces: list[Motion] = []
+) -> tuple[list[tuple[Motion, Motion]], list[Fault], Skeleton | None]:
+    """The recordings without what is skipped, cut at faults, with their postures even in time before them; the faults;
+    the first one's body."""
+    pieces: list[tuple[Motion, Motion]] = []
     faults: list[Fault] = []
     names: set[str] = set()
     first: Motion | None = None
@@ -226,39 +256,44 @@ def _recorded(
             continue
         cuts = sorted({f.frame for f in found}) if flips == "split" else []
         parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
-        pieces += _named([part if rate is None else part.resample(rate) for part in parts], motion.name)
+        pieces += _named([(part if rate is None else part.resample(rate), part) for part in parts], motion.name)
     return pieces, faults, first.skeleton if first else None
 
 
-def _taken(other: Corpus, weight: float, rate: float | None) -> list[tuple[Motion, Clip]]:
+def _taken(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
     """The clips of another corpus, by which they go from then on, where each counts `weight` times as much."""
     out = []
     for clip in other.clips:
         motion = other.motion(clip)
         if rate is not None and rate != other.rate:
             motion = motion.resample(rate)
-        out.append((motion, replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight)))
+        taken = replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight)
+        out.append(_Piece(motion, other.recording(clip), taken))
     return out
 
 
-def _mirror_images(pieces: Sequence[tuple[Motion, Clip]]) -> list[tuple[Motion, Clip]]:
+def _mirror_images(pieces: Sequence[_Piece]) -> list[_Piece]:
     """The clips with left and right exchanged, but for those of which a corpus that is mixed in has the image."""
-    there = {(clip.corpus, clip.name) for _, clip in pieces if clip.mirrored}
+    there = {(clip.corpus, clip.name) for _, _, clip in pieces if clip.mirrored}
     out = []
-    for motion, clip in pieces:
+    for postures, recording, clip in pieces:
         if (clip.corpus, clip.name) not in there:
             try:
-                out.append((mirrored(motion), replace(clip, mirrored=True)))
+                out.append(_Piece(mirrored(postures), mirrored(recording), replace(clip, mirrored=True)))
             except SkeletonError as error:
                 raise SkeletonError(f"{clip.label}: {error}") from None
     return out
 
 
-def _named(parts: list[Motion], name: str) -> list[Motion]:
+def _named(parts: list[tuple[Motion, Motion]], name: str) -> list[tuple[Motion, Motion]]:
     """Parts of a recording that was cut are numbered; a part of a single posture teaches no move and is left out."""
     if len(parts) == 1:
         return parts
-    return [replace(part, name=f"{name}.{i}") for i, part in enumerate(parts, start=1) if len(part) > 1]
+    return [
+        (replace(postures, name=f"{name}.{i}"), recording)
+        for i, (postures, recording) in enumerate(parts, start=1)
+        if len(postures) > 1
+    ]
 
 
 def _free(name: str, taken: set[str]) -> str:

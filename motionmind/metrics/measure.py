@@ -17,16 +17,15 @@ from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
 from motionmind.metrics.verbatim import LONGEST, Phrasebook, find_phrases
 from motionmind.motion import Motion
-from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import usual
 from motionmind.skeleton import Skeleton
+from motionmind.spline import natural_spline, rotation_spline
 
 Floats = NDArray[np.float64]
 Path = NDArray[np.int32]
 
 RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
 _SHORTEST = 4  # frames that a jerk needs
-_PIECE, _MARGIN = 32, 8  # keys that are splined at a time, and those on either side that bear on them
 _MOST = 100  # pieces of the corpus that are measured
 _PARTS = 10  # at least so many are made of all its movement
 _KEYED = 2.0  # frames in the time of a move; fewer are keyframes
@@ -105,7 +104,7 @@ def measure(motion: Motion, learned: Learned, path: Path | None = None) -> dict[
             f"second, and two postures, {step:.2f} s apart"
         )
     habits, phrases = find_habits(learned.grammar), find_phrases(corpus, np.asarray(learned.states))
-    clips = [at_rate(corpus.motion(clip)) for clip in corpus.clips]
+    clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
     own = _motion_figures(sampled, _style(seen, None)) | _path_figures(path, habits, phrases, None)
     rows: dict[str, list[float]] = {name: [] for name in own}
@@ -128,14 +127,7 @@ def at_rate(motion: Motion) -> Motion:
         return motion.resample(RATE)
     start, keys = motion.times[0], motion.times
     times = start + np.arange(int(np.floor((keys[-1] - start) * RATE + 1e-3)) + 1) / RATE
-    rotations, root = np.empty((len(times), len(motion.skeleton), 4)), np.empty((len(times), 3))
-    # A key bears on a natural spline a quarter as much for each key between; a margin spares splines of all keys.
-    for first in range(0, len(keys) - 1, _PIECE):
-        last = min(first + _PIECE, len(keys) - 1)
-        near = slice(max(first - _MARGIN, 0), last + _MARGIN + 1)
-        here = (times >= keys[first]) & ((times < keys[last]) | (last == len(keys) - 1))
-        rotations[here] = rotation_spline(keys[near], motion.rotations[near], times[here])
-        root[here] = natural_spline(keys[near], motion.root[near], times[here])
+    rotations, root = rotation_spline(keys, motion.rotations, times), natural_spline(keys, motion.root, times)
     return replace(motion, rotations=rotations, root=root, times=times, insertions=())
 
 

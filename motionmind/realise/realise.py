@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Corpus, moments
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
+from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import Carriage, carry, lowest, stand
-from motionmind.realise.spline import natural_spline, rotation_spline
 from motionmind.realise.timing import durations
-from motionmind.realise.ways import CLOSELY, NEAR, likely, limbs, mean_rotations, nearness
+from motionmind.realise.ways import CLOSELY, NEAR, divisions, likely, mean_rotations, nearness
 from motionmind.skeleton import Skeleton
+from motionmind.spline import natural_spline, rotation_spline
 
 Floats = NDArray[np.float64]
 
@@ -38,8 +39,9 @@ def realise(
     """The motion from posture `a` to posture `b` in the moves of a path of states [T + 1, L], on the body of `a`.
 
     Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
-    are as in the postures there. Between them each limb is, at the times of the moves, where the mean of all ways is
-    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them. With
+    are as in the postures there. Between them each part of the body is, at the times of the moves, where the mean of all ways is
+    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them, and the fine
+    detail of the corpus's recordings is added to it (`motionmind.realise.detail`). With
     `within` ways count the more the nearer they are to the path, and each joint is then brought into its state.
 
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
@@ -99,7 +101,12 @@ def realise(
         rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
         headings = rot.heading(poses[:, 0])
-    rotations = within_limits(a.skeleton, rot.normalise(corpus.from_lanes(rotations)))
+    rotations = corpus.from_lanes(rotations)
+    if corpus.detail.shape[1]:
+        finer = moments(halves[::2], corpus.detail.shape[1])
+        detail = natural_spline(finer, detail_of(corpus, likest_moves(corpus, poses[::2])), times)
+        rotations = rot.mul(rotations, rot.exp(detail))
+    rotations = within_limits(a.skeleton, rot.normalise(rotations))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -121,33 +128,37 @@ def _mean_way(
     skeleton: Skeleton, carriage: Carriage, stops: Mapping[int, Floats], halves: Floats, path: Floats | None
 ) -> tuple[Floats, Floats]:
     """Mean orientations [2 T + 1, J, 4] of the ways from each of `stops` to the next, near `path` [T + 1, J, 4] if
-    given; and how likely what carries the body is in each of the corpus's moments [2 T + 1, N].
+    given; and how likely the body is carried as in each of the corpus's moments [2 T + 1, N].
 
-    The mean's ends are near the stops but not there: what they are off by is taken off along the way in proportion to
-    the times of the steps [2 T + 1].
+    They are the means of those of all divisions of the body, of the whole and of what carries it. A mean's ends are
+    near the stops but not there: what they are off by is taken off along the way in proportion to the times of the
+    steps [2 T + 1].
     """
     joints, moments = len(skeleton), len(carriage.weights)
     poses, stance = np.empty((len(halves), joints, 4)), np.empty((len(halves), moments))
+    divided = divisions(skeleton)
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), np.stack([stops[start], stops[end]])[:, :joints]
         share = ((halves[here] - halves[2 * start]) / (halves[2 * end] - halves[2 * start]))[:, None]
         straight = rot.slerp(ends[:1], ends[1:], share)
-        for part, limb in enumerate(limbs(skeleton)):
-            shown = np.ascontiguousarray(carriage.orientations[:, limb])
+        off = np.zeros((len(share), joints, 3))
+        carried = []
+        for number, part in enumerate(part for parts in divided for part in parts):
+            shown = np.ascontiguousarray(carriage.orientations[:, part])
             near = np.ones((len(share), moments))
             if path is not None and end > start + 1:
-                near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, limb]]
-            near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, limb])
+                near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, part]]
+            near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, part])
             near[0] *= carriage.weights
-            kinds = np.ascontiguousarray(carriage.kinds[:, part])
+            kinds = np.ascontiguousarray(carriage.kinds[:, number])
             ways = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
-            if part == carriage.kinds.shape[1] - 1:
-                stance[here] = ways
-            else:
-                mean = mean_rotations(ways, shown, np.ascontiguousarray(straight[:, limb]))
-                off = rot.log(rot.inv_mul(straight[:, limb], mean))
-                off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
-                poses[here, limb] = rot.mul(straight[:, limb], rot.exp(off))
+            mean = mean_rotations(ways, shown, np.ascontiguousarray(straight[:, part]))
+            off[:, part] += rot.log(rot.inv_mul(straight[:, part], mean)) / len(divided)
+            if 0 in part and len(carried) < 2:
+                carried.append(ways)
+        stance[here] = np.mean(carried, axis=0)
+        off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
+        poses[here] = rot.mul(straight, rot.exp(off))
     for move, lanes in stops.items():
         poses[2 * move] = lanes[:joints]
     return poses, stance

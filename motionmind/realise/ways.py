@@ -1,11 +1,14 @@
-"""The ways that a corpus knows from one posture to another, limb by limb, and their mean.
+"""The ways that a corpus knows from one posture to another, part by part of the body, and their mean.
 
-A limb's way is a walk through the corpus's postures: from one to the next as they followed in the clips; now and then
-it goes over to another posture of the same *kind*, that is, one that holds the limb much alike, and goes on as from
+A part's way is a walk through the corpus's postures: from one to the next as they followed in the clips; now and then
+it goes over to another posture of the same *kind*, that is, one that holds the part much alike, and goes on as from
 there. A walk is the likelier the nearer its ends are to the two postures that are given. Given those ends and the
 number of moves, how likely each of the corpus's postures is at each move is found exactly, by passing messages forward
 and backward (Rabiner, "A tutorial on hidden Markov models", Proc. IEEE 77(2), 1989, section III). Its mean is the
 movement from which the corpus's own differs least in the square.
+
+Ways of the whole body keep its joints together, but whole bodies recur seldom; limbs recur often, but do not know of
+each other. Their means err differently, and the mean of means errs less than any.
 
 The constants were chosen on other windows than those that experiments/inbetween reports.
 """
@@ -21,15 +24,15 @@ from motionmind.skeleton import Skeleton
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ALIKE = 0.2  # radians a joint (root mean square) within which a limb's postures are of one kind
+ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are of one kind
 NEAR = 0.15  # the same, standard deviation: how near a walk's ends are to the postures that are given
 CLOSELY = 0.13  # the same: how closely a walk follows a path that it is to follow
 STRAIGHT_ON = 0.8  # share of steps after which a walk goes straight on as its clip does
 ANYWHERE = 0.01  # share after which it goes on from any posture, so that some walk joins any two
 
 
-def limbs(skeleton: Skeleton) -> tuple[Ints, ...]:
-    """The joints of each part of a body that moves much on its own, and last those that carry it.
+def divisions(skeleton: Skeleton) -> tuple[tuple[Ints, ...], ...]:
+    """The joints of a body in parts, divided in three ways: whole; what carries it and what is carried; its limbs.
 
     A limb is a leaf and what leads to it from the last fork: a leg, an arm, neck and head. What is left is the trunk.
     What carries the body is its root and the limbs that hang from it: pelvis and legs.
@@ -41,18 +44,24 @@ def limbs(skeleton: Skeleton) -> tuple[Ints, ...]:
         while (above := skeleton.parents[chain[0]]) > 0 and len(skeleton.children(above)) == 1:
             chain.insert(0, above)
         chains.append(chain)
-    taken = {joint for chain in chains for joint in chain}
-    trunk = [joint for joint in range(len(skeleton)) if joint not in taken]
+    every = range(len(skeleton))
     carrying = [0, *(joint for chain in chains if skeleton.parents[chain[0]] == 0 for joint in chain)]
-    return tuple(np.array(part, dtype=np.int64) for part in (trunk, *chains, carrying))
+    carried = [joint for joint in every if joint not in carrying]
+    taken = {joint for chain in chains for joint in chain}
+    trunk = [joint for joint in every if joint not in taken]
+    return tuple(
+        tuple(np.array(part, dtype=np.int64) for part in parts if part)
+        for parts in ((list(every),), (carrying, carried), (trunk, *chains))
+    )
 
 
 def kinds_of(skeleton: Skeleton, orientations: Floats) -> NDArray[np.int32]:
-    """Which kind each part of a body is of in lanes' orientations [N, L, 4]: [N, P], parts as in `limbs`, kinds from 0.
+    """Which kind each part of a body is of in lanes' orientations [N, L, 4]: [N, P], kinds from 0, for the parts of all
+    `divisions`, one after another.
 
     In the order of the postures one founds a kind unless a founder lies within ALIKE; then each joins the nearest.
     """
-    parts = limbs(skeleton)
+    parts = [part for parts in divisions(skeleton) for part in parts]
     out = np.empty((len(orientations), len(parts)), dtype=np.int32)
     for part, joints in enumerate(parts):
         out[:, part] = _kinds(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
@@ -68,7 +77,7 @@ def _kinds(orientations: Floats, within: float) -> Ints:
         for i in range(len(orientations)):
             least = np.inf
             for k in range(count):
-                distance = _squared(orientations[i], orientations[founders[k]])
+                distance = squared(orientations[i], orientations[founders[k]])
                 if distance < least:
                     least, out[i] = distance, k
             if not late and least > within:
@@ -78,7 +87,7 @@ def _kinds(orientations: Floats, within: float) -> Ints:
 
 
 @jit
-def _squared(a: Floats, b: Floats) -> float:
+def squared(a: Floats, b: Floats) -> float:
     """Sum over joints of 4 sin^2 of half the angle between rotations [m, 4]: its square, where it is small."""
     total = 0.0
     for j in range(len(a)):
@@ -89,13 +98,13 @@ def _squared(a: Floats, b: Floats) -> float:
 
 @jit
 def nearness(orientations: Floats, posture: Floats, width: float) -> Floats:
-    """exp(-d^2 / 2 width^2) of each of a limb's orientations [N, m, 4], over that of the nearest to `posture` [m, 4].
+    """exp(-d^2 / 2 width^2) of each of a part's orientations [N, m, 4], over that of the nearest to `posture` [m, 4].
 
     d is in radians, root mean square over the joints.
     """
     out = np.empty(len(orientations))
     for i in range(len(orientations)):
-        out[i] = _squared(orientations[i], posture)
+        out[i] = squared(orientations[i], posture)
     return np.exp((out.min() - out) / (2.0 * len(posture) * width**2))  # type: ignore[no-any-return]
 
 
