@@ -57,7 +57,11 @@ def _cross(a: Array, b: Array) -> Array:
     """Vector product [..., 3]; np.cross takes several times as long on small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 3))
+    out[..., 0] = ay * bz - az * by
+    out[..., 1] = az * bx - ax * bz
+    out[..., 2] = ax * by - ay * bx
+    return out
 
 
 def normalise(q: ArrayLike) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,7 @@ class Skeleton:
         above = ("nothing" if parent < 0 else self.names[parent] for parent in self.parents)
         return dict(zip(self.names, above, strict=True))
 
-    @property
+    @cached_property
     def height(self) -> float:
         """Vertical extent in metres of the body at rest (identity rotations), tips included."""
         positions = self.positions(np.tile(rot.IDENTITY, (len(self), 1)), np.zeros(3))
@@ -116,10 +116,9 @@ class Skeleton:
 
     def global_rotations(self, rotations: Array) -> Array:
         """Rotations [..., J, 4] of each joint's frame against the world, from local ones [..., J, 4]."""
-        out = np.empty_like(rotations)
-        for joint, parent in enumerate(self.parents):
-            local = rotations[..., joint, :]
-            out[..., joint, :] = local if parent < 0 else rot.mul(out[..., parent, :], local)
+        out = np.array(rotations, dtype=np.float64)
+        for joints, parents in self._generations:
+            out[..., joints, :] = rot.mul(out[..., parents, :], out[..., joints, :])
         return out
 
     def local_rotations(self, turned: Array) -> Array:
@@ -143,13 +142,19 @@ class Skeleton:
 
     def _positions(self, turned: Array, root: Array) -> Array:
         out = np.empty((*turned.shape[:-1], 3))
-        for joint, parent in enumerate(self.parents):
-            if parent < 0:
-                out[..., joint, :] = root
-            else:
-                arm = rot.mul_vec(turned[..., parent, :], self.offsets[joint])
-                out[..., joint, :] = out[..., parent, :] + arm
+        out[..., 0, :] = root
+        for joints, parents in self._generations:
+            out[..., joints, :] = out[..., parents, :] + rot.mul_vec(turned[..., parents, :], self.offsets[joints])
         return out
+
+    @cached_property
+    def _generations(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Joints as far from the root as each other, and their parents: from its children outward."""
+        depth = [0] * len(self)
+        for joint, parent in enumerate(self.parents):
+            depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+        steps = [np.flatnonzero(np.array(depth) == far) for far in range(1, max(depth) + 1)]
+        return [(joints, np.array(self.parents, dtype=np.intp)[joints]) for joints in steps]
 
 
 def _some(names: list[str]) -> str:

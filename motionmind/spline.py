@@ -67,6 +67,8 @@ def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats
 def _unroll(vectors: Floats) -> Floats:
     """Rotation vectors [K, K, ..., 3] to each key from each centre, whole turns added so that each is nearest to that
     of the neighbouring key towards the centre."""
+    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max() < np.pi:
+        return vectors  # all neighbours are as near as that already
     out = vectors.copy()
     for distance in range(2, len(out)):
         for side in (1, -1):

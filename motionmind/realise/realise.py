@@ -17,7 +17,7 @@ from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.timing import durations
-from motionmind.realise.ways import CLOSELY, NEAR, divisions, likely, mean_rotations, nearness
+from motionmind.realise.ways import CLOSELY, NEAR, likely, mean_rotations, nearness, parts_of
 from motionmind.skeleton import Skeleton
 from motionmind.spline import natural_spline, rotation_spline
 
@@ -130,35 +130,38 @@ def _mean_way(
     """Mean orientations [2 T + 1, J, 4] of the ways from each of `stops` to the next, near `path` [T + 1, J, 4] if
     given; and how likely the body is carried as in each of the corpus's moments [2 T + 1, N].
 
-    They are the means of those of all divisions of the body, of the whole and of what carries it. A mean's ends are
-    near the stops but not there: what they are off by is taken off along the way in proportion to the times of the
-    steps [2 T + 1].
+    Ways of parts of all sizes count alike; the body is carried by the ways of the whole and of what carries it. The
+    mean's ends are near the stops but not there: what they are off by is taken off along the way in proportion to the
+    times of the steps [2 T + 1].
     """
-    joints, moments = len(skeleton), len(carriage.weights)
-    poses, stance = np.empty((len(halves), joints, 4)), np.empty((len(halves), moments))
-    divided = divisions(skeleton)
+    joints, known = len(skeleton), len(carriage.weights)
+    poses, stance = np.empty((len(halves), joints, 4)), np.empty((len(halves), known))
+    parts = parts_of(skeleton)
+    # Joints that are in the same part of each size.
+    together: dict[tuple[int, ...], list[int]] = {}
+    for joint in range(joints):
+        together.setdefault(tuple(n for n, part in enumerate(parts) if joint in part), []).append(joint)
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), np.stack([stops[start], stops[end]])[:, :joints]
         share = ((halves[here] - halves[2 * start]) / (halves[2 * end] - halves[2 * start]))[:, None]
         straight = rot.slerp(ends[:1], ends[1:], share)
-        off = np.zeros((len(share), joints, 3))
-        carried = []
-        for number, part in enumerate(part for parts in divided for part in parts):
+        ways = np.empty((len(parts), len(share), known))
+        for number, part in enumerate(parts):
             shown = np.ascontiguousarray(carriage.orientations[:, part])
-            near = np.ones((len(share), moments))
+            near = np.ones((len(share), known))
             if path is not None and end > start + 1:
                 near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, part]]
             near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, part])
             near[0] *= carriage.weights
             kinds = np.ascontiguousarray(carriage.kinds[:, number])
-            ways = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
-            mean = mean_rotations(ways, shown, np.ascontiguousarray(straight[:, part]))
-            off[:, part] += rot.log(rot.inv_mul(straight[:, part], mean)) / len(divided)
-            if 0 in part and len(carried) < 2:
-                carried.append(ways)
-        stance[here] = np.mean(carried, axis=0)
-        off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
-        poses[here] = rot.mul(straight, rot.exp(off))
+            ways[number] = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
+        for numbers, some in together.items():
+            about = np.ascontiguousarray(straight[:, some])
+            shown = np.ascontiguousarray(carriage.orientations[:, some])
+            off = rot.log(rot.inv_mul(about, mean_rotations(ways[list(numbers)].mean(axis=0), shown, about)))
+            off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
+            poses[here, some] = rot.mul(about, rot.exp(off))
+        stance[here] = ways[:2].mean(axis=0)
     for move, lanes in stops.items():
         poses[2 * move] = lanes[:joints]
     return poses, stance
