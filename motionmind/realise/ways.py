@@ -25,10 +25,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are of one kind
-NEAR = 0.15  # the same, standard deviation: how near a walk's ends are to the postures that are given
+NEAR = 0.11  # the same, standard deviation: how near a walk's ends are to the postures that are given
 CLOSELY = 0.13  # the same: how closely a walk follows a path that it is to follow
-STRAIGHT_ON = 0.8  # share of steps after which a walk goes straight on as its clip does
-ANYWHERE = 0.01  # share after which it goes on from any posture, so that some walk joins any two
+STRAIGHT_ON = 0.7  # share of steps after which a walk goes straight on as its clip does
+ANYWHERE = 0.003  # share after which it goes on from any posture, so that some walk joins any two
 
 
 def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
