@@ -23,6 +23,8 @@ from motionmind.spline import natural_spline, rotation_spline
 
 Floats = NDArray[np.float64]
 
+RUN = 1.0  # seconds for which a body that turns goes on turning
+
 
 def realise(
     path: NDArray[np.int32],
@@ -94,7 +96,7 @@ def realise(
     if corpus.facing == "free":
         facing = {move: lanes[-1] for move, lanes in stops.items()}
         if within is None:
-            headings = _turning(steps @ carriage.turn, steps @ carriage.turn**2, facing)
+            headings = _turning(steps @ carriage.turn, steps @ carriage.turn**2, halves, facing)
         else:
             headings = natural_spline(keys, _headings(path[:, -1], grammar, seconds, facing), halves)
         turn = rot.about_vertical(natural_spline(halves, headings, times))
@@ -109,12 +111,11 @@ def realise(
     rotations = within_limits(a.skeleton, rot.normalise(rotations))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
-    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
-    low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
+    low = {move: float(lowest(a.skeleton, posture.rotations, posture.root)) for move, posture in postures.items()}
     # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(halves, keys[[0, -1]], np.minimum([low[0], low[-1]], 0.0))
+    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
     heights = stance @ carriage.clearance + floor
-    heights[[2 * move for move in stops]] = low
+    heights[[2 * move for move in stops]] = list(low.values())
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(steps @ carriage.travel, headings), axis=0)])
@@ -173,14 +174,19 @@ def _brought(poses: Floats, centres: Floats, within: Floats) -> Floats:
     return np.where((off <= within)[..., None], poses, rot.slerp(centres, poses, within / np.maximum(off, 1e-9)))
 
 
-def _turning(turn: Floats, spread: Floats, facing: Mapping[int, Floats]) -> Floats:
-    """Headings in radians [2 T + 1], unwrapped, that turn by `turn` [2 T] a step but are `facing`'s at its moves.
+def _turning(turn: Floats, spread: Floats, halves: Floats, facing: Mapping[int, Floats]) -> Floats:
+    """Headings in radians [2 T + 1], unwrapped, at `halves` that are `facing`'s at its moves.
 
-    What is missing is made up by the steps in proportion to how much their turns vary (`spread`: mean squares), as the
-    mean of normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
+    Ways turn by `turn` [2 T] in each step, with mean squares `spread`. The less sure they are to which side they turn
+    on the whole, the less of it is done: M^2 / (M^2 + V) of turns that add up to M with variance V, the linear estimate
+    of least mean square error. Ways that turn do so for about RUN seconds, so that V is that of steps that vary together
+    for as long. What is missing to B is made up by the steps in proportion to how much their turns vary, as the mean of
+    normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
     """
-    out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     varies = np.maximum(spread - turn**2, 1e-4)
+    variance = varies.sum() * RUN * len(turn) / (halves[-1] - halves[0])
+    turn = turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
+    out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     for start, end in pairwise(2 * move for move in facing):
         missing = rot.heading(facing[end // 2]) - out[end]
         missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
