@@ -35,7 +35,7 @@ from motionmind.search.progression import of_moves
 from motionmind.search.sample import drawn
 from motionmind.search.solve import MOST_STATES, Certificate, Rules, Via, Watch, solve
 from motionmind.skeleton import human23
-from motionmind.tween import Floats, Posed, Tween, explain
+from motionmind.tween import Floats, Posed, Tween, explain, source_of
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -194,7 +194,7 @@ class Engine(Learned):
             bridge_price,
         )
         began = perf_counter()
-        motion = realise(
+        motion, detailed = realise(
             certificate.path,
             a,
             b,
@@ -227,6 +227,11 @@ class Engine(Learned):
             path_degrees=self._off(motion, certificate.path),
             via_degrees=snap[1:-1],
             sources=sources,
+            detail=tuple(
+                source_of(self.corpus, int(moves.begins[move]), int(moves.ends[move]))
+                for moves in [self.corpus.moves]
+                for move in detailed
+            ),
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             node_budget=node_budget,

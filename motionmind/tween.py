@@ -92,6 +92,8 @@ class Tween:
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
         via_degrees: angle to their states for the postures that it was to pass through [K, L].
         sources: for each move and lane one place in the corpus that attests it, None where none does.
+        detail: where the movement's fine detail was recorded, a place for each even part of its time; empty where the
+            corpus has none to give.
         expansions: of A*.
         peak_nodes: the greatest number of nodes that A* held.
         node_budget: the number that it might hold.
@@ -116,6 +118,7 @@ class Tween:
     path_degrees: Floats
     via_degrees: Floats
     sources: tuple[tuple[Source | None, ...], ...]
+    detail: tuple[Source, ...]
     expansions: int
     peak_nodes: int
     node_budget: int
@@ -170,6 +173,7 @@ class Tween:
             },
             "path_degrees": {"mean": float(off.mean()), "most": float(off.max())} if off.size else {},
             "sources": [[None if source is None else asdict(source) for source in row] for row in self.sources],
+            "detail": [asdict(source) for source in self.detail],
             "times": self.motion.insertions[0].times.tolist(),
             "names": [list(row) for row in account.names],
             "degrees": account.degrees.tolist(),
@@ -209,7 +213,7 @@ def explain(
         row: list[Source | None] = []
         for lane, joint in enumerate(grammar.lanes):
             edge = graph.edge(lane, before[lane], after[lane])
-            row.append(_source(corpus, int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None)
+            row.append(source_of(corpus, int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None)
             holds_goal = before[lane] == after[lane] == path[-1, lane]
             if holds_goal and (edge < 0 or wait < weights[edge]):
                 waits.append(Wait(joint, move, wait))
@@ -221,7 +225,8 @@ def explain(
     return float(np.mean(attested)) if attested else 1.0, tuple(bridges), tuple(waits), tuple(sources)
 
 
-def _source(corpus: Corpus, posture: int, to: int) -> Source:
+def source_of(corpus: Corpus, posture: int, to: int) -> Source:
+    """The place in a corpus where a move leads from one of its postures `to` another."""
     clip = corpus.clip_of(posture)
     return Source(
         clip.name,

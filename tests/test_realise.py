@@ -268,9 +268,10 @@ def realised(
     known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0, within: Array | None = None
 ) -> Motion:
     """The motion along postures `rows` of the corpus."""
-    return realise(
+    motion, _ = realise(
         known.states[rows], a, b, known.corpus, known, known.carriage, fps, within=within  # type: ignore[arg-type]
     )  # fmt: skip
+    return motion
 
 
 @pytest.fixture(scope="module", params=["free", "stage"])

@@ -121,7 +121,7 @@ def made(engine: Engine, real: Motion, seconds: float) -> Iterator[tuple[str, Ma
     tween = _tween(engine, a, b, seconds)
     yield "mean", (tween.motion.rotations, tween.motion.root)
     within = np.radians(engine.space.tolerances[: len(a.skeleton)])
-    path = realise(tween.path, a, b, engine.corpus, engine.grammar, engine.carriage, FPS, seconds, within=within)
+    path, _ = realise(tween.path, a, b, engine.corpus, engine.grammar, engine.carriage, FPS, seconds, within=within)
     yield "path", (path.rotations, path.root)
 
 

@@ -119,6 +119,8 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         lines.append(
             ("motion", f"{kind}: {off.mean():.1f} degrees a joint off its states on the way, at most {off.max():.1f}")
         )
+    if result.detail:
+        lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
     if files:
         lines.append(("written", ", ".join(map(click.format_filename, files))))
     for name, line in lines:

@@ -22,6 +22,7 @@ from motionmind.skeleton import Skeleton
 from motionmind.spline import natural_spline, rotation_spline
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 RUN = 1.0  # seconds for which a body that turns goes on turning
 
@@ -37,14 +38,14 @@ def realise(
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
     within: Floats | None = None,
-) -> Motion:
+) -> tuple[Motion, Ints]:
     """The motion from posture `a` to posture `b` in the moves of a path of states [T + 1, L], on the body of `a`.
 
     Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
-    are as in the postures there. Between them each part of the body is, at the times of the moves, where the mean of all ways is
-    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them, and the fine
-    detail of the corpus's recordings is added to it (`motionmind.realise.detail`). With
-    `within` ways count the more the nearer they are to the path, and each joint is then brought into its state.
+    are as in the postures there. Between them the body is, at the times of the moves, where the mean of all ways is
+    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them, and fine
+    detail of the corpus's recordings is added to it (`motionmind.realise.detail`). With `within` ways count the more
+    the nearer they are to the path, and each joint is then brought into its state.
 
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
     Its height keeps the lowest point as far above the floor as the corpus's postures have it; the floor is at 0, or
@@ -62,25 +63,22 @@ def realise(
         through: postures on the way, by the number of moves that lead there, increasing.
         within: radians within which each joint is of its state at each move [J]; None for the mean of all ways,
             wherever the path goes.
+
+    Returns:
+        The motion, and the corpus's moves whose detail it has, one after another; none where the corpus keeps none.
     """
+    detailed = np.zeros(0, dtype=np.int64)
     if len(path) == 1:
-        return Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
-    seconds = durations(path, grammar.transitions)
-    frames = max(1, round((length or float(seconds.sum())) * fps))
-    fps = frames / length if length else fps
-    count = max(1, round((len(path) - 1) * frames / fps / float(seconds.sum())))
-    seconds *= frames / fps / seconds.sum()
-    keys = np.concatenate([[0.0], np.cumsum(seconds)])
-    times = np.arange(frames + 1) / fps
-    times[-1] = length or times[-1]
-    keys[-1] = times[-1]
+        still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
+        return still, detailed
+    keys, times, count = _clock(path, grammar, fps, length)
 
     # The facing's states are steps of a circle, which the corpus need not show: its lane has no ways but turns.
     joints = len(a.skeleton)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: corpus.to_lanes(posture.rotations) for move, posture in postures.items()}
     centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
-    halves = np.insert(keys, np.arange(1, len(keys)), 0.5 * (keys[1:] + keys[:-1]))
+    halves = moments(keys, 1)
     if within is None and not through and count != len(path) - 1:
         # A path may take more moves than there is time for; the corpus's ways are not to be hurried.
         halves = np.linspace(0.0, keys[-1], 2 * count + 1)
@@ -98,31 +96,79 @@ def realise(
         if within is None:
             headings = _turning(steps @ carriage.turn, steps @ carriage.turn**2, halves, facing)
         else:
-            headings = natural_spline(keys, _headings(path[:, -1], grammar, seconds, facing), halves)
+            headings = natural_spline(keys, _headings(path[:, -1], grammar, np.diff(keys), facing), halves)
         turn = rot.about_vertical(natural_spline(halves, headings, times))
         rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
         headings = rot.heading(poses[:, 0])
     rotations = corpus.from_lanes(rotations)
-    if corpus.detail.shape[1]:
-        finer = moments(halves[::2], corpus.detail.shape[1])
-        detail = natural_spline(finer, detail_of(corpus, likest_moves(corpus, poses[::2])), times)
+    between = corpus.detail.shape[1]
+    if between:
+        detailed = likest_moves(corpus, poses[::2])
+        detail = natural_spline(moments(halves[::2], between), detail_of(corpus, detailed), times)
         rotations = rot.mul(rotations, rot.exp(detail))
     rotations = within_limits(a.skeleton, rot.normalise(rotations))
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
-    low = {move: float(lowest(a.skeleton, posture.rotations, posture.root)) for move, posture in postures.items()}
+    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
+    low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
+    heights = stance @ carriage.clearance
+    drift = _drift(steps @ carriage.travel, headings)
+    root = _root(
+        a.skeleton, rotations, times, halves, heights, dict(zip(stops, low, strict=True)), drift, a.root, b.root
+    )
+    return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),)), detailed
+
+
+def _clock(path: NDArray[np.int32], grammar: Grammar, fps: float, length: float | None) -> tuple[Floats, Floats, int]:
+    """Times of a path's moves [T + 1], and of as many frames at about `fps` as they take, or as `length` seconds do;
+    and how many moves the corpus makes in that time."""
+    seconds = durations(path, grammar.transitions)
+    usually = float(seconds.sum())
+    frames = max(1, round((length or usually) * fps))
+    length = length or frames / fps
+    keys = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
+    times = np.linspace(0.0, length, frames + 1)
+    keys[-1] = length
+    return keys, times, max(1, round(len(seconds) * length / usually))
+
+
+def _root(
+    skeleton: Skeleton,
+    rotations: Floats,
+    times: Floats,
+    halves: Floats,
+    heights: Floats,
+    low: Mapping[int, float],
+    drift: Floats,
+    a: Floats,
+    b: Floats,
+) -> Floats:
+    """Positions of the root at `times` [N, 3] from `a` to `b`, on feet that stand.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        times: of the frames [N], seconds.
+        halves: of the steps [2 T + 1].
+        heights: of the lowest point above the floor at the steps [2 T + 1], metres.
+        low: the same above 0 at some moves, where it is given; the first and the last among them.
+        drift: how far the root goes in each step as the corpus's bodies travel [2 T, 3].
+        a: first position of the root [3].
+        b: last position.
+    """
+    moves = list(low)
     # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[0], low[len(path) - 1]], 0.0))
-    heights = stance @ carriage.clearance + floor
-    heights[[2 * move for move in stops]] = list(low.values())
+    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[moves[0]], low[moves[-1]]], 0.0))
+    heights = heights + floor
+    heights[2 * np.array(moves)] = list(low.values())
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
-    places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(steps @ carriage.travel, headings), axis=0)])
-    drift = np.diff(natural_spline(halves, places, times), axis=0)
-    root = stand(a.skeleton, rotations, carry(a.skeleton, rotations, clear, drift, a.root, b.root), heights)
-    root[0], root[-1] = a.root, b.root
-    return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
+    places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
+    root = carry(skeleton, rotations, clear, np.diff(natural_spline(halves, places, times), axis=0), a, b)
+    root = stand(skeleton, rotations, root, heights)
+    root[0], root[-1] = a, b
+    return root
 
 
 def _mean_way(
@@ -179,8 +225,8 @@ def _turning(turn: Floats, spread: Floats, halves: Floats, facing: Mapping[int, 
 
     Ways turn by `turn` [2 T] in each step, with mean squares `spread`. The less sure they are to which side they turn
     on the whole, the less of it is done: M^2 / (M^2 + V) of turns that add up to M with variance V, the linear estimate
-    of least mean square error. Ways that turn do so for about RUN seconds, so that V is that of steps that vary together
-    for as long. What is missing to B is made up by the steps in proportion to how much their turns vary, as the mean of
+    of least mean square error. Ways that turn do so for about RUN seconds, so that V is of steps that vary together for
+    as long. What is missing to B is made up by the steps in proportion to how much their turns vary, as the mean of
     normal variables under a condition on their sum; of all that differ by whole turns the nearest is meant.
     """
     varies = np.maximum(spread - turn**2, 1e-4)
