@@ -1,4 +1,4 @@
-"""From a path of states to movement: splines, samples, durations, the root, and the whole."""
+"""From a path of states to movement: splines, durations, the root, ways, detail, and the whole."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from motionmind.corpus.gather import gather
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.motion import Motion, Posture
 from motionmind.notation.body_file import body
+from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
 from motionmind.realise.limits import within_limits
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
 from motionmind.realise.timing import durations
-from motionmind.realise.ways import ANYWHERE, STRAIGHT_ON, likely, limbs, mean_rotations
+from motionmind.realise.ways import ANYWHERE, STRAIGHT_ON, likely, mean_rotations, parts_of
 from motionmind.skeleton import Skeleton, human23
 from motionmind.spline import natural_spline, rotation_spline
 
@@ -46,6 +47,19 @@ def test_a_spline_through_one_knot_stays_there() -> None:
     np.testing.assert_array_equal(natural_spline(np.zeros(1), np.ones((1, 3)), np.arange(4.0)), np.ones((4, 3)))
     key = rot.about_vertical(0.3)[None]
     np.testing.assert_array_equal(rotation_spline(np.zeros(1), key, np.arange(4.0)), np.tile(key, (4, 1)))
+
+
+def test_splines_of_many_knots_are_made_in_pieces_that_fit() -> None:
+    times, keys = wander(150, 40.0, seed=1)
+    at = np.linspace(0.0, times[-1], 800)
+    np.testing.assert_allclose(
+        natural_spline(times, times[:, None] ** 2 + keys[:, 0], at),
+        CubicSpline(times, times[:, None] ** 2 + keys[:, 0], bc_type="natural")(at),
+        atol=1e-5,
+    )
+    spans = rot.about_vertical(np.cumsum(np.radians(30.0 + 20.0 * keys[:, 0, 0])))
+    expected = CubicSpline(times, np.unwrap(rot.heading(spans)), bc_type="natural")(at)
+    assert rot.angle(rotation_spline(times, spans, at), rot.about_vertical(expected)).max() < 1e-6
 
 
 def wander(count: int, degrees: float, seed: int, lanes: int = 5) -> tuple[Array, Array]:
@@ -173,13 +187,16 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
 # --- ways -------------------------------------------------------------------------------------------------------------
 
 
-def test_limbs_share_out_the_joints_and_what_carries_the_body_is_pelvis_and_legs() -> None:
+def test_each_joint_is_in_one_part_of_each_size() -> None:
     names = human23().names
-    *parts, carrying = ([names[j] for j in part] for part in limbs(human23()))
-    assert sorted(name for part in parts for name in part) == sorted(names)
-    assert parts[0] == ["pelvis", "lumbar", "thorax"]
-    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in parts
-    assert carrying == ["pelvis", *parts[1], *parts[2]]
+    whole, carrying, carried, *limbs = ([names[j] for j in part] for part in parts_of(human23()))
+    for parts in ([whole], [carrying, carried], limbs):
+        assert sorted(name for part in parts for name in part) == sorted(names)
+    assert limbs[0] == ["pelvis", "lumbar", "thorax"]
+    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in limbs
+    assert carrying == ["pelvis", *limbs[1], *limbs[2]]
+    hand = Skeleton("hand", ("wrist", "thumb", "finger"), (-1, 0, 0), np.zeros((3, 3)))
+    assert [part.tolist() for part in parts_of(hand)] == [[0, 1, 2], [0, 1, 2], [0], [1], [2]]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -225,6 +242,69 @@ def test_joints_are_brought_to_their_limits_and_no_further() -> None:
     np.testing.assert_array_equal(within_limits(human23(), q), q)
 
 
+# --- detail -----------------------------------------------------------------------------------------------------------
+
+
+def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
+    """A body at 30 frames a second that also trembles, faster than 5 postures a second tell."""
+    slow = walk(int(seconds * 5.0) + 1, seed=seed)
+    times = np.arange(int(seconds * 30.0) + 1) / 30.0
+    tremble = (
+        0.05 * np.sin(2.0 * np.pi * 6.0 * times)[:, None] * np.random.default_rng(seed).normal(size=(23, 3))[:, None]
+    )
+    rotations = rot.mul(rotation_spline(slow.times, slow.rotations, times), rot.exp(np.swapaxes(tremble, 0, 1)))
+    return Motion(slow.skeleton, rotations, natural_spline(slow.times, slow.root, times), times, "trembling")
+
+
+def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
+    corpus = gather("walks", [walk(5), walk(4, seed=1)], reverse=1.0)
+    moves, poses = corpus.moves, walk(4, seed=2)
+    lanes = corpus.to_lanes(poses.rotations)
+    shown = corpus.to_lanes(corpus.rotations)
+    far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in lanes])
+
+    def cost(sequence: tuple[int, ...]) -> float:
+        near = sum(far[t, moves.begins[m]] + far[t + 1, moves.ends[m]] for t, m in enumerate(sequence))
+        return float(near) + 2.0 * GOES_OVER**2 * sum(not straight(*pair) for pair in pairwise(sequence))
+
+    def straight(m: int, n: int) -> bool:
+        return bool(moves.ends[m] == moves.begins[n] and moves.begins[m] != moves.ends[n])
+
+    found = likest_moves(corpus, lanes)
+    assert cost(tuple(found)) == pytest.approx(min(map(cost, product(range(len(moves.begins)), repeat=3))), abs=1e-9)
+
+
+def test_a_movement_of_the_corpus_has_its_own_detail_again() -> None:
+    clip = recorded()
+    corpus = gather("trembling", [clip], rate=5.0)
+    rows = np.arange(6, 25)
+    moves = likest_moves(corpus, corpus.to_lanes(corpus.rotations[rows]))
+    np.testing.assert_array_equal(corpus.begins[moves], rows[:-1])
+    times = np.arange(6 * len(rows) - 5) / 30.0
+    spline = rotation_spline(corpus.times, corpus.rotations, times + corpus.times[6])
+    again = rot.mul(spline, rot.exp(detail_of(corpus, moves)))
+    assert rot.angle(again, clip.rotations[36 : 36 + len(times)]).max() < 2e-4  # as fine as half a float
+
+
+def test_detail_is_backwards_in_moves_that_are() -> None:
+    corpus = gather("trembling", [recorded(2.0)], rate=5.0, reverse=0.0)
+    forward = np.arange(len(corpus) - 1)
+    backward = forward[::-1] + len(forward)
+    np.testing.assert_array_equal(detail_of(corpus, backward), detail_of(corpus, forward)[::-1])
+
+
+def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
+    clip = recorded()
+    known = learned(clip, rate=5.0)
+    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
+    a, b = clip.posture(12), clip.posture(96)
+    rows = list(range(2, 17))
+    found, plain = (realised(one, rows, a, b) for one in (known, smooth))
+    apart = rot.angle(found.rotations, plain.rotations)
+    assert apart[::6].max() < 1e-6
+    assert np.median(apart[3::6]) > 0.01
+
+
 # --- the whole --------------------------------------------------------------------------------------------------------
 
 
@@ -250,8 +330,8 @@ def walk(frames: int = 40, sink: float = 0.0, seed: int = 0) -> Motion:
     return Motion(body, q, stand(body, q, root, np.full(frames, -sink)), t, "walk")
 
 
-def learned(motion: Motion, facing: Facing = "free") -> Learned:
-    corpus = gather("walks", [motion], facing=facing)
+def learned(motion: Motion, facing: Facing = "free", rate: float | None = None) -> Learned:
+    corpus = gather("walks", [motion], facing=facing, rate=rate)
     states = np.repeat(np.arange(len(corpus), dtype=np.int32)[:, None], 23, axis=1)
     sizes = [len(corpus)] * 23
     ring = rot.about_vertical(np.arange(24) * np.pi / 12.0)
@@ -396,7 +476,7 @@ def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
     whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
     path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
     path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
-    found = realise(
+    found, _ = realise(
         path, *turned, known.corpus, known, known.carriage, 60.0, within=np.full(23, 0.3)  # type: ignore[arg-type]
     )  # fmt: skip
     headings = np.unwrap(rot.heading(found.rotations[:, 0]))
