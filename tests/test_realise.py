@@ -356,7 +356,10 @@ def test_no_frame_jumps(walking: Learned) -> None:
     found = realised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
     keys = motion.rotations[rows]
     fastest = rot.angle(keys[1:], keys[:-1]).max(axis=0) / 0.2
-    assert np.all(rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0 < 2.0 * fastest + 1e-6)
+    speed = rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0
+    # Legs are quicker than the corpus's where its feet slide and these step.
+    leg = np.isin(np.arange(23), limbs(human23())[-1][1:])
+    assert np.all(speed < np.where(leg, 5.0, 2.0) * fastest + 1e-6)
     assert np.linalg.norm(np.diff(found.root, axis=0), axis=1).max() * 60.0 < 2.0 * 1.2
     turned = np.diff(found.rotations * np.sign(np.sum(found.rotations * found.rotations[:1], -1, keepdims=True)), 2, 0)
     assert np.abs(turned).max() < 0.01

@@ -1,80 +1,117 @@
 """Feet that stay where they stand: what the root, which is one, cannot do for two feet their legs do.
 
 Each foot is given a *track*, near to the one that it has, on which it hardly moves while it is near the floor. Where it
-has to get elsewhere in so short a time that it would slide, it is lifted as in a step. The leg then follows, by inverse
-kinematics of its two long bones, and the foot keeps its orientation. The constants were chosen on other recordings than
-those that experiments/inbetween reports.
+has to get elsewhere in so short a time that it would slide, it is lifted as in a step. The root goes along as far as
+the legs would otherwise have to bend or stretch, and the legs follow, by inverse kinematics of their two long bones;
+the feet keep their orientations. The constants were chosen on other recordings than those that experiments/inbetween
+reports.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.realise.limits import within_limits
-from motionmind.realise.root import lowest
+from motionmind.realise.root import stand
 from motionmind.realise.ways import limbs
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
 
 HOLDS = 0.04  # metres above the floor at which a foot's hold on it has fallen to a half
-EVEN = 0.01  # what it weighs, beside a foot that stands, that a track departs evenly from the one that was
+EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs evenly from the one that was
 SMOOTH = 0.015  # seconds: so long it takes to begin to depart, and to cease
-BACK = 1.35  # a second: how fast a foot that holds on to nothing returns to where it was
+BACK = 2.5  # a second: how fast a foot that holds on to nothing returns to where it was
 FAST = 0.6  # metres a second from which a foot does not slide but steps
 STEP = 0.07  # metres above the floor to which a step lifts it
-RISE = 0.1  # seconds of lifting
+RISE = 0.15  # seconds of lifting
 STANDS = 0.04  # metres above the floor below which another foot stands, so that this one may step
 SOFT = 0.02  # of a leg's length: so near to its full length it is not stretched as far as it would have to be
 HINGE = 0.1  # sine of a knee's bend below which its axis is rather the one that it has at other times
-SINK = 0.01  # metres that a foot may be below the floor after its leg was brought within its limits
+STAY = 0.1  # what it weighs, beside a leg that keeps its length, that the root stays on its way
 
 
-def plant(skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, fps: float) -> Floats:
-    """The same movement, local rotations [N, J, 4], with feet that stay where they stand: only legs differ.
+def plant(
+    skeleton: Skeleton, rotations: Floats, root: Floats, heights: Floats, floor: Floats, fps: float, given: Floats
+) -> tuple[Floats, Floats]:
+    """The same movement with feet that stay where they stand: local rotations [N, J, 4], positions of the root [N, 3].
 
-    A leg is a limb of two bones or more that hangs from the root. Its first and last frames stay as they are, bit by
-    bit, and its joints within their limits. A leg whose limits would put its foot into the floor is left as it was.
+    Only the root and the legs differ. A leg is a limb of two bones or more that hangs from the root; its joints are
+    brought within their limits at last, and then its foot may be a little off its track, but not in the floor.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres; they stay.
-        floor: height of the floor at each frame [N], metres.
+        root: positions of the root [N, 3], metres.
+        heights: of the body's lowest point at each frame [N], metres, before and after.
+        floor: the floor's [N], metres.
         fps: frames a second.
+        given: when postures were given that are to stay as they are, in frames, whole or not, from the first frame to
+            the last [G]. The frames next to them stay too.
     """
     legs = _legs(skeleton)
-    if len(rotations) < 3 or not legs:
-        return rotations
+    if not legs:
+        return rotations, root
+    rotations, root = rotations.copy(), root.copy()
+    for start, end in pairwise(given):
+        # Rounded, so that a posture that falls on a frame does.
+        part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
+        if part.stop - part.start > 2:
+            stretch = rotations[part], root[part], floor[part]
+            rotations[part], root[part] = _planted(skeleton, legs, *stretch, fps)
+    return rotations, stand(skeleton, rotations, root, heights)
+
+
+def _planted(
+    skeleton: Skeleton, legs: list[tuple[list[int], int]], rotations: Floats, root: Floats, floor: Floats, fps: float
+) -> tuple[Floats, Floats]:
+    """The same movement, three frames or more, between two that stay."""
     turned = skeleton.global_rotations(rotations)
     places = skeleton.positions_and_tips(rotations, root)
     # Both ends of each foot's last bone: one that turns on its ball or on its tip stands.
     ends = [places[:, [leg[-1], leg[-1] + len(skeleton)]] for leg, _ in legs]
     heights = [end[..., 1] - floor[:, None] for end in ends]
-    planted = rotations.copy()
-    for number, (leg, knee) in enumerate(legs):
-        others = [height.min(axis=1) for other, height in enumerate(heights) if other != number]
+    off = np.empty((len(rotations), len(legs), 3))
+    for foot, end in enumerate(ends):
+        others = [height.min(axis=1) for other, height in enumerate(heights) if other != foot]
         stands = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
-        off = _departure(ends[number], heights[number], stands, fps)
-        heights[number] = heights[number] + off[:, 1:2]
-        upper, middle = leg[knee - 1 : knee + 1]
-        lower = leg[knee + 1] if knee + 1 < len(leg) else middle + len(skeleton)
-        thigh, shank = _reach(turned[:, upper], places[:, [upper, middle, lower]], places[:, lower] + off)
-        planted[:, upper] = rot.inv_mul(turned[:, skeleton.parents[upper]], rot.mul(thigh, turned[:, upper]))
-        planted[:, middle] = rot.inv_mul(rot.mul(thigh, turned[:, upper]), rot.mul(shank, turned[:, middle]))
-        if lower < len(skeleton):
-            planted[:, lower] = rot.inv_mul(rot.mul(shank, turned[:, middle]), turned[:, lower])
-    limited = within_limits(skeleton, planted)
+        off[:, foot] = _departure(end, heights[foot], stands, fps)
+        heights[foot] = heights[foot] + off[:, foot, 1:2]
+    # Hip, knee and what they bring to its place: the next joint, or the tip.
+    chains = np.array([[*leg, leg[-1] + len(skeleton)][knee - 1 : knee + 2] for leg, knee in legs])
+    moved = _along(places[:, chains[:, 2]] - places[:, chains[:, 0]], off)
+    planted = rotations.copy()
+    for foot, (hip, knee, end) in enumerate(chains):
+        thigh, shank = _reach(turned[:, hip], places[:, chains[foot]], places[:, end] + off[:, foot] - moved)
+        thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
+        planted[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
+        planted[:, knee] = rot.inv_mul(thigh, shank)
+        if end < len(skeleton):
+            planted[:, end] = rot.inv_mul(shank, turned[:, end])
+    joints = [joint for leg, _ in legs for joint in leg]
     out = rotations.copy()
-    for leg, _ in legs:
-        frames = np.flatnonzero(np.any(limited[:, leg] != planted[:, leg], axis=(1, 2)))
-        alone = rotations[frames]
-        alone[:, leg] = limited[frames][:, leg]
-        if len(frames) == 0 or np.all(lowest(skeleton, alone, root[frames]) >= floor[frames] - SINK):
-            out[1:-1, leg] = limited[1:-1, leg]
-    return out
+    out[1:-1, joints] = within_limits(skeleton, planted)[1:-1, joints]
+    return out, root + moved
+
+
+def _along(legs: Floats, off: Floats) -> Floats:
+    """How far the root goes along [N, 3], metres, so that legs hardly change their lengths.
+
+    It is the r for which sum_l (u_l . (off_l - r))^2 + STAY |r|^2 is least, with u_l the direction of leg l: 0 where
+    all feet are to be where they were.
+
+    Args:
+        legs: from the hip to the end of each leg [N, L, 3], metres.
+        off: how far that end is to be from where it was [N, L, 3], metres.
+    """
+    along = legs / np.maximum(np.linalg.norm(legs, axis=-1, keepdims=True), 1e-9)
+    system = np.einsum("nli,nlj->nij", along, along) + STAY * np.eye(3)
+    pull = np.einsum("nli,nlj,nlj->ni", along, along, off)
+    return np.asarray(np.linalg.solve(system, pull[..., None])[..., 0])
 
 
 def _legs(skeleton: Skeleton) -> list[tuple[list[int], int]]:

@@ -13,6 +13,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
+from motionmind.realise.feet import plant
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.spline import natural_spline, rotation_spline
@@ -43,6 +44,7 @@ def realise(
     `within` ways count the more the nearer they are to the path, and each joint is then brought into its state.
 
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
+    What one root cannot hold the legs do (`motionmind.realise.feet`), but not with `within`, which says where they go.
     Its height keeps the lowest point as far above the floor as the corpus's postures have it; the floor is at 0, or
     lower under ends that are.
 
@@ -113,6 +115,9 @@ def realise(
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(_drift(steps @ carriage.travel, headings), axis=0)])
     drift = np.diff(natural_spline(halves, places, times), axis=0)
     root = stand(a.skeleton, rotations, carry(a.skeleton, rotations, clear, drift, a.root, b.root), heights)
+    if within is None:
+        given, ground = fps * halves[[2 * move for move in stops]], np.interp(times, halves, floor)
+        rotations, root = plant(a.skeleton, rotations, root, heights, ground, fps, given)
     root[0], root[-1] = a.root, b.root
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
 
