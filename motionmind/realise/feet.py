@@ -36,7 +36,7 @@ STAY = 0.1  # what it weighs, beside a leg that keeps its length, that the root 
 
 
 def plant(
-    skeleton: Skeleton, rotations: Floats, root: Floats, heights: Floats, floor: Floats, fps: float, given: Floats
+    skeleton: Skeleton, rotations: Floats, root: Floats, heights: Floats, clearance: Floats, fps: float, given: Floats
 ) -> tuple[Floats, Floats]:
     """The same movement with feet that stay where they stand: local rotations [N, J, 4], positions of the root [N, 3].
 
@@ -48,7 +48,7 @@ def plant(
         rotations: local rotations [N, J, 4].
         root: positions of the root [N, 3], metres.
         heights: of the body's lowest point at each frame [N], metres, before and after.
-        floor: the floor's [N], metres.
+        clearance: how far it is above the floor [N], metres.
         fps: frames a second.
         given: when postures were given that are to stay as they are, in frames, whole or not, from the first frame to
             the last [G]. The frames next to them stay too.
@@ -56,7 +56,7 @@ def plant(
     legs = _legs(skeleton)
     if not legs:
         return rotations, root
-    rotations, root = rotations.copy(), root.copy()
+    rotations, root, floor = rotations.copy(), root.copy(), heights - clearance
     for start, end in pairwise(given):
         # Rounded, so that a posture that falls on a frame does.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)

@@ -116,8 +116,9 @@ def realise(
     drift = np.diff(natural_spline(halves, places, times), axis=0)
     root = stand(a.skeleton, rotations, carry(a.skeleton, rotations, clear, drift, a.root, b.root), heights)
     if within is None:
-        given, ground = fps * halves[[2 * move for move in stops]], np.interp(times, halves, floor)
-        rotations, root = plant(a.skeleton, rotations, root, heights, ground, fps, given)
+        rotations, root = plant(
+            a.skeleton, rotations, root, heights, clear, fps, fps * halves[[2 * move for move in stops]]
+        )
     root[0], root[-1] = a.root, b.root
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),))
 
