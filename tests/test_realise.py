@@ -300,7 +300,8 @@ def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
     a, b = clip.posture(12), clip.posture(96)
     rows = list(range(2, 17))
     found, plain = (realised(one, rows, a, b) for one in (known, smooth))
-    apart = rot.angle(found.rotations, plain.rotations)
+    carried = parts_of(human23())[2]  # legs also do what feet need
+    apart = rot.angle(found.rotations, plain.rotations)[:, carried]
     assert apart[::6].max() < 1e-6
     assert np.median(apart[3::6]) > 0.01
 
@@ -437,7 +438,10 @@ def test_no_frame_jumps(walking: Learned) -> None:
     found = realised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
     keys = motion.rotations[rows]
     fastest = rot.angle(keys[1:], keys[:-1]).max(axis=0) / 0.2
-    assert np.all(rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0 < 2.0 * fastest + 1e-6)
+    speed = rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0
+    # Legs are quicker than the corpus's where its feet slide and these step.
+    leg = np.isin(np.arange(23), parts_of(human23())[1][1:])
+    assert np.all(speed < np.where(leg, 5.0, 2.0) * fastest + 1e-6)
     assert np.linalg.norm(np.diff(found.root, axis=0), axis=1).max() * 60.0 < 2.0 * 1.2
     turned = np.diff(found.rotations * np.sign(np.sum(found.rotations * found.rotations[:1], -1, keepdims=True)), 2, 0)
     assert np.abs(turned).max() < 0.01

@@ -14,6 +14,7 @@ from motionmind.corpus.corpus import Corpus, moments
 from motionmind.grammar.grammar import Grammar
 from motionmind.motion import Insertion, Motion, Posture
 from motionmind.realise.detail import detail_of, likest_moves
+from motionmind.realise.feet import plant
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import Carriage, carry, lowest, stand
 from motionmind.realise.timing import durations
@@ -48,6 +49,7 @@ def realise(
     the nearer they are to the path, and each joint is then brought into its state.
 
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
+    What one root cannot hold the legs do (`motionmind.realise.feet`), but not with `within`, which says where they go.
     Its height keeps the lowest point as far above the floor as the corpus's postures have it; the floor is at 0, or
     lower under ends that are.
 
@@ -112,10 +114,16 @@ def realise(
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
-    heights = stance @ carriage.clearance
-    drift = _drift(steps @ carriage.travel, headings)
-    root = _root(
-        a.skeleton, rotations, times, halves, heights, dict(zip(stops, low, strict=True)), drift, a.root, b.root
+    rotations, root = _on_feet(
+        a.skeleton,
+        rotations,
+        times,
+        halves,
+        stance @ carriage.clearance,
+        dict(zip(stops, low, strict=True)),
+        _drift(steps @ carriage.travel, headings),
+        (a.root, b.root),
+        planted=within is None,
     )
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),)), detailed
 
@@ -133,7 +141,7 @@ def _clock(path: NDArray[np.int32], grammar: Grammar, fps: float, length: float 
     return keys, times, max(1, round(len(seconds) * length / usually))
 
 
-def _root(
+def _on_feet(
     skeleton: Skeleton,
     rotations: Floats,
     times: Floats,
@@ -141,10 +149,10 @@ def _root(
     heights: Floats,
     low: Mapping[int, float],
     drift: Floats,
-    a: Floats,
-    b: Floats,
-) -> Floats:
-    """Positions of the root at `times` [N, 3] from `a` to `b`, on feet that stand.
+    ends: tuple[Floats, Floats],
+    planted: bool,
+) -> tuple[Floats, Floats]:
+    """A movement that feet carry: its local rotations [N, J, 4] and the positions of its root [N, 3].
 
     Args:
         skeleton: the body.
@@ -152,23 +160,26 @@ def _root(
         times: of the frames [N], seconds.
         halves: of the steps [2 T + 1].
         heights: of the lowest point above the floor at the steps [2 T + 1], metres.
-        low: the same above 0 at some moves, where it is given; the first and the last among them.
+        low: the same above 0 at those moves where postures are given; the first and the last among them.
         drift: how far the root goes in each step as the corpus's bodies travel [2 T, 3].
-        a: first position of the root [3].
-        b: last position.
+        ends: the first and the last position of the root [3].
+        planted: whether the legs may move, so that feet stay.
     """
-    moves = list(low)
+    given = 2 * np.array(list(low))
     # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[moves[0]], low[moves[-1]]], 0.0))
+    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[0], low[given[-1] // 2]], 0.0))
     heights = heights + floor
-    heights[2 * np.array(moves)] = list(low.values())
+    heights[given] = list(low.values())
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
-    root = carry(skeleton, rotations, clear, np.diff(natural_spline(halves, places, times), axis=0), a, b)
+    root = carry(skeleton, rotations, clear, np.diff(natural_spline(halves, places, times), axis=0), *ends)
     root = stand(skeleton, rotations, root, heights)
-    root[0], root[-1] = a, b
-    return root
+    if planted:
+        fps = 1.0 / (times[1] - times[0])
+        rotations, root = plant(skeleton, rotations, root, heights, clear, fps, fps * halves[given])
+    root[0], root[-1] = ends
+    return rotations, root
 
 
 def _mean_way(

@@ -31,19 +31,25 @@ STRAIGHT_ON = 0.7  # share of steps after which a walk goes straight on as its c
 ANYWHERE = 0.003  # share after which it goes on from any posture, so that some walk joins any two
 
 
-def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
-    """The joints of parts of a body, each joint in one of each size: the whole; what carries it, and what is carried
-    (if anything is); the trunk and the limbs.
-
-    A limb is a leaf and what leads to it from the last fork: a leg, an arm, neck and head. What is left is the trunk.
-    What carries the body is its root and the limbs that hang from it: pelvis and legs.
-    """
+def limbs_of(skeleton: Skeleton) -> list[list[int]]:
+    """The joints of each limb, outward: a leaf and what leads to it from the last fork, as a leg, an arm, neck and
+    head."""
     chains = []
     for end in (joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)):
         chain = [end]
         while (above := skeleton.parents[chain[0]]) > 0 and len(skeleton.children(above)) == 1:
             chain.insert(0, above)
         chains.append(chain)
+    return chains
+
+
+def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
+    """The joints of parts of a body, each joint in one of each size: the whole; what carries it, and what is carried
+    (if anything is); the trunk, which is what is left, and the limbs.
+
+    What carries the body is its root and the limbs that hang from it: pelvis and legs.
+    """
+    chains = limbs_of(skeleton)
     every = list(range(len(skeleton)))
     carrying = [0, *(joint for chain in chains if skeleton.parents[chain[0]] == 0 for joint in chain)]
     carried = [joint for joint in every if joint not in carrying]
