@@ -270,7 +270,7 @@ def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
     def straight(m: int, n: int) -> bool:
         return bool(moves.ends[m] == moves.begins[n] and moves.begins[m] != moves.ends[n])
 
-    found = likest_moves(corpus, lanes)
+    found = likest_moves(moves, shown[:, :23], lanes[:, :23])
     assert cost(tuple(found)) == pytest.approx(min(map(cost, product(range(len(moves.begins)), repeat=3))), abs=1e-9)
 
 
@@ -278,7 +278,8 @@ def test_a_movement_of_the_corpus_has_its_own_detail_again() -> None:
     clip = recorded()
     corpus = gather("trembling", [clip], rate=5.0)
     rows = np.arange(6, 25)
-    moves = likest_moves(corpus, corpus.to_lanes(corpus.rotations[rows]))
+    lanes = corpus.to_lanes(corpus.rotations)[:, :23]
+    moves = likest_moves(corpus.moves, lanes, lanes[rows])
     np.testing.assert_array_equal(corpus.begins[moves], rows[:-1])
     times = np.arange(6 * len(rows) - 5) / 30.0
     spline = rotation_spline(corpus.times, corpus.rotations, times + corpus.times[6])

@@ -79,6 +79,14 @@ class Transitions:
         at = int(first + np.searchsorted(self.targets[first:last], target))
         return at if at < last and self.targets[at] == target else -1
 
+    def edges(self, path: NDArray[np.int32]) -> Ints:
+        """Indices of the transitions of all lanes in each move of a path of states [T + 1, L]: [T, L], as `edge`."""
+        width = int(self.sizes().max()) + 1
+        keys = self.sources * width + self.targets  # in order, for rows are, and the targets in each
+        asked = (self.starts[:-1] + path[:-1]) * width + path[1:]
+        at = np.minimum(np.searchsorted(keys, asked), len(keys) - 1)
+        return np.where(keys[at] == asked, at, -1) if len(keys) else np.full(asked.shape, -1)
+
 
 def count_transitions(
     states: NDArray[np.int32],

@@ -20,16 +20,15 @@ Ints = NDArray[np.int64]
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer a posture must be for a run to end before it
 
 
-def likest_moves(corpus: Corpus, poses: Floats) -> Ints:
-    """The corpus's moves [T] that lead along postures of its lanes [T + 1, L, 4] but for the facing, in long runs.
+def likest_moves(moves: Moves, shown: Floats, poses: Floats) -> Ints:
+    """The corpus's moves [T] that lead along `poses` [T + 1, J, 4], in long runs; its own postures are `shown`
+    [N, J, 4].
 
     They minimise the sum of d^2 over both ends of all moves, d being their distance from the movement's postures,
     radians, root mean square over the joints, plus 2 GOES_OVER^2 for each move that does not go on from the one before
     as its clip does. Found by dynamic programming.
     """
-    moves, joints = corpus.moves, len(corpus.skeleton)
-    shown = np.ascontiguousarray(corpus.to_lanes(corpus.rotations)[:, :joints])
-    far = _far(shown, np.ascontiguousarray(poses[:, :joints])) / joints
+    far = _far(np.ascontiguousarray(shown), np.ascontiguousarray(poses)) / poses.shape[1]
     cost = far[:-1, moves.begins] + far[1:, moves.ends]
     before = _before(moves)
     total, came = cost[0], []

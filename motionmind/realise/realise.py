@@ -106,7 +106,7 @@ def realise(
     rotations = corpus.from_lanes(rotations)
     between = corpus.detail.shape[1]
     if between:
-        detailed = likest_moves(corpus, poses[::2])
+        detailed = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], poses[::2])
         detail = natural_spline(moments(halves[::2], between), detail_of(corpus, detailed), times)
         rotations = rot.mul(rotations, rot.exp(detail))
     rotations = within_limits(a.skeleton, rot.normalise(rotations))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +20,9 @@ def durations(path: NDArray[np.int32], transitions: Transitions) -> NDArray[np.f
     own. A move that nobody can time takes the median duration of all moves of the corpus.
     """
     out = np.full(len(path) - 1, usual(transitions))
-    for t, (before, after) in enumerate(pairwise(path)):
-        moving = [lane for lane in range(path.shape[1]) if before[lane] != after[lane]] or list(range(path.shape[1]))
-        edges = [transitions.edge(lane, before[lane], after[lane]) for lane in moving]
-        timed = [transitions.seconds[edge] for edge in edges if edge >= 0]
-        if timed:
-            out[t] = np.median(timed)
+    edges, moving = transitions.edges(path), path[1:] != path[:-1]
+    moving[~moving.any(axis=1)] = True
+    for t, timed in enumerate(moving & (edges >= 0)):
+        if timed.any():
+            out[t] = np.median(transitions.seconds[edges[t, timed]])
     return out
