@@ -121,6 +121,40 @@ def test_postures_are_made_even_in_time_after_the_cut() -> None:
     assert corpus.rate == 20.0
 
 
+def shaking(frames: int, fps: float, seed: int = 0) -> Motion:
+    """An arm that swings and shakes, faster than 5 postures a second tell."""
+    slow, t = swing("a", frames, fps), np.arange(frames) / fps
+    shake = 0.03 * np.sin(40.0 * t[:, None, None] + np.random.default_rng(seed).uniform(0.0, 6.0, (3, 3)))
+    return replace(slow, rotations=rot.mul(slow.rotations, rot.exp(shake)))
+
+
+@pytest.mark.parametrize(("fps", "rate"), [(120.0, 5.0), (60.0, 10.0), (30.0, 6.0)])
+def test_a_corpus_keeps_what_its_postures_leave_out(fps: float, rate: float) -> None:
+    clip = shaking(int(8.0 * fps), fps)
+    corpus = gather("arms", [clip], rate=rate)
+    again = corpus.recording(corpus.clips[0])
+    assert again.fps == pytest.approx(30.0)
+    off = rot.angle(again.rotations, clip.at(again.times).rotations)
+    assert off.max() < 1e-4  # half floats: four digits of some hundredths
+    assert np.abs(corpus.detail[-1]).max() == 0.0
+    assert np.abs(again.root - clip.at(again.times).root).max() < 1e-6  # it goes evenly
+
+
+def test_detail_is_of_what_is_recorded_so_finely() -> None:
+    for clip, rate in ((shaking(60, 10.0), 5.0), (shaking(300, 50.0), None), (shaking(300, 50.0), 30.0)):
+        corpus = gather("arms", [clip], rate=rate)
+        assert not np.any(corpus.detail)
+        again = corpus.recording(corpus.clips[0]).at(corpus.times)
+        assert rot.angle(again.rotations, corpus.rotations).max() < 1e-7
+
+
+def test_a_cut_leaves_no_detail_of_the_jump() -> None:
+    jump = replace(swing("a", 241, jumps={101: 90.0}), name="jump")
+    corpus = gather("arms", [jump], rate=5.0)
+    assert len(corpus.clips) == 2
+    assert np.abs(corpus.detail).max() < np.radians(1.0)
+
+
 def test_recordings_of_one_name_are_told_apart() -> None:
     corpus = gather("arms", [swing("a", 3), swing("a", 4), swing("", 3), swing("a", 5), swing("", 3)])
     assert [clip.name for clip in corpus.clips] == ["a", "a (2)", "clip", "a (3)", "clip (2)"]
@@ -182,6 +216,8 @@ def test_clips_and_arrays_that_do_not_fit_are_refused() -> None:
             replace(corpus, clips=clips)
     with pytest.raises(CorpusError, match="rotations, root and times"):
         replace(corpus, root=corpus.root[:3])
+    with pytest.raises(CorpusError, match="its detail is not that of 4 postures"):
+        replace(corpus, detail=corpus.detail[:3])
     with pytest.raises(CorpusError, match="no postures"):
         replace(corpus, clips=(), rotations=corpus.rotations[:0], root=corpus.root[:0], times=corpus.times[:0])
 

@@ -144,6 +144,15 @@ def test_an_edge_is_found_by_its_ends_and_only_where_it_is_attested(seed: int) -
             assert graph.edge(lane, before, after) == attested.get((before, after), -1)
 
 
+def test_all_edges_of_a_path_are_those_that_are_found_one_by_one(seed: int) -> None:
+    graph = grammar(seed).transitions
+    path = np.random.default_rng(seed).integers(graph.sizes(), size=(40, len(graph.sizes()))).astype(np.int32)
+    expected = [
+        [graph.edge(lane, *pair) for lane, pair in enumerate(zip(*rows, strict=True))] for rows in pairwise(path)
+    ]
+    np.testing.assert_array_equal(graph.edges(path), expected)
+
+
 def test_conditional_weights_are_minus_log_p_and_each_row_sums_to_one(seed: int) -> None:
     body, graph = corpus(seed), grammar(seed).transitions
     weights = graph.weights("conditional")

@@ -513,6 +513,24 @@ def test_what_a_mixed_corpus_has_mirrored_is_not_mirrored_again(home: Home) -> N
     np.testing.assert_array_equal(image.rotations, engine.corpus.motion(engine.corpus.clips[2]).rotations)
 
 
+def test_detail_goes_with_a_corpus_that_is_mixed_in_at_its_rate_or_another(home: Home) -> None:
+    shaken = shaking_dance("a")
+    one = gather("one", [shaken], rate=5.0)
+    for rate in (5.0, None, 2.5):
+        mix = gather("two", [], mix=[(one, 0.5)], rate=rate, mirror=True)
+        for clip, exact in zip(mix.clips, (shaken, mirrored(shaken)), strict=True):
+            found = mix.recording(clip)
+            assert rot.angle(found.rotations, exact.at(found.times).rotations).max() < 2e-4
+
+
+def shaking_dance(name: str) -> Motion:
+    """Human23 for 8 s at 30 frames a second, shaking faster than 5 postures a second tell."""
+    times = np.arange(241) / 30.0
+    phase = np.random.default_rng(1).uniform(0.0, 6.0, (2, 23, 3))
+    turns = 0.3 * np.sin(times[:, None, None] + phase[0]) + 0.03 * np.sin(40.0 * times[:, None, None] + phase[1])
+    return Motion(human23(), rot.exp(turns), np.zeros((241, 3)), times, name)
+
+
 def test_postures_of_a_mixed_corpus_are_brought_to_the_rate(home: Home) -> None:
     home.keep("even", [walk("a", range(-4, 5), seconds=0.1)], rate=10.0)
     home.keep("keys", [walk("b", [0, 2], seconds=0.4)])
