@@ -27,16 +27,23 @@ EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs e
 SMOOTH = 0.015  # seconds: so long it takes to begin to depart, and to cease
 BACK = 2.5  # a second: how fast a foot that holds on to nothing returns to where it was
 FAST = 0.6  # metres a second from which a foot does not slide but steps
-STEP = 0.07  # metres above the floor to which a step lifts it
+STEP = 0.06  # metres above the floor to which a step lifts it
 RISE = 0.15  # seconds of lifting
 STANDS = 0.055  # metres above the floor below which another foot stands, so that this one may step
 SOFT = 0.02  # of a leg's length: so near to its full length it is not stretched as far as it would have to be
 HINGE = 0.1  # sine of a knee's bend below which its axis is rather the one that it has at other times
-STAY = 0.1  # what it weighs, beside a leg that keeps its length, that the root stays on its way
+STAY = 0.3  # what it weighs, beside a leg that keeps its length, that the root stays on its way
 
 
 def plant(
-    skeleton: Skeleton, rotations: Floats, root: Floats, heights: Floats, clearance: Floats, fps: float, given: Floats
+    skeleton: Skeleton,
+    rotations: Floats,
+    root: Floats,
+    heights: Floats,
+    clearance: Floats,
+    stands: Floats,
+    fps: float,
+    given: Floats,
 ) -> tuple[Floats, Floats]:
     """The same movement with feet that stay where they stand: local rotations [N, J, 4], positions of the root [N, 3].
 
@@ -49,11 +56,13 @@ def plant(
         root: positions of the root [N, 3], metres.
         heights: of the body's lowest point at each frame [N], metres, before and after.
         clearance: how far it is above the floor [N], metres.
+        stands: how much each limb, and last the trunk, is to stand where it is low from each frame to the next
+            [N - 1, limbs + 1], 0 to 1.
         fps: frames a second.
         given: when postures were given that are to stay as they are, in frames, whole or not, from the first frame to
             the last [G]. The frames next to them stay too.
     """
-    legs = _legs(skeleton)
+    numbers, legs = _legs(skeleton)
     if not legs:
         return rotations, root
     rotations, root, floor = rotations.copy(), root.copy(), heights - clearance
@@ -61,13 +70,19 @@ def plant(
         # Rounded, so that a posture that falls on a frame does.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
         if part.stop - part.start > 2:
-            stretch = rotations[part], root[part], floor[part]
+            stretch = rotations[part], root[part], floor[part], stands[part.start : part.stop - 1, numbers]
             rotations[part], root[part] = _planted(skeleton, legs, *stretch, fps)
     return rotations, stand(skeleton, rotations, root, heights)
 
 
 def _planted(
-    skeleton: Skeleton, legs: list[tuple[list[int], int]], rotations: Floats, root: Floats, floor: Floats, fps: float
+    skeleton: Skeleton,
+    legs: list[tuple[list[int], int]],
+    rotations: Floats,
+    root: Floats,
+    floor: Floats,
+    stands: Floats,
+    fps: float,
 ) -> tuple[Floats, Floats]:
     """The same movement, three frames or more, between two that stay."""
     turned = skeleton.global_rotations(rotations)
@@ -78,12 +93,13 @@ def _planted(
     off = np.empty((len(rotations), len(legs), 3))
     for foot, end in enumerate(ends):
         others = [height.min(axis=1) for other, height in enumerate(heights) if other != foot]
-        stands = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
-        off[:, foot] = _departure(end, heights[foot], stands, fps)
+        others_stand = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
+        off[:, foot] = _departure(end, heights[foot], stands[:, foot], others_stand, fps)
         heights[foot] = heights[foot] + off[:, foot, 1:2]
     # Hip, knee and what they bring to its place: the next joint, or the tip.
     chains = np.array([[*leg, leg[-1] + len(skeleton)][knee - 1 : knee + 2] for leg, knee in legs])
-    moved = _along(places[:, chains[:, 2]] - places[:, chains[:, 0]], off)
+    # For a step a knee bends; the root goes along with what is level.
+    moved = _along(places[:, chains[:, 2]] - places[:, chains[:, 0]], off * np.array([1.0, 0.0, 1.0]))
     planted = rotations.copy()
     for foot, (hip, knee, end) in enumerate(chains):
         thigh, shank = _reach(turned[:, hip], places[:, chains[foot]], places[:, end] + off[:, foot] - moved)
@@ -114,28 +130,31 @@ def _along(legs: Floats, off: Floats) -> Floats:
     return np.asarray(np.linalg.solve(system, pull[..., None])[..., 0])
 
 
-def _legs(skeleton: Skeleton) -> list[tuple[list[int], int]]:
-    """Joints of each leg from the root down, and which of them is its knee: the one between its two long bones."""
-    out = []
-    for limb in limbs_of(skeleton):
+def _legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
+    """Which limbs are legs; the joints of each from the root down, and which of them is its knee: the one between its
+    two long bones."""
+    numbers, out = [], []
+    for number, limb in enumerate(limbs_of(skeleton)):
         bones = np.linalg.norm([*skeleton.offsets[limb[1:]], skeleton.tips[limb[-1]]], axis=-1)
         pairs = np.minimum(bones[:-1], bones[1:])
         if skeleton.parents[limb[0]] == 0 and len(limb) > 1 and pairs.max() > 0.0:
+            numbers.append(number)
             out.append((limb, int(np.argmax(pairs)) + 1))
-    return out
+    return numbers, out
 
 
-def _departure(ends: Floats, heights: Floats, others_stand: NDArray[np.bool_], fps: float) -> Floats:
+def _departure(ends: Floats, heights: Floats, stands: Floats, others_stand: NDArray[np.bool_], fps: float) -> Floats:
     """How far a foot is to be from where it was [N, 3], metres: 0 in the first and in the last frame.
 
     Args:
         ends: places of the foot's two ends [N, 2, 3], metres.
         heights: theirs above the floor [N, 2], metres.
+        stands: how much it stands where it is low from each frame to the next [N - 1].
         others_stand: whether it may step, for the body stands elsewhere [N].
         fps: frames a second.
     """
     moves = np.diff(ends[..., [0, 2]], axis=0)
-    level = _track(moves, _higher(heights), fps)
+    level = _track(moves, _higher(heights), stands, fps)
     speed = fps * np.linalg.norm(moves + np.diff(level, axis=0)[:, None], axis=-1)
     low = _higher(heights) < STEP
     slides = np.any(low, axis=1) & np.all(~low | (speed > FAST), axis=1)
@@ -145,7 +164,7 @@ def _departure(ends: Floats, heights: Floats, others_stand: NDArray[np.bool_], f
     lift = np.zeros(len(ends))
     if np.any(steps & others_stand):
         lift = _envelope(np.where(steps & others_stand, np.maximum(STEP - heights.min(axis=1), 0.0), 0.0), fps)
-        level = _track(moves, _higher(heights + lift[:, None]), fps)
+        level = _track(moves, _higher(heights + lift[:, None]), stands, fps)
     return np.stack([level[:, 0], lift, level[:, 1]], axis=-1)
 
 
@@ -154,22 +173,24 @@ def _higher(heights: Floats) -> Floats:
     return np.maximum(heights[1:], heights[:-1])
 
 
-def _track(moves: Floats, heights: Floats, fps: float) -> Floats:
+def _track(moves: Floats, heights: Floats, stands: Floats, fps: float) -> Floats:
     """How far, level, a foot is to be from where it was [N, 2], metres, so that it stays where it stands.
 
     From 0 to 0 the offsets d minimise sum_p w_p |d' + v_p|^2 + EVEN |d'|^2 + BACK^2 |d|^2 + SMOOTH^2 |d''|^2 over the
-    time, with v_p how fast end p moves and w_p = 1 / (1 + (height / HOLDS)^4) how firmly it stands. In frames, and
+    time, with v_p how fast end p moves and w_p = 1 / (1 + (height / HOLDS)^4) how near to the floor it is, times how
+    much the foot stands there. In frames, and
     divided by fps: differences stand for derivatives, BACK / fps for BACK and SMOOTH fps for SMOOTH. The normal
     equations are five diagonals.
 
     Args:
         moves: how far the foot's ends move from each frame to the next, level [N - 1, 2, 2], metres.
         heights: theirs above the floor meanwhile [N - 1, 2], metres.
+        stands: how much the foot stands where it is low [N - 1].
         fps: frames a second.
     """
     from scipy.linalg import solveh_banded
 
-    hold = 1.0 / (1.0 + (np.maximum(heights, 0.0) / HOLDS) ** 4)
+    hold = stands[:, None] / (1.0 + (np.maximum(heights, 0.0) / HOLDS) ** 4)
     pull = hold.sum(axis=1) + EVEN
     bend = (SMOOTH * fps) ** 2
     out = np.zeros((len(moves) + 1, 2))

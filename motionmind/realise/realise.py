@@ -120,6 +120,7 @@ def realise(
         times,
         halves,
         stance @ carriage.clearance,
+        stance @ carriage.stands,
         dict(zip(stops, low, strict=True)),
         _drift(steps @ carriage.travel, headings),
         (a.root, b.root),
@@ -147,6 +148,7 @@ def _on_feet(
     times: Floats,
     halves: Floats,
     heights: Floats,
+    stands: Floats,
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
@@ -160,7 +162,8 @@ def _on_feet(
         times: of the frames [N], seconds.
         halves: of the steps [2 T + 1].
         heights: of the lowest point above the floor at the steps [2 T + 1], metres.
-        low: the same above 0 at those moves where postures are given; the first and the last among them.
+        stands: how much each limb, and last the trunk, stands where it is low, at the steps [2 T + 1, limbs + 1].
+        low: the same as `heights` above 0 at those moves where postures are given; the first and the last among them.
         drift: how far the root goes in each step as the corpus's bodies travel [2 T, 3].
         ends: the first and the last position of the root [3].
         planted: whether the legs may move, so that feet stay.
@@ -173,11 +176,13 @@ def _on_feet(
     heights = _eased(halves, heights, times)
     clear = np.maximum(heights - np.interp(times, halves, floor), 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
-    root = carry(skeleton, rotations, clear, np.diff(natural_spline(halves, places, times), axis=0), *ends)
+    middles = 0.5 * (times[1:] + times[:-1])
+    held = np.stack([np.interp(middles, halves, limb) for limb in stands.T], axis=1)
+    root = carry(skeleton, rotations, clear, held, np.diff(natural_spline(halves, places, times), axis=0), *ends)
     root = stand(skeleton, rotations, root, heights)
     if planted:
         fps = 1.0 / (times[1] - times[0])
-        rotations, root = plant(skeleton, rotations, root, heights, clear, fps, fps * halves[given])
+        rotations, root = plant(skeleton, rotations, root, heights, clear, held, fps, fps * halves[given])
     root[0], root[-1] = ends
     return rotations, root
 

@@ -11,7 +11,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.notation.anatomy import SIDES
 from motionmind.realise.limits import anatomy_of
-from motionmind.realise.ways import kinds_of
+from motionmind.realise.ways import kinds_of, limb_of_points
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
+SLIDES = 0.3  # metres a second at which a limb that touches the floor stands no more than half
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,8 @@ class Carriage:
         travel: displacement of the root in it, metres, in the body's heading midway [M, 3].
         clearance: height of the lowest point above the clip's floor [N], metres, at least 0. The floor is where the
             lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
+        stands: how still the lowest point of each limb, and last of the trunk, is [N, limbs + 1]: 1 where it does not
+            move level, 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
     """
 
     orientations: Floats
@@ -49,6 +52,7 @@ class Carriage:
     turn: Floats
     travel: Floats
     clearance: Floats
+    stands: Floats
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
@@ -74,29 +78,55 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         0.5 * turned,
         0.5 * moved,
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
+        _stands(corpus),
     )
 
 
-def carry(skeleton: Skeleton, rotations: Floats, clearance: Floats, drift: Floats, a: Floats, b: Floats) -> Floats:
+def _stands(corpus: Corpus) -> Floats:
+    """How still limbs and trunk are, as in Carriage: 1 / (1 + (v / SLIDES)^2) of the level speed v of the point that is
+    lowest in a move; in a posture the mean of the moves there."""
+    begins, ends = corpus.moves.begins, corpus.moves.ends
+    places = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
+    limb = limb_of_points(corpus.skeleton)
+    out = np.ones((len(corpus) + len(begins), limb.max() + 1))
+    counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
+    for number in range(out.shape[1]):
+        points = places[:, limb == number]
+        if not points.shape[1]:
+            continue  # all joints are of limbs
+        lowest = np.argmin(points[begins, :, 1] + points[ends, :, 1], axis=1)
+        moved = points[ends, lowest] - points[begins, lowest]
+        speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds
+        still = 1.0 / (1.0 + (speed / SLIDES) ** 2)
+        out[len(corpus) :, number] = still
+        sums = np.bincount(begins, still, len(corpus)) + np.bincount(ends, still, len(corpus))
+        out[: len(corpus), number] = sums / counts
+    return out
+
+
+def carry(
+    skeleton: Skeleton, rotations: Floats, clearance: Floats, stands: Floats, drift: Floats, a: Floats, b: Floats
+) -> Floats:
     """Positions [N, 3] of the root from `a` [3] to `b` [3], level; heights are as `stand` makes them.
 
-    From each frame to the next the points of the body that are near the floor are to stay, and the root is to go by
+    From each frame to the next the points of the body that stand near the floor are to stay, and the root is to go by
     `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p how point p moves seen
-    from the root and w_p = exp(-height / GRIP), under the condition that they add up to b - a. So
-    v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is made up
-    where the body stands least.
+    from the root and w_p = exp(-height / GRIP) times how much its limb stands, under the condition that they add up to
+    b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is
+    made up where the body stands least.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
         clearance: height of the lowest point above the floor [N], metres.
+        stands: how much each limb, and last the trunk, stands from each frame to the next [N - 1, limbs + 1], 0 to 1.
         drift: how far the corpus's bodies would travel from each frame to the next [N - 1, 3].
         a: first position of the root.
         b: last position.
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
-    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP)
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)]
     weight = SLIP + hold.sum(axis=1)
     steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)

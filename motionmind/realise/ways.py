@@ -43,6 +43,15 @@ def limbs_of(skeleton: Skeleton) -> list[list[int]]:
     return chains
 
 
+def limb_of_points(skeleton: Skeleton) -> Ints:
+    """To which of `limbs_of` each joint belongs, then each tip [2 J]; to one more, the trunk, what belongs to none."""
+    limbs = limbs_of(skeleton)
+    out = np.full(len(skeleton), len(limbs), dtype=np.int64)
+    for number, limb in enumerate(limbs):
+        out[limb] = number
+    return np.concatenate([out, out])
+
+
 def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
     """The joints of parts of a body, each joint in one of each size: the whole; what carries it, and what is carried
     (if anything is); the trunk, which is what is left, and the limbs.
