@@ -11,7 +11,20 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.metrics.feet import foot_slide, skating
 from motionmind.notation.body_file import body
-from motionmind.realise.feet import BACK, EVEN, HOLDS, SMOOTH, STEP, _along, _envelope, _legs, _reach, _track, plant
+from motionmind.realise.feet import (
+    BACK,
+    EVEN,
+    HOLDS,
+    SMOOTH,
+    STAY,
+    STEP,
+    _along,
+    _envelope,
+    _legs,
+    _reach,
+    _track,
+    plant,
+)
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import lowest, stand
 from motionmind.skeleton import Skeleton, human23, human44
@@ -38,7 +51,12 @@ def sway(seconds: float = 1.2, size: float = 0.12, travel: float = 0.0, fps: flo
 
 def planted(q: Array, root: Array, fps: float = 30.0, given: Sequence[float] = ()) -> tuple[Array, Array]:
     zero = np.zeros(len(q))
-    return plant(human23(), q, root, zero, zero, fps, np.array(given or [0.0, len(q) - 1.0]))
+    return plant(human23(), q, root, zero, zero, stands(q), fps, np.array(given or [0.0, len(q) - 1.0]))
+
+
+def stands(q: Array) -> Array:
+    """All limbs stand, where they are low."""
+    return np.ones((len(q) - 1, q.shape[1] + 1))
 
 
 # --- what it does -----------------------------------------------------------------------------------------------------
@@ -52,6 +70,14 @@ def test_feet_slide_much_less_and_all_but_legs_and_root_stay() -> None:
     np.testing.assert_array_equal(found[:, others], q[:, others])
     np.testing.assert_array_equal(found[[0, -1]], q[[0, -1]])
     np.testing.assert_allclose(went[[0, -1]], root[[0, -1]], atol=1e-12)
+
+
+def test_feet_that_are_to_slide_are_let_slide() -> None:
+    q, root = sway(size=0.05)
+    zero = np.zeros(len(q))
+    found, went = plant(human23(), q, root, zero, zero, 0.0 * stands(q), 30.0, np.array([0.0, len(q) - 1.0]))
+    np.testing.assert_allclose(rot.angle(found, q), 0.0, atol=1e-6)
+    np.testing.assert_allclose(went, root, atol=1e-9)
 
 
 def test_feet_that_would_skate_step() -> None:
@@ -149,7 +175,9 @@ def test_few_frames_leave_little_to_do(frames: int) -> None:
 
 def test_legs_are_found_by_their_long_bones() -> None:
     for skeleton in (human23(), human44()):
-        legs = [([skeleton.names[joint] for joint in leg], skeleton.names[leg[knee]]) for leg, knee in _legs(skeleton)]
+        legs = [
+            ([skeleton.names[joint] for joint in leg], skeleton.names[leg[knee]]) for leg, knee in _legs(skeleton)[1]
+        ]
         assert [knee for _, knee in legs] == ["left_knee", "right_knee"]
         assert [leg[0] for leg, _ in legs] == ["left_hip", "right_hip"]
 
@@ -157,7 +185,7 @@ def test_legs_are_found_by_their_long_bones() -> None:
 def test_a_body_without_legs_stays_as_it_is() -> None:
     rod = Skeleton("rod", ("a", "b"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     q, root = np.tile(rot.IDENTITY, (5, 2, 1)), np.arange(15.0).reshape(5, 3)
-    found, went = plant(rod, q, root, np.zeros(5), np.zeros(5), 30.0, np.array([0.0, 4.0]))
+    found, went = plant(rod, q, root, np.zeros(5), np.zeros(5), stands(q), 30.0, np.array([0.0, 4.0]))
     np.testing.assert_array_equal(found, q)
     np.testing.assert_array_equal(went, root)
 
@@ -169,7 +197,8 @@ def test_a_body_without_legs_stays_as_it_is() -> None:
 def test_a_track_is_the_least_squares_solution(frames: int, fps: float) -> None:
     rng = np.random.default_rng(frames)
     moves, heights = rng.normal(size=(frames - 1, 2, 2)), rng.uniform(-0.02, 0.2, (frames - 1, 2))
-    hold = np.sqrt(1.0 / (1.0 + (np.maximum(heights, 0.0) / HOLDS) ** 4))
+    still = rng.uniform(0.0, 1.0, frames - 1)
+    hold = np.sqrt(still[:, None] / (1.0 + (np.maximum(heights, 0.0) / HOLDS) ** 4))
     first, second = np.diff(np.eye(frames), axis=0), np.diff(np.eye(frames), 2, axis=0)
     rows = [hold[:, :1] * first, hold[:, 1:] * first, np.sqrt(EVEN) * first, BACK / fps * np.eye(frames)]
     rows.append(SMOOTH * fps * second)
@@ -177,7 +206,7 @@ def test_a_track_is_the_least_squares_solution(frames: int, fps: float) -> None:
     system = np.concatenate(rows)[:, 1:-1]
     right.append(np.zeros((len(system) - 2 * (frames - 1), 2)))
     expected = np.linalg.lstsq(system, np.concatenate(right), rcond=None)[0]
-    found = _track(moves, heights, fps)
+    found = _track(moves, heights, still, fps)
     np.testing.assert_allclose(found[1:-1], expected, atol=1e-9)
     np.testing.assert_array_equal(found[[0, -1]], 0.0)
 
@@ -199,7 +228,7 @@ def test_the_root_goes_along_as_far_as_legs_would_be_stretched() -> None:
     unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
 
     def cost(r: Array) -> Array:
-        return np.asarray(np.sum(np.sum(unit * (off - r[:, None]), -1) ** 2, -1) + 0.1 * np.sum(r**2, -1))
+        return np.asarray(np.sum(np.sum(unit * (off - r[:, None]), -1) ** 2, -1) + STAY * np.sum(r**2, -1))
 
     for step in 1e-3 * np.concatenate([np.eye(3), -np.eye(3)]):
         assert np.all(cost(found + step) > cost(found))

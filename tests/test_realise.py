@@ -19,7 +19,7 @@ from motionmind.notation.body_file import body
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
 from motionmind.realise.limits import within_limits
 from motionmind.realise.realise import _headings, realise
-from motionmind.realise.root import Carriage, carry, learn_carriage, lowest, stand
+from motionmind.realise.root import SLIDES, Carriage, carry, learn_carriage, lowest, stand
 from motionmind.realise.timing import durations
 from motionmind.realise.ways import ANYWHERE, STRAIGHT_ON, likely, mean_rotations, parts_of
 from motionmind.skeleton import Skeleton, human23
@@ -170,15 +170,34 @@ def test_a_foot_that_stands_carries_the_body() -> None:
     rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
     feet = [stander.index("left_toes"), stander.index("right_toes")]
     seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
-    root = carry(stander, rest, np.zeros(30), np.zeros((29, 3)), -seen[0], -seen[-1])
+    root = carry(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1])
     np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
     assert np.ptp(seen[:, 2]) > 0.1
+
+
+def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
+    """A body that is drawn along, one leg swinging so that its foot stays: only that foot stands."""
+    drawn, t = human23(), np.arange(9) * 0.2
+    q = np.tile(rot.IDENTITY, (9, 23, 1))
+    root = np.stack([0.0 * t, 0.9 + 0.0 * t, 0.6 * t], axis=1)
+    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    np.testing.assert_allclose(stands, 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    hip, toes = drawn.index("left_hip"), drawn.index("left_toes")
+    offset = drawn.positions(q[0], np.zeros(3))[toes]
+    # Turned about x until the tip of its toes, the lowest point of the leg, is where it was.
+    reach = offset + drawn.tips[toes] - drawn.offsets[hip]
+    angle = np.arcsin((reach[2] - root[:, 2] + root[4, 2]) / np.hypot(*reach[1:])) - np.arctan2(reach[2], -reach[1])
+    q[:, hip] = rot.from_axis_angle([1.0, 0.0, 0.0], -angle)
+    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    assert stands[9 + 2 : 9 + 6, 0].min() > 0.95
+    np.testing.assert_allclose(stands[:, 1:], 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    np.testing.assert_allclose(stands[1:8], 0.5 * (stands[9:16] + stands[10:17]), atol=1e-12)
 
 
 def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
-    flown = carry(human23(), motion.rotations, np.full(12, 3.0), drift, a, b)
+    flown = carry(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b)
     missing = b - drift.sum(axis=0)
     np.testing.assert_allclose(np.diff(flown, axis=0), drift + missing / 11.0, atol=1e-9)
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)

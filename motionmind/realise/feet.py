@@ -27,6 +27,7 @@ EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs e
 SMOOTH = 0.015  # seconds: so long it takes to begin to depart, and to cease
 BACK = 2.5  # a second: how fast a foot that holds on to nothing returns to where it was
 FAST = 0.6  # metres a second from which a foot does not slide but steps
+MEANT = 0.25  # how much a foot is to stand, so that it may step rather than slide
 STEP = 0.06  # metres above the floor to which a step lifts it
 RISE = 0.15  # seconds of lifting
 STANDS = 0.055  # metres above the floor below which another foot stands, so that this one may step
@@ -157,7 +158,7 @@ def _departure(ends: Floats, heights: Floats, stands: Floats, others_stand: NDAr
     level = _track(moves, _higher(heights), stands, fps)
     speed = fps * np.linalg.norm(moves + np.diff(level, axis=0)[:, None], axis=-1)
     low = _higher(heights) < STEP
-    slides = np.any(low, axis=1) & np.all(~low | (speed > FAST), axis=1)
+    slides = np.any(low, axis=1) & np.all(~low | (speed > FAST), axis=1) & (stands > MEANT)
     steps = np.zeros(len(ends), dtype=np.bool_)
     steps[:-1] |= slides
     steps[1:] |= slides
