@@ -37,6 +37,7 @@ REPORT = {
         "waits",
         "snap_degrees",
         "path_degrees",
+        "detail",
         "sources",
         "times",
         "names",

@@ -243,6 +243,7 @@ REPORT = [
     "snap_degrees",
     "path_degrees",
     "sources",
+    "detail",
     "times",
     "names",
     "degrees",

@@ -483,7 +483,7 @@ def test_the_command_prints_what_is_measured(run: Run, engine: Engine) -> None:
     for name, figure in found.items():
         expected = [number if np.isfinite(number) else None for number in (figure.value, figure.low, figure.high)]
         assert [figures[name][key] for key in ("value", "low", "high")] == pytest.approx(expected), name
-    shown = run("measure", "tween.json", "--corpus", "random")
+    shown = run("measure", "tween.json", "--corpus", "random", "--report", "report.json")
     assert shown.code == 0
     lines = shown.out.splitlines()[2:]
     assert [line.split("  ")[0].replace(" ", "_") for line in lines] == list(found)
