@@ -204,11 +204,12 @@ def _mean_way(
     together: dict[tuple[int, ...], list[int]] = {}
     for joint in range(joints):
         together.setdefault(tuple(n for n, part in enumerate(parts) if joint in part), []).append(joint)
+    shared = {number for numbers in together for number in numbers[:-1]}
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), np.stack([stops[start], stops[end]])[:, :joints]
         share = ((halves[here] - halves[2 * start]) / (halves[2 * end] - halves[2 * start]))[:, None]
         straight = rot.slerp(ends[:1], ends[1:], share)
-        ways = np.empty((len(parts), len(share), known))
+        ways: dict[int, Floats] = {}
         for number, part in enumerate(parts):
             shown = np.ascontiguousarray(carriage.orientations[:, part])
             near = np.ones((len(share), known))
@@ -218,13 +219,18 @@ def _mean_way(
             near[0] *= carriage.weights
             kinds = np.ascontiguousarray(carriage.kinds[:, number])
             ways[number] = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
-        for numbers, some in together.items():
-            about = np.ascontiguousarray(straight[:, some])
-            shown = np.ascontiguousarray(carriage.orientations[:, some])
-            off = rot.log(rot.inv_mul(about, mean_rotations(ways[list(numbers)].mean(axis=0), shown, about)))
-            off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
-            poses[here, some] = rot.mul(about, rot.exp(off))
-        stance[here] = ways[:2].mean(axis=0)
+            for numbers, some in together.items():
+                if numbers[-1] != number:
+                    continue
+                about = np.ascontiguousarray(straight[:, some])
+                shown = np.ascontiguousarray(carriage.orientations[:, some])
+                mean = mean_rotations(np.mean([ways[n] for n in numbers], axis=0), shown, about)
+                off = rot.log(rot.inv_mul(about, mean))
+                off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
+                poses[here, some] = rot.mul(about, rot.exp(off))
+            if number not in shared:
+                del ways[number]  # those of a large corpus are large
+        stance[here] = 0.5 * (ways[0] + ways[1])
     for move, lanes in stops.items():
         poses[2 * move] = lanes[:joints]
     return poses, stance
