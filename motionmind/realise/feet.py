@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.realise.limits import within_limits
-from motionmind.realise.root import stand
+from motionmind.realise.root import lows, stand
 from motionmind.realise.ways import limbs_of
 from motionmind.skeleton import Skeleton
 
@@ -26,6 +26,7 @@ HOLDS = 0.04  # metres above the floor at which a foot's hold on it has fallen t
 EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs evenly from the one that was
 SMOOTH = 0.015  # seconds: so long it takes to begin to depart, and to cease
 BACK = 2.5  # a second: how fast a foot that holds on to nothing returns to where it was
+UNDER = 0.05  # metres by which a limb must be lower than another, for the body to stand on it, that stands e times less
 FAST = 0.6  # metres a second from which a foot does not slide but steps
 MEANT = 0.25  # how much a foot is to stand, so that it may step rather than slide
 STEP = 0.06  # metres above the floor to which a step lifts it
@@ -49,7 +50,8 @@ def plant(
     """The same movement with feet that stay where they stand: local rotations [N, J, 4], positions of the root [N, 3].
 
     Only the root and the legs differ. A leg is a limb of two bones or more that hangs from the root; its joints are
-    brought within their limits at last, and then its foot may be a little off its track, but not in the floor.
+    brought within their limits at last, and then its foot may be a little off its track, but not in the floor. The body
+    stands on what stands: where a foot that does not is lower, its leg bends, and the body is not lifted onto it.
 
     Args:
         skeleton: the body.
@@ -67,11 +69,16 @@ def plant(
     if not legs:
         return rotations, root
     rotations, root, floor = rotations.copy(), root.copy(), heights - clearance
+    low = lows(skeleton, rotations, root)
+    sunk = _sunk(low, stands)
     for start, end in pairwise(given):
         # Rounded, so that a posture that falls on a frame does.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
         if part.stop - part.start > 2:
-            stretch = rotations[part], root[part], floor[part], stands[part.start : part.stop - 1, numbers]
+            sink = np.maximum(sunk[part] - np.linspace(sunk[part][0], sunk[part][-1], len(sunk[part])), 0.0)
+            root[part, 1] -= sink
+            under = np.maximum(heights[part, None] - (low[part][:, numbers] - sink[:, None]), 0.0)
+            stretch = rotations[part], root[part], floor[part], under, stands[part.start : part.stop - 1, numbers]
             rotations[part], root[part] = _planted(skeleton, legs, *stretch, fps)
     return rotations, stand(skeleton, rotations, root, heights)
 
@@ -82,21 +89,24 @@ def _planted(
     rotations: Floats,
     root: Floats,
     floor: Floats,
+    under: Floats,
     stands: Floats,
     fps: float,
 ) -> tuple[Floats, Floats]:
-    """The same movement, three frames or more, between two that stay."""
+    """The same movement, three frames or more, between two that stay; legs are lifted by so much that they are `under`
+    where the body stands [N, legs]."""
     turned = skeleton.global_rotations(rotations)
     places = skeleton.positions_and_tips(rotations, root)
     # Both ends of each foot's last bone: one that turns on its ball or on its tip stands.
     ends = [places[:, [leg[-1], leg[-1] + len(skeleton)]] for leg, _ in legs]
-    heights = [end[..., 1] - floor[:, None] for end in ends]
+    heights = [end[..., 1] - floor[:, None] + lifted[:, None] for end, lifted in zip(ends, under.T, strict=True)]
     off = np.empty((len(rotations), len(legs), 3))
     for foot, end in enumerate(ends):
         others = [height.min(axis=1) for other, height in enumerate(heights) if other != foot]
         others_stand = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
         off[:, foot] = _departure(end, heights[foot], stands[:, foot], others_stand, fps)
         heights[foot] = heights[foot] + off[:, foot, 1:2]
+        off[:, foot, 1] += under[:, foot]
     # Hip, knee and what they bring to its place: the next joint, or the tip.
     chains = np.array([[*leg, leg[-1] + len(skeleton)][knee - 1 : knee + 2] for leg, knee in legs])
     # For a step a knee bends; the root goes along with what is level.
@@ -113,6 +123,18 @@ def _planted(
     out = rotations.copy()
     out[1:-1, joints] = within_limits(skeleton, planted)[1:-1, joints]
     return out, root + moved
+
+
+def _sunk(low: Floats, stands: Floats) -> Floats:
+    """How far the body is to sink [N] from where its lowest point is on the floor, to stand on what stands there.
+
+    Its limbs, whose lowest points are at `low` [N, limbs + 1], count by the square of how much they stand
+    [N - 1, limbs + 1], and by exp(-h / UNDER) for the height h above the lowest of all.
+    """
+    still = np.concatenate([stands[:1], 0.5 * (stands[1:] + stands[:-1]), stands[-1:]])
+    above = low - low.min(axis=1, keepdims=True)
+    weights = still**2 * np.exp(-above / UNDER)
+    return np.asarray(np.sum(weights * np.where(weights > 0.0, above, 0.0), axis=1) / weights.sum(axis=1))
 
 
 def _along(legs: Floats, off: Floats) -> Floats:
@@ -177,9 +199,9 @@ def _higher(heights: Floats) -> Floats:
 def _track(moves: Floats, heights: Floats, stands: Floats, fps: float) -> Floats:
     """How far, level, a foot is to be from where it was [N, 2], metres, so that it stays where it stands.
 
-    From 0 to 0 the offsets d minimise sum_p w_p |d' + v_p|^2 + EVEN |d'|^2 + BACK^2 |d|^2 + SMOOTH^2 |d''|^2 over the
-    time, with v_p how fast end p moves and w_p = 1 / (1 + (height / HOLDS)^4) how near to the floor it is, times how
-    much the foot stands there. In frames, and
+    From 0 to 0 the offsets d minimise sum_p w_p |d' + v_p|^2 + EVEN |d'|^2 + (1 - w) BACK^2 |d|^2 + SMOOTH^2 |d''|^2
+    over the time, with v_p how fast end p moves, w_p = 1 / (1 + (height / HOLDS)^4) how near to the floor it is, times
+    how much the foot stands there, and w the greater of the two. In frames, and
     divided by fps: differences stand for derivatives, BACK / fps for BACK and SMOOTH fps for SMOOTH. The normal
     equations are five diagonals.
 
@@ -193,11 +215,13 @@ def _track(moves: Floats, heights: Floats, stands: Floats, fps: float) -> Floats
 
     hold = stands[:, None] / (1.0 + (np.maximum(heights, 0.0) / HOLDS) ** 4)
     pull = hold.sum(axis=1) + EVEN
+    free = 1.0 - hold.max(axis=1)
+    back = 0.5 * (free[:-1] + free[1:]) * (BACK / fps) ** 2
     bend = (SMOOTH * fps) ** 2
     out = np.zeros((len(moves) + 1, 2))
     # Rows are of the frames but the first and the last, where d = 0; a second difference reaches over three frames.
     diagonals = np.zeros((3, len(out) - 2))
-    diagonals[2] = pull[:-1] + pull[1:] + (BACK / fps) ** 2 + 4.0 * bend
+    diagonals[2] = pull[:-1] + pull[1:] + back + 4.0 * bend
     diagonals[2, :-1] += bend
     diagonals[2, 1:] += bend
     diagonals[1, 1:] = -pull[1:-1] - 4.0 * bend

@@ -11,7 +11,7 @@ from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.notation.anatomy import SIDES
 from motionmind.realise.limits import anatomy_of
-from motionmind.realise.ways import kinds_of, limb_of_points
+from motionmind.realise.ways import kinds_of, limb_of_points, limbs_of
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ def _stands(corpus: Corpus) -> Floats:
     begins, ends = corpus.moves.begins, corpus.moves.ends
     places = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
     limb = limb_of_points(corpus.skeleton)
-    out = np.ones((len(corpus) + len(begins), limb.max() + 1))
+    out = np.ones((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
     counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
     for number in range(out.shape[1]):
         points = places[:, limb == number]
@@ -142,16 +142,26 @@ def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats
 
 
 def lowest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """Heights [...] of the lowest joint, tip or heel of postures with local rotations [..., J, 4] and root [..., 3].
+    """Heights [...] of the lowest joint, tip or heel of postures with local rotations [..., J, 4] and root [..., 3]."""
+    return np.asarray(lows(skeleton, rotations, root).min(axis=-1))
+
+
+def lows(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
+    """The same for each limb, and last for the trunk [..., limbs + 1]; infinite where all joints are of limbs.
 
     Heels are known of bodies with an anatomy, whose proportions they are given in.
     """
-    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
-    least, anatomy = heights.min(axis=-1), anatomy_of(skeleton)
+    heights, limb = skeleton.positions_and_tips(rotations, root)[..., 1], limb_of_points(skeleton)
+    anatomy = anatomy_of(skeleton)
     if anatomy is not None and anatomy.leg is not None:
         heel = np.array(anatomy.leg.heel) * skeleton.height / anatomy.skeleton.height
         ankles = [anatomy.named(anatomy.leg.ankle, side) for side in SIDES]
         turned = skeleton.global_rotations(rotations)[..., ankles, :]
         heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
-        least = np.minimum(least, (heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]).min(axis=-1))
-    return np.asarray(least)
+        heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
+        limb = np.concatenate([limb, limb[ankles]])
+    count = len(limbs_of(skeleton)) + 1
+    out = np.full((*heights.shape[:-1], count), np.inf)
+    for number in range(count):
+        out[..., number] = heights[..., limb == number].min(axis=-1, initial=np.inf)
+    return out
