@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from motionmind import rotations as rot
 from motionmind.realise.limits import within_limits
-from motionmind.realise.root import lows, stand
+from motionmind.realise.root import BEARS, lows, stand
 from motionmind.realise.ways import limbs_of
 from motionmind.skeleton import Skeleton
 
@@ -128,12 +128,12 @@ def _planted(
 def _sunk(low: Floats, stands: Floats) -> Floats:
     """How far the body is to sink [N] from where its lowest point is on the floor, to stand on what stands there.
 
-    Its limbs, whose lowest points are at `low` [N, limbs + 1], count by the square of how much they stand
-    [N - 1, limbs + 1], and by exp(-h / UNDER) for the height h above the lowest of all.
+    Its limbs, whose lowest points are at `low` [N, limbs + 1], count by how much they stand [N - 1, limbs + 1],
+    to the power of BEARS, and by exp(-h / UNDER) for the height h above the lowest of all.
     """
     still = np.concatenate([stands[:1], 0.5 * (stands[1:] + stands[:-1]), stands[-1:]])
     above = low - low.min(axis=1, keepdims=True)
-    weights = still**2 * np.exp(-above / UNDER)
+    weights = still**BEARS * np.exp(-above / UNDER)
     return np.asarray(np.sum(weights * np.where(weights > 0.0, above, 0.0), axis=1) / weights.sum(axis=1))
 
 

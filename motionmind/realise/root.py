@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
+BEARS = 4  # power of how much limbs stand by which they bear the body: of two feet the one that stands the surer
 SLIDES = 0.3  # metres a second at which a limb that touches the floor stands no more than half
 
 
@@ -111,9 +112,9 @@ def carry(
 
     From each frame to the next the points of the body that stand near the floor are to stay, and the root is to go by
     `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p how point p moves seen
-    from the root and w_p = exp(-height / GRIP) times how much its limb stands, under the condition that they add up to
-    b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is
-    made up where the body stands least.
+    from the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to b - a.
+    So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is made up
+    where the body stands least.
 
     Args:
         skeleton: the body.
@@ -126,7 +127,7 @@ def carry(
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
-    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)]
+    hold = np.exp(-np.maximum(height[1:], height[:-1]) / GRIP) * stands[:, limb_of_points(skeleton)] ** BEARS
     weight = SLIP + hold.sum(axis=1)
     steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)
