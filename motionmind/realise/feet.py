@@ -26,7 +26,7 @@ HOLDS = 0.04  # metres above the floor at which a foot's hold on it has fallen t
 EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs evenly from the one that was
 SMOOTH = 0.015  # seconds: so long it takes to begin to depart, and to cease
 BACK = 2.5  # a second: how fast a foot that holds on to nothing returns to where it was
-UNDER = 0.05  # metres by which a limb must be lower than another, for the body to stand on it, that stands e times less
+UNDER = 0.02  # metres by which a limb must be lower than another, for the body to stand on it, that stands e times less
 FAST = 0.6  # metres a second from which a foot does not slide but steps
 MEANT = 0.25  # how much a foot is to stand, so that it may step rather than slide
 STEP = 0.06  # metres above the floor to which a step lifts it
@@ -133,7 +133,7 @@ def _sunk(low: Floats, stands: Floats) -> Floats:
     """
     still = np.concatenate([stands[:1], 0.5 * (stands[1:] + stands[:-1]), stands[-1:]])
     above = low - low.min(axis=1, keepdims=True)
-    weights = still**BEARS * np.exp(-above / UNDER)
+    weights = np.maximum(still, 1e-3) ** BEARS * np.exp(-above / UNDER)
     return np.asarray(np.sum(weights * np.where(weights > 0.0, above, 0.0), axis=1) / weights.sum(axis=1))
 
 
