@@ -83,7 +83,7 @@ def test_feet_that_are_to_slide_are_let_slide() -> None:
 
 
 def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
-    """One knee straightens, so that its foot would be 6 cm in the floor: the body stays on the other, and the leg bends."""
+    """One knee straightens until its foot would be in the floor: the body stays on the other, and that leg bends."""
     skeleton, still = human23(), sway(size=0.0)
     q, root = still[0].copy(), still[1].copy()
     knee = skeleton.index("left_knee")
