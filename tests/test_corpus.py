@@ -140,7 +140,21 @@ def test_a_corpus_keeps_what_its_postures_leave_out(fps: float, rate: float) -> 
     assert np.abs(again.root - clip.at(again.times).root).max() < 1e-6  # it goes evenly
 
 
-def test_detail_is_of_what_is_recorded_so_finely() -> None:
+def test_a_joint_that_jumps_between_two_postures_has_no_detail_there() -> None:
+    clip = shaking(361, 60.0)
+    rotations = clip.rotations.copy()
+    rotations[100:104, ELBOW] = rot.mul(rotations[100:104, ELBOW], rot.from_axis_angle([0.0, 1.0, 0.0], 1.0))
+    corpus, clean = (
+        gather("arms", [one], rate=5.0, flips="keep") for one in (replace(clip, rotations=rotations), clip)
+    )
+    assert not np.any(corpus.detail[8, :, ELBOW])  # from 96 to 108, of 12 frames a posture
+    for changed in (corpus, clean):
+        changed.detail.setflags(write=True)
+        changed.detail[8, :, ELBOW] = 0.0
+    np.testing.assert_array_equal(corpus.detail, clean.detail)
+
+
+def test_nothing_is_kept_of_coarse_recordings_nor_where_every_frame_is_a_posture() -> None:
     for clip, rate in ((shaking(60, 10.0), 5.0), (shaking(300, 50.0), None), (shaking(300, 50.0), 30.0)):
         corpus = gather("arms", [clip], rate=rate)
         assert not np.any(corpus.detail)

@@ -27,11 +27,12 @@ from motionmind.realise.feet import (
 )
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import lowest, stand
-from motionmind.realise.ways import limbs_of
+from motionmind.realise.ways import limbs_of, parts_of
 from motionmind.skeleton import Skeleton, human23, human44
 
 Array = NDArray[np.float64]
 LEGS = list(range(1, 9))
+TIGHT = np.zeros(23, dtype=np.bool_)  # no joint is loose
 
 
 def sway(seconds: float = 1.2, size: float = 0.12, travel: float = 0.0, fps: float = 30.0) -> tuple[Array, Array]:
@@ -45,14 +46,14 @@ def sway(seconds: float = 1.2, size: float = 0.12, travel: float = 0.0, fps: flo
         for joint, bend in (("hip", -0.45), ("knee", 0.8), ("ankle", -0.35)):
             index = skeleton.index(f"{side}_{joint}")
             q[:, index] = rot.from_axis_angle([1.0, 0.0, 0.0], bend + sizes[index, 0] * np.sin(4.0 * t + index))
-    q = within_limits(skeleton, q)
+    q = within_limits(skeleton, q, q[[0, -1]], TIGHT)
     root = np.stack([0.0 * t, 0.0 * t, travel * t / seconds], axis=1)
     return q, stand(skeleton, q, root, np.zeros(len(t)))
 
 
 def planted(q: Array, root: Array, fps: float = 30.0, given: Sequence[float] = ()) -> tuple[Array, Array]:
     zero = np.zeros(len(q))
-    return plant(human23(), q, root, zero, zero, stands(q), fps, np.array(given or [0.0, len(q) - 1.0]))
+    return plant(human23(), q, root, zero, zero, stands(q), TIGHT, fps, np.array(given or [0.0, len(q) - 1.0]))
 
 
 def stands(q: Array, skeleton: Skeleton | None = None) -> Array:
@@ -76,7 +77,7 @@ def test_feet_slide_much_less_and_all_but_legs_and_root_stay() -> None:
 def test_feet_that_are_to_slide_are_let_slide() -> None:
     q, root = sway(size=0.05)
     zero = np.zeros(len(q))
-    found, went = plant(human23(), q, root, zero, zero, 0.0 * stands(q), 30.0, np.array([0.0, len(q) - 1.0]))
+    found, went = plant(human23(), q, root, zero, zero, 0.0 * stands(q), TIGHT, 30.0, np.array([0.0, len(q) - 1.0]))
     before, after = (human23().positions(*one)[:, LEGS][..., [0, 2]] for one in ((q, root), (found, went)))
     assert np.abs(after - before).max() < 0.003  # what a knee yields where one foot is lower
     assert foot_slide(human23(), found, went) == pytest.approx(foot_slide(human23(), q, root), rel=0.1)
@@ -93,7 +94,7 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     assert np.ptp(root[:, 1]) > 0.01
     standing = stands(q)
     standing[:, [number for number, leg in enumerate(limbs_of(skeleton)) if knee in leg]] = 0.2
-    found, went = plant(skeleton, q, root, *np.zeros((2, len(q))), standing, 30.0, np.array([0.0, len(q) - 1.0]))
+    found, went = plant(skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, 30.0, np.array([0.0, len(q) - 1.0]))
     assert np.ptp(went[:, 1]) < 0.2 * np.ptp(root[:, 1])
     np.testing.assert_allclose(lowest(skeleton, found, went), 0.0, atol=1e-9)
 
@@ -115,7 +116,7 @@ def test_the_floor_and_the_limits_hold_and_the_height_stays() -> None:
         q, root = sway(size=0.3, travel=travel)
         found, went = planted(q, root)
         np.testing.assert_allclose(lowest(human23(), found, went), 0.0, atol=1e-9)
-        assert rot.angle(within_limits(human23(), found), found).max() < 1e-9
+        assert rot.angle(within_limits(human23(), found, found[[0, -1]], TIGHT), found).max() < 1e-9
 
 
 def test_knees_keep_to_their_side_and_feet_to_their_orientations() -> None:
@@ -124,7 +125,7 @@ def test_knees_keep_to_their_side_and_feet_to_their_orientations() -> None:
     knees = body("human23").degrees(found)[:, [2, 6], 0]
     assert knees.min() > 5.0
     turned = [human23().global_rotations(rotations)[:, [3, 4, 7, 8]] for rotations in (q, found)]
-    inside = rot.angle(within_limits(human23(), found), found).max(axis=1) < 1e-12
+    inside = rot.angle(within_limits(human23(), found, found[[0, -1]], TIGHT), found).max(axis=1) < 1e-12
     assert rot.angle(*turned)[inside].max() < np.radians(3.0)
 
 
@@ -200,10 +201,26 @@ def test_legs_are_found_by_their_long_bones() -> None:
         assert [leg[0] for leg, _ in legs] == ["left_hip", "right_hip"]
 
 
+def test_legs_hang_where_the_body_forks_first() -> None:
+    """A rig's own root above the pelvis changes nothing; a chain that does not fork is no leg."""
+    body = human23()
+    rig = Skeleton(
+        "rig",
+        ("root", *body.names),
+        (-1, 0, *(p + 1 for p in body.parents[1:])),
+        np.concatenate([[[0.0] * 3], body.offsets]),
+        np.concatenate([[[0.0] * 3], body.tips]),
+    )
+    assert [[joint - 1 for joint in leg] for leg, _ in _legs(rig)[1]] == [leg for leg, _ in _legs(body)[1]]
+    assert parts_of(rig)[1].tolist() == [0, *(parts_of(body)[1] + 1)]
+    chain = Skeleton("chain", ("a", "b", "c"), (-1, 0, 1), np.array([[0.0] * 3, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]))
+    assert _legs(chain)[1] == []
+
+
 def test_a_body_without_legs_stays_as_it_is() -> None:
     rod = Skeleton("rod", ("a", "b"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     q, root = np.tile(rot.IDENTITY, (5, 2, 1)), np.arange(15.0).reshape(5, 3)
-    found, went = plant(rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), 30.0, np.array([0.0, 4.0]))
+    found, went = plant(rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), TIGHT[:2], 30.0, np.array([0.0, 4.0]))
     np.testing.assert_array_equal(found, q)
     np.testing.assert_array_equal(went, root)
 
@@ -221,7 +238,7 @@ def test_a_track_is_the_least_squares_solution(frames: int, fps: float) -> None:
     free = 1.0 - hold.max(axis=1) ** 2
     back = np.sqrt(np.convolve(free, [0.5, 0.5])) * BACK / fps
     rows = [hold[:, :1] * first, hold[:, 1:] * first, np.sqrt(EVEN) * first, np.diag(back)]
-    rows.append(SMOOTH * fps * second)
+    rows += [SMOOTH * fps * second, SMOOTH * fps * np.eye(frames)[[1, -2]]]  # it rests before and after
     right = [-hold[:, :1] * moves[:, 0], -hold[:, 1:] * moves[:, 1]]
     system = np.concatenate(rows)[:, 1:-1]
     right.append(np.zeros((len(system) - 2 * (frames - 1), 2)))

@@ -17,7 +17,7 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.motion import Motion, Posture
 from motionmind.notation.body_file import body
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
-from motionmind.realise.limits import within_limits
+from motionmind.realise.limits import find_loose, within_limits
 from motionmind.realise.realise import _headings, realise
 from motionmind.realise.root import SLIDES, Carriage, carry, learn_carriage, lowest, stand
 from motionmind.realise.timing import durations
@@ -253,12 +253,26 @@ def test_joints_are_brought_to_their_limits_and_no_further() -> None:
     q = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (3, 1, 1))
     bent = anatomy.rotations({"left_knee": np.array([[170.0, 0.0, 0.0]]), "right_hip": np.array([[0.0, 100.0, 0.0]])})
     q[1] = bent[0]
-    limited = anatomy.degrees(within_limits(human23(), q))[1]
+    tight = np.zeros(23, dtype=np.bool_)
+    limited = anatomy.degrees(within_limits(human23(), q, q[[0, 2]], tight))[1]
     assert limited[human23().index("left_knee"), 0] == pytest.approx(150.0)
     assert limited[human23().index("right_hip"), 1] == pytest.approx(80.0)
-    np.testing.assert_array_equal(within_limits(human23(), q)[[0, 2]], q[[0, 2]])
+    np.testing.assert_array_equal(within_limits(human23(), q, q[[0, 2]], tight)[[0, 2]], q[[0, 2]])
+    loose = np.arange(23) == human23().index("left_knee")
+    spared = within_limits(human23(), q, q[[0, 2]], loose)
+    np.testing.assert_array_equal(spared[:, loose], q[:, loose])
+    assert anatomy.degrees(spared)[1, human23().index("right_hip"), 1] == pytest.approx(80.0)
     q[2] = q[1]  # what is given is not changed, nor what goes no further
-    np.testing.assert_array_equal(within_limits(human23(), q), q)
+    np.testing.assert_array_equal(within_limits(human23(), q, q[1:], tight), q)
+
+
+def test_joints_that_a_corpus_itself_has_beyond_their_limits_are_loose() -> None:
+    anatomy, knee = body("human23"), human23().index("left_knee")
+    straight = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (200, 1, 1))
+    for degrees, count, loose in ((154.0, 200, False), (156.0, 2, False), (156.0, 3, True), (170.0, 200, True)):
+        q = straight.copy()
+        q[:count, knee] = anatomy.rotations({"left_knee": np.array([[degrees, 0.0, 0.0]])})[0, knee]
+        assert find_loose(human23(), q).tolist() == [joint == knee and loose for joint in range(23)]
 
 
 # --- detail -----------------------------------------------------------------------------------------------------------
@@ -427,6 +441,14 @@ def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned)
     for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
         found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
         assert lowest(human23(), found.rotations, found.root).min() > -1e-3
+
+
+def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
+    """Both ends are 30 cm higher than the corpus knows bodies to be."""
+    motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
+    a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
+    found = realised(walking, rows, a, b)
+    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), 0.3, atol=0.01)
 
 
 def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:

@@ -99,6 +99,8 @@ def tween(
         [place for group in places for place in group], [a, b, *(path for path, _ in passing(options["via"]))]
     )
     options = asked(options)
+    if alternatives and options["follow"] is None:
+        options["follow"] = True  # as the mean of the ways all would be alike
     engine = Engine.load(corpus, home)
     ends = read_posture(a), read_posture(b)
     if not is_compiled("search"):

@@ -24,6 +24,7 @@ FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
 FINE = 30.0  # moments a second at which it is kept what lies between postures
+FAULT_DEGREES = 30.0  # a joint that is so far off between two postures was not recorded well
 _COARSE = 20.0  # frames a second; a recording of fewer has nothing to keep
 
 
@@ -218,14 +219,17 @@ class _Piece(NamedTuple):
 
 
 def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
-    """What postures leave out of a recording, as a corpus keeps it [N, between, J, 3]; none of the last posture."""
+    """What postures leave out of a recording, as a corpus keeps it [N, between, J, 3]; none of the last posture, nor of
+    a joint in a move in which it jumps."""
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
     if between > 0 and count > 1 and recording.fps >= _COARSE:
         times = moments(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
-        out[:-1] = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
+        detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
+        faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(FAULT_DEGREES)
+        out[:-1] = np.where(faulty[:, None, :, None], 0.0, detail)
     return out
 
 

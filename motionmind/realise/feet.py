@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.realise.limits import within_limits
 from motionmind.realise.root import BEARS, lows, stand
-from motionmind.realise.ways import limbs_of
+from motionmind.realise.ways import fork_of, limbs_of
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,7 @@ UNDER = 0.02  # metres by which a limb must be lower than another, for the body 
 FAST = 0.6  # metres a second from which a foot does not slide but steps
 MEANT = 0.25  # how much a foot is to stand, so that it may step rather than slide
 STEP = 0.06  # metres above the floor to which a step lifts it
-RISE = 0.15  # seconds of lifting
+RISE = 0.2  # seconds of lifting
 STANDS = 0.055  # metres above the floor below which another foot stands, so that this one may step
 SOFT = 0.02  # of a leg's length: so near to its full length it is not stretched as far as it would have to be
 HINGE = 0.1  # sine of a knee's bend below which its axis is rather the one that it has at other times
@@ -44,14 +44,16 @@ def plant(
     heights: Floats,
     clearance: Floats,
     stands: Floats,
+    loose: NDArray[np.bool_],
     fps: float,
     given: Floats,
 ) -> tuple[Floats, Floats]:
     """The same movement with feet that stay where they stand: local rotations [N, J, 4], positions of the root [N, 3].
 
-    Only the root and the legs differ. A leg is a limb of two bones or more that hangs from the root; its joints are
-    brought within their limits at last, and then its foot may be a little off its track, but not in the floor. The body
-    stands on what stands: where a foot that does not is lower, its leg bends, and the body is not lifted onto it.
+    Only the root and the legs differ. A leg is a limb of two bones or more that hangs from the root, or from the first
+    fork below it; its joints are brought within their limits at last, and then its foot may be a little off its track,
+    but not in the floor. The body stands on what stands: where a foot that does not is lower, its leg bends, and the
+    body is not lifted onto it.
 
     Args:
         skeleton: the body.
@@ -61,6 +63,7 @@ def plant(
         clearance: how far it is above the floor [N], metres.
         stands: how much each limb, and last the trunk, is to stand where it is low from each frame to the next
             [N - 1, limbs + 1], 0 to 1.
+        loose: joints without limits [J].
         fps: frames a second.
         given: when postures were given that are to stay as they are, in frames, whole or not, from the first frame to
             the last [G]. The frames next to them stay too.
@@ -79,7 +82,7 @@ def plant(
             root[part, 1] -= sink
             under = np.maximum(heights[part, None] - (low[part][:, numbers] - sink[:, None]), 0.0)
             stretch = rotations[part], root[part], floor[part], under, stands[part.start : part.stop - 1, numbers]
-            rotations[part], root[part] = _planted(skeleton, legs, *stretch, fps)
+            rotations[part], root[part] = _planted(skeleton, legs, *stretch, loose, fps)
     return rotations, stand(skeleton, rotations, root, heights)
 
 
@@ -91,6 +94,7 @@ def _planted(
     floor: Floats,
     under: Floats,
     stands: Floats,
+    loose: NDArray[np.bool_],
     fps: float,
 ) -> tuple[Floats, Floats]:
     """The same movement, three frames or more, between two that stay; legs are lifted by so much that they are `under`
@@ -121,7 +125,7 @@ def _planted(
             planted[:, end] = rot.inv_mul(shank, turned[:, end])
     joints = [joint for leg, _ in legs for joint in leg]
     out = rotations.copy()
-    out[1:-1, joints] = within_limits(skeleton, planted)[1:-1, joints]
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
     return out, root + moved
 
 
@@ -156,11 +160,11 @@ def _along(legs: Floats, off: Floats) -> Floats:
 def _legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
     """Which limbs are legs; the joints of each from the root down, and which of them is its knee: the one between its
     two long bones."""
-    numbers, out = [], []
+    numbers, out, above = [], [], fork_of(skeleton)[-1]
     for number, limb in enumerate(limbs_of(skeleton)):
         bones = np.linalg.norm([*skeleton.offsets[limb[1:]], skeleton.tips[limb[-1]]], axis=-1)
         pairs = np.minimum(bones[:-1], bones[1:])
-        if skeleton.parents[limb[0]] == 0 and len(limb) > 1 and pairs.max() > 0.0:
+        if skeleton.parents[limb[0]] == above and len(limb) > 1 and pairs.max() > 0.0:
             numbers.append(number)
             out.append((limb, int(np.argmax(pairs)) + 1))
     return numbers, out
@@ -219,11 +223,10 @@ def _track(moves: Floats, heights: Floats, stands: Floats, fps: float) -> Floats
     back = 0.5 * (free[:-1] + free[1:]) * (BACK / fps) ** 2
     bend = (SMOOTH * fps) ** 2
     out = np.zeros((len(moves) + 1, 2))
-    # Rows are of the frames but the first and the last, where d = 0; a second difference reaches over three frames.
+    # Rows are of the frames but the first and the last, where d = 0, as before and after; a second difference reaches
+    # over three frames.
     diagonals = np.zeros((3, len(out) - 2))
-    diagonals[2] = pull[:-1] + pull[1:] + back + 4.0 * bend
-    diagonals[2, :-1] += bend
-    diagonals[2, 1:] += bend
+    diagonals[2] = pull[:-1] + pull[1:] + back + 6.0 * bend
     diagonals[1, 1:] = -pull[1:-1] - 4.0 * bend
     diagonals[0, 2:] = bend
     pulled = np.einsum("np,npk->nk", hold, moves)

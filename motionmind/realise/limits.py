@@ -10,22 +10,27 @@ from motionmind.notation.body_file import body
 from motionmind.skeleton import BODIES, Skeleton
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+BEYOND = 5.0  # degrees
+RARE = 0.01
 
 
-def within_limits(skeleton: Skeleton, rotations: Floats) -> Floats:
+def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools) -> Floats:
     """The same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
 
-    Limits are those of the anatomy of human23 or human44, widened to what the first and the last posture have, which
-    were given. Angles are clipped one by one, as swing and twist; a body of another kind is left as it is.
+    Limits are those of the anatomy of human23 or human44, widened to what the postures have that were given
+    [G, J, 4]; `loose` joints [J] have none. Angles are clipped one by one, as swing and twist; a body of another kind
+    is left as it is.
     """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
     degrees = anatomy.degrees(rotations)
     least, most = _limits(anatomy)
-    ends = degrees[[0, -1]]
-    clipped = np.clip(degrees, np.minimum(least, ends.min(axis=0)), np.maximum(most, ends.max(axis=0)))
-    beyond = np.any(clipped != degrees, axis=-1)
+    shown = anatomy.degrees(given)
+    clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
+    beyond = np.any(clipped != degrees, axis=-1) & ~loose
     frames = np.flatnonzero(beyond.any(axis=1))
     if len(frames) == 0:
         return rotations
@@ -33,6 +38,18 @@ def within_limits(skeleton: Skeleton, rotations: Floats) -> Floats:
     out = rotations.copy()
     out[frames] = np.where(beyond[frames, :, None], anatomy.rotations(named), rotations[frames])
     return out
+
+
+def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
+    """Joints [J] that a corpus's own postures [N, J, 4] have beyond their limits by more than BEYOND, in more than RARE
+    of them: what is brought onto a body from another rig need not bend as its anatomy does."""
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None:
+        return np.zeros(len(skeleton), dtype=np.bool_)
+    degrees = anatomy.degrees(rotations)
+    least, most = _limits(anatomy)
+    beyond = np.any((degrees < least - BEYOND) | (degrees > most + BEYOND), axis=-1)
+    return np.asarray(beyond.mean(axis=0) > RARE)
 
 
 def anatomy_of(skeleton: Skeleton) -> Body | None:

@@ -51,7 +51,7 @@ def realise(
     Feet that stand carry the body; where none does it travels as the corpus's bodies do, and it ends where `b` stands.
     What one root cannot hold the legs do (`motionmind.realise.feet`), but not with `within`, which says where they go.
     Its height keeps the lowest point as far above the floor as the corpus's postures have it; the floor is at 0, or
-    lower under ends that are.
+    lower under ends that are, or higher under ends that the corpus knows no such height of.
 
     Args:
         path: states of the lanes.
@@ -109,20 +109,26 @@ def realise(
         detailed = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], poses[::2])
         detail = natural_spline(moments(halves[::2], between), detail_of(corpus, detailed), times)
         rotations = rot.mul(rotations, rot.exp(detail))
-    rotations = within_limits(a.skeleton, rot.normalise(rotations))
+    given = np.stack([posture.rotations for posture in postures.values()])
+    if within is not None:
+        states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
+        given = np.concatenate([given, corpus.from_lanes(states)])
+    rotations = within_limits(a.skeleton, rot.normalise(rotations), given, carriage.loose)
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
+    size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
     rotations, root = _on_feet(
         a.skeleton,
         rotations,
         times,
         halves,
-        stance @ carriage.clearance,
+        size * (stance @ carriage.clearance),
         stance @ carriage.stands,
+        carriage.loose,
         dict(zip(stops, low, strict=True)),
-        _drift(steps @ carriage.travel, headings),
+        size * _drift(steps @ carriage.travel, headings),
         (a.root, b.root),
         planted=within is None,
     )
@@ -149,6 +155,7 @@ def _on_feet(
     halves: Floats,
     heights: Floats,
     stands: Floats,
+    loose: NDArray[np.bool_],
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
@@ -163,14 +170,17 @@ def _on_feet(
         halves: of the steps [2 T + 1].
         heights: of the lowest point above the floor at the steps [2 T + 1], metres.
         stands: how much each limb, and last the trunk, stands where it is low, at the steps [2 T + 1, limbs + 1].
+        loose: joints without limits [J].
         low: the same as `heights` above 0 at those moves where postures are given; the first and the last among them.
         drift: how far the root goes in each step as the corpus's bodies travel [2 T, 3].
         ends: the first and the last position of the root [3].
         planted: whether the legs may move, so that feet stay.
     """
     given = 2 * np.array(list(low))
-    # Where the ends are below 0 so is their floor: a recording's own zero is often off.
-    floor = np.interp(halves, halves[[0, -1]], np.minimum([low[0], low[given[-1] // 2]], 0.0))
+    # A recording's own zero is often off: where the ends are lower so is their floor, and where they are higher than
+    # bodies that stand so are in the corpus.
+    ends_low = np.array([low[0], low[given[-1] // 2]])
+    floor = np.interp(halves, halves[[0, -1]], np.maximum(np.minimum(ends_low, 0.0), ends_low - heights[[0, -1]]))
     heights = heights + floor
     heights[given] = list(low.values())
     heights = _eased(halves, heights, times)
@@ -182,7 +192,7 @@ def _on_feet(
     root = stand(skeleton, rotations, root, heights)
     if planted:
         fps = 1.0 / (times[1] - times[0])
-        rotations, root = plant(skeleton, rotations, root, heights, clear, held, fps, fps * halves[given])
+        rotations, root = plant(skeleton, rotations, root, heights, clear, held, loose, fps, fps * halves[given])
     root[0], root[-1] = ends
     return rotations, root
 

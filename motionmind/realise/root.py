@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
 from motionmind.notation.anatomy import SIDES
-from motionmind.realise.limits import anatomy_of
+from motionmind.realise.limits import anatomy_of, find_loose
 from motionmind.realise.ways import kinds_of, limb_of_points, limbs_of
 from motionmind.skeleton import Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
@@ -42,6 +43,7 @@ class Carriage:
             lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
         stands: how still the lowest point of each limb, and last of the trunk, is [N, limbs + 1]: 1 where it does not
             move level, 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
+        loose: which joints do not keep to their limits in the corpus [J].
     """
 
     orientations: Floats
@@ -54,6 +56,7 @@ class Carriage:
     travel: Floats
     clearance: Floats
     stands: Floats
+    loose: Bools
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
@@ -80,6 +83,7 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         0.5 * moved,
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
         _stands(corpus),
+        find_loose(corpus.skeleton, corpus.rotations),
     )
 
 

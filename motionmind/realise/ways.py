@@ -31,6 +31,14 @@ STRAIGHT_ON = 0.7  # share of steps after which a walk goes straight on as its c
 ANYWHERE = 0.003  # share after which it goes on from any posture, so that some walk joins any two
 
 
+def fork_of(skeleton: Skeleton) -> list[int]:
+    """The joints from the root to the first fork, where a rig's own root or two may lie above the pelvis."""
+    out = [0]
+    while len(children := skeleton.children(out[-1])) == 1:
+        out += children
+    return out
+
+
 def limbs_of(skeleton: Skeleton) -> list[list[int]]:
     """The joints of each limb, outward: a leaf and what leads to it from the last fork, as a leg, an arm, neck and
     head."""
@@ -56,11 +64,11 @@ def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
     """The joints of parts of a body, each joint in one of each size: the whole; what carries it, and what is carried
     (if anything is); the trunk, which is what is left, and the limbs.
 
-    What carries the body is its root and the limbs that hang from it: pelvis and legs.
+    What carries the body is its root, down to the first fork, and the limbs that hang there: pelvis and legs.
     """
-    chains = limbs_of(skeleton)
+    chains, above = limbs_of(skeleton), fork_of(skeleton)
     every = list(range(len(skeleton)))
-    carrying = [0, *(joint for chain in chains if skeleton.parents[chain[0]] == 0 for joint in chain)]
+    carrying = [*above, *(joint for chain in chains if skeleton.parents[chain[0]] == above[-1] for joint in chain)]
     carried = [joint for joint in every if joint not in carrying]
     trunk = [joint for joint in every if not any(joint in chain for chain in chains)]
     found = (every, carrying, carried, trunk, *chains)
