@@ -26,9 +26,8 @@ def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: B
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
-    degrees = anatomy.degrees(rotations)
+    degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given])), [len(rotations)])
     least, most = _limits(anatomy)
-    shown = anatomy.degrees(given)
     clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
     beyond = np.any(clipped != degrees, axis=-1) & ~loose
     frames = np.flatnonzero(beyond.any(axis=1))
