@@ -59,11 +59,10 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
                 real.root[0] + share * (real.root[-1] - real.root[0]),
             ),
         }
-        for scheme in SCHEMES:
-            tween = found.tween(
-                real.posture(0), real.posture(-1), duration=SECONDS, coordination=scheme, node_budget=BUDGET, fps=FPS
-            )
-            made[scheme] = tween.motion.rotations, tween.motion.root
+        asked = {"duration": SECONDS, "node_budget": BUDGET, "fps": FPS}
+        for kind, more in (*((scheme, {"coordination": scheme, "follow": True}) for scheme in SCHEMES), ("mean", {})):
+            motion = found.tween(real.posture(0), real.posture(-1), **asked, **more).motion
+            made[kind] = motion.rotations, motion.root
         for kind, (rotations, root) in made.items():
             legs, others = collides(piece.skeleton, rotations, root)
             turned = [piece.skeleton.global_rotations(q[1:-1]) for q in (real.rotations, rotations)]
@@ -158,14 +157,20 @@ MEASURES = {
     "l2q": ("L2Q", "{:.3f}"),
 }
 BOOTSTRAPS = 2000
-COMPARED = (("posture", "none"), ("progression", "none"), ("progression", "posture"), ("posture", "slerp"))
+COMPARED = (
+    ("posture", "none"),
+    ("progression", "none"),
+    ("progression", "posture"),
+    ("posture", "slerp"),
+    ("mean", "posture"),
+)
 
 
 def chart(rows: list[Row]) -> str:
     panels = []
     for key, (title, _) in MEASURES.items():
         panel = Panel(title, "a dot a sequence, at the right their mean", "", joined=False, numbered=False)
-        for place, kind in enumerate(("danced", "slerp", *SCHEMES)):
+        for place, kind in enumerate(("danced", "slerp", *SCHEMES, "mean")):
             by_sequence = _by_sequence(rows, kind, key)
             found = [(place + 0.3 * n / len(by_sequence), _mean(v)) for n, v in enumerate(by_sequence.values())]
             panel.series[kind] = [*found, (place + 0.5, _mean([v for values in by_sequence.values() for v in values]))]
