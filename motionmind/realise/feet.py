@@ -30,7 +30,7 @@ UNDER = 0.02  # metres by which a limb must be lower than another, for the body 
 FAST = 0.6  # metres a second from which a foot does not slide but steps
 MEANT = 0.25  # how much a foot is to stand, so that it may step rather than slide
 STEP = 0.06  # metres above the floor to which a step lifts it
-RISE = 0.2  # seconds of lifting
+RISE = 0.3  # seconds of lifting
 STANDS = 0.055  # metres above the floor below which another foot stands, so that this one may step
 SOFT = 0.02  # of a leg's length: so near to its full length it is not stretched as far as it would have to be
 HINGE = 0.1  # sine of a knee's bend below which its axis is rather the one that it has at other times
@@ -79,6 +79,7 @@ def plant(
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
         if part.stop - part.start > 2:
             sink = np.maximum(sunk[part] - np.linspace(sunk[part][0], sunk[part][-1], len(sunk[part])), 0.0)
+            sink *= _edges(len(sink), fps)
             root[part, 1] -= sink
             under = np.maximum(heights[part, None] - (low[part][:, numbers] - sink[:, None]), 0.0)
             stretch = rotations[part], root[part], floor[part], under, stands[part.start : part.stop - 1, numbers]
@@ -240,10 +241,14 @@ def _envelope(need: Floats, fps: float) -> Floats:
     window = np.hanning(2 * rise + 3)[1:-1]
     # The mean over a window of what is the greatest in the window around each frame: none of these is less than need.
     around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * rise), 2 * rise + 1).max(axis=1)
-    frames = np.arange(len(need))
-    edge = np.minimum(np.minimum(frames, frames[::-1]) / rise, 1.0)
-    smooth = np.convolve(around, window / window.sum(), "valid")
-    return np.asarray(smooth * edge * edge * (3.0 - 2.0 * edge))
+    return np.asarray(np.convolve(around, window / window.sum(), "valid") * _edges(len(need), fps))
+
+
+def _edges(count: int, fps: float) -> Floats:
+    """A curve [count] that rises smoothly from 0 to 1 in RISE, and falls to 0 as long before the end."""
+    frames = np.arange(count)
+    share = np.minimum(np.minimum(frames, frames[::-1]) / max(1, round(RISE * fps)), 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 def _reach(hip: Floats, leg: Floats, target: Floats) -> tuple[Floats, Floats]:
