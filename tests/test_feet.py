@@ -95,7 +95,7 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     standing = stands(q)
     standing[:, [number for number, leg in enumerate(limbs_of(skeleton)) if knee in leg]] = 0.2
     found, went = plant(skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, 30.0, np.array([0.0, len(q) - 1.0]))
-    assert abs(went[18, 1] - went[0, 1]) < 0.03 * abs(root[18, 1] - root[0, 1])
+    assert abs(went[18, 1] - went[0, 1]) < 0.1 * abs(root[18, 1] - root[0, 1])
     assert np.ptp(went[:, 1]) < 0.3 * np.ptp(root[:, 1])  # near the ends it begins to
     np.testing.assert_allclose(lowest(skeleton, found, went), 0.0, atol=1e-9)
 
