@@ -58,8 +58,8 @@ def plant(
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
-        heights: of the body's lowest point at each frame [N], metres, before and after.
+        root: positions of the root [N, 3], metres, of any height.
+        heights: of the body's lowest point at each frame [N], metres, as it is to be.
         clearance: how far it is above the floor [N], metres.
         stands: how much each limb, and last the trunk, is to stand where it is low from each frame to the next
             [N - 1, limbs + 1], 0 to 1.
@@ -70,9 +70,12 @@ def plant(
     """
     numbers, legs = _legs(skeleton)
     if not legs:
-        return rotations, root
+        return rotations, stand(skeleton, rotations, root, heights)
     rotations, root, floor = rotations.copy(), root.copy(), heights - clearance
     low = lows(skeleton, rotations, root)
+    lift = heights - low.min(axis=1)
+    root[:, 1] += lift
+    low += lift[:, None]
     sunk = _sunk(low, stands)
     for start, end in pairwise(given):
         # Rounded, so that a posture that falls on a frame does.

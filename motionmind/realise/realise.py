@@ -118,7 +118,7 @@ def realise(
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
-    low = [float(lowest(a.skeleton, posture.rotations, posture.root)) for posture in postures.values()]
+    low = lowest(a.skeleton, given[: len(postures)], np.stack([posture.root for posture in postures.values()])).tolist()
     rotations, root = _on_feet(
         a.skeleton,
         rotations,
@@ -189,10 +189,11 @@ def _on_feet(
     middles = 0.5 * (times[1:] + times[:-1])
     held = np.stack([np.interp(middles, halves, limb) for limb in stands.T], axis=1)
     root = carry(skeleton, rotations, clear, held, np.diff(natural_spline(halves, places, times), axis=0), *ends)
-    root = stand(skeleton, rotations, root, heights)
     if planted:
         fps = 1.0 / (times[1] - times[0])
         rotations, root = plant(skeleton, rotations, root, heights, clear, held, loose, fps, fps * halves[given])
+    else:
+        root = stand(skeleton, rotations, root, heights)
     root[0], root[-1] = ends
     return rotations, root
 
@@ -220,6 +221,7 @@ def _mean_way(
         share = ((halves[here] - halves[2 * start]) / (halves[2 * end] - halves[2 * start]))[:, None]
         straight = rot.slerp(ends[:1], ends[1:], share)
         ways: dict[int, Floats] = {}
+        sums: dict[tuple[int, ...], Floats] = {}
         for number, part in enumerate(parts):
             shown = np.ascontiguousarray(carriage.orientations[:, part])
             near = np.ones((len(share), known))
@@ -234,7 +236,9 @@ def _mean_way(
                     continue
                 about = np.ascontiguousarray(straight[:, some])
                 shown = np.ascontiguousarray(carriage.orientations[:, some])
-                mean = mean_rotations(np.mean([ways[n] for n in numbers], axis=0), shown, about)
+                if numbers[:-1] not in sums:
+                    sums[numbers[:-1]] = np.sum([ways[n] for n in numbers[:-1]], axis=0)
+                mean = mean_rotations((sums[numbers[:-1]] + ways[number]) / len(numbers), shown, about)
                 off = rot.log(rot.inv_mul(about, mean))
                 off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
                 poses[here, some] = rot.mul(about, rot.exp(off))
