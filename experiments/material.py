@@ -8,9 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
+from motionmind._typing import Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.metrics.measure import at_rate
@@ -94,6 +94,6 @@ def posture(whole: Corpus, index: int) -> Posture:
     return Posture(whole.skeleton, whole.rotations[index], whole.root[index])
 
 
-def pairs(whole: Corpus, count: int, seed: int) -> NDArray[np.int64]:
+def pairs(whole: Corpus, count: int, seed: int) -> Ints:
     """Random pairs of a corpus's postures [count, 2]."""
     return np.random.default_rng(seed).integers(len(whole), size=(count, 2))

@@ -14,9 +14,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from motionmind.body.human import human23, human44
+    from motionmind.body.motion import Insertion, Motion, Posture
+    from motionmind.body.skeleton import Skeleton
     from motionmind.chaos.flows import Flow, flow_of
     from motionmind.discretize import make as make_discretization
-    from motionmind.engine import Engine
     from motionmind.errors import (
         CorpusError,
         FormatError,
@@ -26,14 +28,13 @@ if TYPE_CHECKING:
         SkeletonError,
     )
     from motionmind.formats import read_motion, read_posture, write_motion, write_posture
-    from motionmind.learned import own_skeleton
-    from motionmind.motion import Insertion, Motion, Posture
     from motionmind.notation.compose import compose
     from motionmind.render.pictures import write_picture
     from motionmind.render.sheet import contact_sheet
-    from motionmind.retarget import to_human23
-    from motionmind.skeleton import Skeleton, human23, human44
-    from motionmind.tween import Bridge, Source, Tween, Wait
+    from motionmind.retarget.retarget import own_skeleton, to_human23
+    from motionmind.tween.certificate import Bridge, Source, Wait
+    from motionmind.tween.engine import Engine
+    from motionmind.tween.result import Tween
     from motionmind.variation.piece import Piece
     from motionmind.variation.review import Seam
     from motionmind.variation.variation import Variation, vary
@@ -92,14 +93,14 @@ _HOMES = {
         "SkeletonError",
     ),
     "formats": ("read_motion", "read_posture", "write_motion", "write_posture"),
-    "learned": ("own_skeleton",),
+    "_learned": ("own_skeleton",),
     "motion": ("Insertion", "Motion", "Posture"),
     "notation.compose": ("compose",),
     "render.pictures": ("write_picture",),
     "render.sheet": ("contact_sheet",),
-    "retarget": ("to_human23",),
+    "_retarget": ("to_human23",),
     "skeleton": ("Skeleton", "human23", "human44"),
-    "tween": ("Bridge", "Source", "Tween", "Wait"),
+    "_tween": ("Bridge", "Source", "Tween", "Wait"),
     "variation.piece": ("Piece",),
     "variation.review": ("Seam",),
     "variation.variation": ("Variation", "vary"),

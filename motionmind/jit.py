@@ -21,7 +21,7 @@ config: Any = numba.config
 def jit(function: _F) -> _F:
     """Compile `function` to machine code on its first call; arithmetic as written, so the same bytes every time.
 
-    It may call other compiled functions of its own folder, and runs beside other threads.
+    It may call other compiled functions of its own folder and of `geometry`, and runs beside other threads.
     """
     theirs = config.CACHE_DIR  # read when a function is decorated; nobody else's functions are to move
     config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent)
@@ -62,7 +62,7 @@ def is_compiled(package: str) -> bool:
 
 @cache
 def _folder(source: Path) -> str:
-    """Where compiled code is kept: a folder named after the state of all sources in the folder `source`.
+    """Where compiled code is kept: a folder named after the state of all sources in the folder `source`, and in `geometry`.
 
     numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
     go on using the old code after that file changed. It is in the user's cache directory, or where that cannot be
@@ -70,7 +70,8 @@ def _folder(source: Path) -> str:
     """
     if given := os.environ.get("NUMBA_CACHE_DIR"):
         return given
-    files = [Path(__file__), *sorted(source.glob("*.py"))]
+    here = Path(__file__)
+    files = [here, *sorted(here.parent.glob("geometry/*.py")), *sorted(source.glob("*.py"))]
     state = hashlib.sha256(repr([(str(file), file.stat().st_mtime_ns) for file in files]).encode()).hexdigest()[:16]
     own = Path(platformdirs.user_cache_dir("motionmind", appauthor=False))
     nearest = next(folder for folder in (own, *own.parents) if folder.exists())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind.skeleton import Skeleton
+from motionmind.body.skeleton import Skeleton
 
 
 def ant() -> Skeleton:

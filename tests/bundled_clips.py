@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from motionmind.motion import Motion
+from motionmind.body.motion import Motion
 from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score
 

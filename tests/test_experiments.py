@@ -110,7 +110,7 @@ def test_a_name_that_is_no_question_is_refused() -> None:
 def standing(**turns: tuple[str, float]) -> tuple[Any, Any, Any]:
     """A body that stands, ten times, with some joints turned about an axis by degrees; its rotations and root."""
     from motionmind import human23
-    from motionmind import rotations as rot
+    from motionmind.geometry import rotations as rot
 
     body = human23()
     rotations = np.tile(rot.IDENTITY, (10, len(body), 1))

@@ -6,17 +6,16 @@ products that the model's definition prints, not from the search's grid.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind.search.bound import Messages, no_messages
-from motionmind.search.problem import Grid, Model, build_grid, costs_to_go, with_waits
-from motionmind.search.solve import Rules
-
-Floats = NDArray[np.float64]
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.trellis import Grid, build_grid
+from motionmind.search.trws import Messages, no_messages
 
 
 @dataclass(frozen=True)
@@ -88,13 +87,13 @@ class Toy:
             np.concatenate([np.arange(size) for size in self.sizes]).astype(np.int32),
         )
 
-    def ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def ends(self) -> tuple[Ints, Ints]:
         return np.array(self.start, dtype=np.int64), np.array(self.goal, dtype=np.int64)
 
     def rules(self, shortest: int, longest: int, node_budget: int = 100_000, sweeps: int = 60) -> Rules:
         return Rules(self.wait, self.per_move, shortest, longest, node_budget, sweeps)
 
-    def cost(self, path: NDArray[np.int32]) -> float:
+    def cost(self, path: Int32s) -> float:
         """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule."""
         if tuple(path[0]) != self.start or tuple(path[-1]) != self.goal:
             return np.inf
@@ -106,7 +105,7 @@ class Toy:
                     total += self.coupling(lane)[after[parent], after[lane]]
         return float(total)
 
-    def joint_states(self) -> NDArray[np.int64]:
+    def joint_states(self) -> Ints:
         """All states of the whole body [product of sizes, L]."""
         return np.array(list(product(*map(range, self.sizes))))
 
@@ -226,5 +225,21 @@ def grid_of(toy: Toy, moves: int, below: float = np.inf) -> Grid:
     return build_grid(held, start, moves, costs_to_go(held, goal, moves), below)
 
 
-def _pointer(rows: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _pointer(rows: list[Ints]) -> Ints:
     return np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
+
+
+def evaluate(text: str, states: np.ndarray, lanes: list[str]) -> float:
+    """Cost of a path of states [T + 1, L] in a cost function network, by the format's own definition."""
+    network = json.loads(text)
+    chosen = {f"{name}_{t}": row[lane] for t, row in enumerate(states) for lane, name in enumerate(lanes)}
+    total = 0.0
+    for function in network["functions"].values():
+        at = [network["variables"][name].index(f"s{chosen[name]}") for name in function["scope"]]
+        costs = function["costs"]
+        if len(at) == 2:
+            listed = dict(zip(zip(costs[0::3], costs[1::3], strict=True), costs[2::3], strict=True))
+            total += listed.get(tuple(at), function["defaultcost"])
+        else:
+            total += costs[at[0] if at else 0]
+    return total

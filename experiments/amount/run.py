@@ -10,7 +10,7 @@ from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import corpus, pairs, part, posture, recorded
 from motionmind import Engine, make_discretization
-from motionmind.survey import joinable
+from motionmind.learned.summary import joinable
 
 BUDGET = 20_000
 DEGREES = 15.0

@@ -21,16 +21,15 @@ from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from motionmind import compose
+from motionmind._typing import Floats
 from motionmind.chaos.baselines import dabby, shuffled
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary, runs
 from motionmind.chaos.trajectories import largest_exponent, trajectory
 from motionmind.corpus.bundled import bundled
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 PIECES = {

@@ -15,8 +15,9 @@ from time import perf_counter
 
 import numpy as np
 
+from motionmind._typing import Floats, Ints
 from motionmind.chaos.flows import FLOWS
-from motionmind.chaos.reorder import Floats, Ints, itinerary, reorder
+from motionmind.chaos.reorder import itinerary, reorder
 from motionmind.chaos.trajectories import trajectory
 from motionmind.jit import jit
 

@@ -14,10 +14,10 @@ from time import perf_counter
 import numpy as np
 
 from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
-from motionmind import rotations as rot
+from motionmind.body.anatomy import Body
+from motionmind.body.anatomy_file import body
 from motionmind.corpus import store
-from motionmind.notation.anatomy import Body
-from motionmind.notation.body_file import body
+from motionmind.geometry import rotations as rot
 
 PAIRS = 200
 ANGLES = ("hip flexion", "hip abduction", "hip rotation", "knee flexion", "lumbar flexion", "thorax flexion")

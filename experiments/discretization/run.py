@@ -11,10 +11,10 @@ from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import corpus, engine, pairs, part, posture, recorded
 from motionmind import Engine, make_discretization
-from motionmind import rotations as rot
 from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.learned.summary import joinable
 from motionmind.metrics import angular_jerk, find_habits
-from motionmind.survey import joinable
 
 BUDGET = 20_000
 EXPERTS = {"ballet": "ballet", "karate": "karate"}

@@ -8,13 +8,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, RECORDED, movement, recorded, without
 from motionmind import Engine, Motion, NoPathError, Posture
-from motionmind import rotations as rot
+from motionmind._typing import Floats
+from motionmind.geometry import rotations as rot
 from motionmind.metrics import (
     Judge,
     angular_jerk,
@@ -30,7 +30,6 @@ from motionmind.metrics import (
 )
 from motionmind.realise.realise import realise
 
-Floats = NDArray[np.float64]
 Made = tuple[Floats, Floats]  # rotations [T, J, 4], root [T, 3]
 
 GAPS = (0.6, 1.2, 2.0, 4.0)  # seconds

@@ -6,18 +6,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, RECORDED, movement, recorded, without
 from motionmind import Skeleton
-from motionmind import rotations as rot
+from motionmind._typing import Bools, Floats
+from motionmind.body.anatomy_file import body as anatomy
+from motionmind.geometry import rotations as rot
 from motionmind.metrics import Judge, angular_speed, find_feet, find_floor, find_judge, l2q
-from motionmind.notation.body_file import body as anatomy
 from motionmind.render.anatomy import body_of
-
-Floats = NDArray[np.float64]
 
 SECONDS = 2.0
 FRAMES = round(SECONDS * FPS)
@@ -100,7 +98,7 @@ def judge(data: str | None, name: str) -> Judge:
 # --- what bodies cannot do --------------------------------------------------------------------------------------------
 
 
-def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Bools, Bools]:
     """Whether the legs, or any two other parts that are apart when the body rests, reach into each other by more than
     1 cm: two [T]."""
     body = body_of(skeleton)

@@ -8,18 +8,16 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import RATE, corpus, engine, part, recorded
 from motionmind import Engine, Motion, NoPathError, Piece, flow_of, make_discretization
+from motionmind._typing import Bools, Floats
 from motionmind.chaos.reorder import itinerary
 from motionmind.metrics import angular_jerk, angular_speed
 from motionmind.metrics.measure import at_rate
 from motionmind.variation.seams import judge
-
-Floats = NDArray[np.float64]
 
 FLOWS, NUDGES, LENGTH = ("lorenz", "rossler"), (0.1, 0.3, 1.0), 200
 RULES: dict[str, dict[str, Any]] = {
@@ -129,12 +127,12 @@ def usual(found: Engine) -> Usual:
     return Usual(speed, jerk, 100.0 * float(np.concatenate(own).mean()))
 
 
-def awkward(motion: Motion, moves: Floats, speed: Floats, jerk: Floats) -> NDArray[np.bool_]:
+def awkward(motion: Motion, moves: Floats, speed: Floats, jerk: Floats) -> Bools:
     """Whether in each move some joint turns faster and jerks more than `speed` and `jerk` [J]."""
     if len(motion) < 4:
         return np.zeros(len(moves) - 1, dtype=bool)
 
-    def has(values: Floats, most: Floats, frames: int) -> NDArray[np.bool_]:
+    def has(values: Floats, most: Floats, frames: int) -> Bools:
         """Whether each joint goes beyond the most within each move [T, J]; a value is of so many frames."""
         at = np.searchsorted(moves, motion.times[: len(values)] + 0.5 * frames / FPS, side="right") - 1
         out = np.zeros((len(moves) - 1, values.shape[1]), dtype=bool)

@@ -16,8 +16,8 @@ from time import perf_counter
 import numpy as np
 
 from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
-from motionmind import rotations as rot
 from motionmind.corpus.gather import gather
+from motionmind.geometry import rotations as rot
 
 RATE = 5.0
 

@@ -16,16 +16,19 @@ from time import perf_counter
 
 import numpy as np
 import pytoulbar2
-from numpy.typing import NDArray
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.progression import fit_progression
-from motionmind.search import astar, bound, solve, strips
+from motionmind.search import astar, solve
+from motionmind.search import pair_chains as strips
+from motionmind.search import trws as bound
 from motionmind.search.cfn import cfn
-from motionmind.search.costs import price
-from motionmind.search.problem import Grid, Model, build_grid, costs_to_go, with_waits
-from motionmind.search.progression import of_moves
-from motionmind.search.solve import Certificate, Rules
+from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.solve import Certificate
+from motionmind.search.trellis import Grid, build_grid
+from motionmind.tween.problem import price
+from motionmind.tween.progression import of_moves
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
 EXPANSIONS = 200_000
@@ -41,8 +44,7 @@ EFFORTS = (  # sweeps of strips and of messages
     ("strips", (100, 160)),
 )
 
-Floats = NDArray[np.float64]
-Ends = tuple[NDArray[np.int64], NDArray[np.int64]]
+Ends = tuple[Ints, Ints]
 
 
 def main() -> None:
@@ -76,7 +78,7 @@ def main() -> None:
     compare_solvers(model, few, engine.grammar.lanes)
 
 
-def joinable(model: Model, states: NDArray[np.int32], count: int, seed: int) -> Iterator[Ends]:
+def joinable(model: Model, states: Int32s, count: int, seed: int) -> Iterator[Ends]:
     """Random pairs of postures that some path of at most RULES.longest moves joins."""
     rng = np.random.default_rng(seed)
     while count > 0:
@@ -87,7 +89,7 @@ def joinable(model: Model, states: NDArray[np.int32], count: int, seed: int) -> 
             yield start, goal
 
 
-def warm_up(model: Model, states: NDArray[np.int32]) -> None:
+def warm_up(model: Model, states: Int32s) -> None:
     """Compile, or load, all that is measured."""
     for start, goal in joinable(model, states, 3, 1):
         answer = solve.solve(model, start, goal, RULES)

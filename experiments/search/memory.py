@@ -17,9 +17,12 @@ from time import process_time
 import numpy as np
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
-from motionmind.search import astar, bound, strips
-from motionmind.search.costs import price
-from motionmind.search.problem import build_grid, costs_to_go, with_waits
+from motionmind.search import astar
+from motionmind.search import pair_chains as strips
+from motionmind.search import trws as bound
+from motionmind.search.problem import costs_to_go, with_waits
+from motionmind.search.trellis import build_grid
+from motionmind.tween.problem import price
 
 BUDGETS = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 MOVES = 12

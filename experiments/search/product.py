@@ -23,9 +23,8 @@ from bench import RULES, Ends, joinable, moves_of, toulbar2
 from motionmind import Engine, Motion, Skeleton, make_discretization, own_skeleton, read_motion
 from motionmind.search import solve
 from motionmind.search.cfn import cfn
-from motionmind.search.costs import price
-from motionmind.search.problem import Model, costs_to_go, with_waits
-from motionmind.search.solve import Rules
+from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.tween.problem import price
 
 JOINTS = ("pelvis", "left_hip", "left_knee", "left_ankle")  # beside them the facing is a lane
 SAME = 1e-6  # nats

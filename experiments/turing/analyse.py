@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from motionmind._typing import Bools, Floats
 
 KINDS = ("danced", "made")
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Verdict:
         return self.means[0] - self.means[1]
 
 
-def judged(ratings: Floats, made: NDArray[np.bool_]) -> Verdict:
+def judged(ratings: Floats, made: Bools) -> Verdict:
     """The verdict on ratings [raters, films] of films that were `made` [films], or else danced."""
     from scipy.stats import f, t
 
@@ -89,7 +89,7 @@ def judged(ratings: Floats, made: NDArray[np.bool_]) -> Verdict:
     )
 
 
-def read(key: Path, answers: list[Path]) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+def read(key: Path, answers: list[Path]) -> tuple[dict[str, Floats], Bools]:
     """Ratings [raters, films] by scale, and which films were made."""
     kinds: dict[str, dict[str, Any]] = json.loads(key.read_text())
     films = sorted(kinds)

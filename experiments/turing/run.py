@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.turing.analyse import judged
+from motionmind._typing import Bools, Floats
 
 FILMS = 20
 RATER, FILM, REST = 0.5, 0.4, 0.8  # standard deviations, in points, of raters, films, and all else
@@ -42,7 +42,7 @@ def work(raters: int, difference: float, tests: int, seed: int) -> list[Row]:
     ]
 
 
-def simulated(rng: np.random.Generator, raters: int, made: NDArray[np.bool_], difference: float) -> NDArray[np.float64]:
+def simulated(rng: np.random.Generator, raters: int, made: Bools, difference: float) -> Floats:
     """Ratings from 1 to 5 [raters, films] of raters who like what was `made` less, by so many points."""
     liked = 3.2 + RATER * rng.normal(size=(raters, 1)) + FILM * rng.normal(size=len(made)) - difference * made
     return np.clip(np.round(liked + REST * rng.normal(size=(raters, len(made)))), 1.0, 5.0)

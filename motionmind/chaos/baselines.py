@@ -7,17 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats, Ints
+from motionmind.body.limbs import limbs
+from motionmind.body.skeleton import Skeleton
 from motionmind.chaos.reorder import checked, runs
 from motionmind.errors import MotionMindError
-from motionmind.mirror import MIDDLE, sides_of
-from motionmind.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-TRUNK = "trunk"
 
 
 def shuffled(count: int, rng: Generator) -> Ints:
@@ -61,27 +56,6 @@ def dabby(sites: Floats, points: Floats) -> Ints:
     ascending = sites[order, 0]
     place = np.searchsorted(ascending, np.minimum(points[:, 0], ascending[-1]), side="left")
     return np.asarray(order[place], dtype=np.int64)
-
-
-def limbs(skeleton: Skeleton) -> dict[str, Ints]:
-    """The body's parts: the joints of each limb, under the name of its first joint, and of the trunk.
-
-    A limb is a branch of joints of the left or the right side, as it hangs from the middle: two arms and two legs on a
-    person, from the clavicles and the hips, six legs and two feelers on an insect.
-    """
-    sides = sides_of(skeleton)
-    parts: dict[str, list[int]] = {TRUNK: []}
-    part_of: list[str] = []
-    for joint, (name, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
-        if sides[joint] == MIDDLE:
-            part = TRUNK
-        elif parent >= 0 and sides[parent] == sides[joint]:
-            part = part_of[parent]
-        else:
-            part = name
-        part_of.append(part)
-        parts.setdefault(part, []).append(joint)
-    return {part: np.array(joints, dtype=np.int64) for part, joints in parts.items()}
 
 
 def quadrants(skeleton: Skeleton, count: int, rng: Generator) -> Ints:

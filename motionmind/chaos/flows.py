@@ -12,11 +12,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats
 from motionmind.errors import MotionMindError
 
-Floats = NDArray[np.float64]
 Field = Callable[..., Any]
 
 

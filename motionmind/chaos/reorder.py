@@ -13,14 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from motionmind._typing import Floats, Ints
 from motionmind.chaos.flows import Flow
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _FAR = 1e150  # beyond it squares of distances overflow
 _ROUNDING = 1e-12  # by how much two distances may differ, as a part of them, where the nearer one is looked for exactly

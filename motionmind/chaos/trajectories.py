@@ -19,13 +19,13 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from motionmind._typing import Floats
 from motionmind.chaos.flows import Field, Flow
 from motionmind.errors import MotionMindError
 from motionmind.jit import either, jit, pointer
 
-Floats = NDArray[np.float64]
 Loop = Callable[..., tuple[Any, Any]]
 Step = Callable[[Floats, float, tuple[float, ...], Floats, Floats], None]
 

@@ -32,7 +32,7 @@ from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.formats.papers import Form
-    from motionmind.tween import Tween
+    from motionmind.tween.result import Tween
 
 INTERRUPTED = 130  # by Ctrl-C, as shells have it
 
@@ -85,9 +85,9 @@ def tween(
         raise click.UsageError("--problem is that of joints that move on their own; leave out --posturewise")
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
-    from motionmind.engine import Engine
     from motionmind.formats import read_posture, write_atomically
     from motionmind.jit import is_compiled
+    from motionmind.tween.engine import Engine
 
     alone = report == Path("-")
     wanted = ((output, MOVEMENT + PICTURES), (None if alone else report, ()), (problem, (".cfn",)))
@@ -164,7 +164,7 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     It is on human23 where the clip's joints map to it, by known names or by --joints, else on the clip's own, as on
     human44.
     """
-    from motionmind.learned import own_skeleton
+    from motionmind.retarget.retarget import own_skeleton
 
     check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], [clip])
     motion = own_skeleton(read(clip, **source), read_mapping(joints))
@@ -200,8 +200,8 @@ def convert(
     """
     from motionmind.formats import lost, write_motion
     from motionmind.formats.papers import write_papers
-    from motionmind.mapping import is_human44
-    from motionmind.retarget import to_human23
+    from motionmind.retarget.joint_mapping import is_human44
+    from motionmind.retarget.retarget import to_human23
 
     check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz"))], [file])
     suffix = output.suffix.lower()

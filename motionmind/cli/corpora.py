@@ -30,9 +30,9 @@ from motionmind.cli.printing import note, print_check, print_origins, progress
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
     from motionmind.corpus.corpus import Facing
     from motionmind.corpus.gather import Flips
-    from motionmind.motion import Motion
 
 
 @app.group("corpus", cls=InOrder, invoke_without_command=True, epilog=example("motionmind corpus check ballet"))
@@ -131,10 +131,10 @@ def build(
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make
-    from motionmind.engine import Engine
-    from motionmind.learned import own_skeleton
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_score
+    from motionmind.retarget.retarget import own_skeleton
+    from motionmind.tween.engine import Engine
 
     place = place_for(name, home)
     others = mixture(mix)
@@ -203,7 +203,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
 @HOME
 def info(name: str, as_json: bool, home: Path | None) -> None:
     """Say what a corpus is and how large."""
-    from motionmind.engine import Engine
+    from motionmind.tween.engine import Engine
 
     found = Engine.load(name, home).info()
     if as_json:
@@ -226,7 +226,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
 @HOME
 def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) -> None:
     """Say how well a corpus hangs together, and its recordings' faults."""
-    from motionmind.engine import Engine
+    from motionmind.tween.engine import Engine
 
     found = Engine.load(name, home).check(pairs, seed)
     if as_json:

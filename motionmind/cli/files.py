@@ -15,7 +15,7 @@ from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
-    from motionmind.motion import Motion, Posture
+    from motionmind.body.motion import Motion, Posture
 
 MOVEMENT = (".json", ".bvh", ".glb", ".npz")
 
@@ -29,8 +29,8 @@ def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | Non
 
 def write(path: Path, thing: Motion | Posture) -> None:
     """Movement into a file, as movement or as a picture, as its suffix says; what it has no place for is said."""
+    from motionmind.body.motion import Posture
     from motionmind.formats import lost, write_motion, write_posture
-    from motionmind.motion import Posture
     from motionmind.render.pictures import write_picture
 
     motion = thing.as_motion() if isinstance(thing, Posture) else thing
@@ -47,7 +47,7 @@ def write(path: Path, thing: Motion | Posture) -> None:
 
 def read_mapping(path: Path | None) -> dict[str, str] | None:
     """Which joint is which, from a file; None without one."""
-    from motionmind.retarget import read_joint_mapping
+    from motionmind.retarget.retarget import read_joint_mapping
 
     return read_joint_mapping(path) if path else None
 

@@ -20,7 +20,7 @@ def explain(report: Path, as_json: bool) -> None:
 
     REPORT is what tween --report wrote.
     """
-    from motionmind.explain import explain, lines, plain, read_report
+    from motionmind.tween.narrative import explain, lines, plain, read_report
 
     found = explain(read_report(report))
     if as_json:
@@ -44,8 +44,8 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     more, such as which states of the joint's parent go with a state. States that no move leads to or from are left out
     of pictures.
     """
-    from motionmind.engine import Engine
-    from motionmind.render.graph import GRAPHS, write_graph
+    from motionmind.plots.joint_graph import GRAPHS, write_graph
+    from motionmind.tween.engine import Engine
 
     check_outputs([(output, GRAPHS)], [])
     found = Engine.load(corpus, home).joint_graph(joint)

@@ -44,10 +44,10 @@ def measure(
     """
     import numpy as np
 
-    from motionmind.engine import Engine
-    from motionmind.explain import read_report
-    from motionmind.learned import own_skeleton
     from motionmind.metrics.measure import measure
+    from motionmind.retarget.retarget import own_skeleton
+    from motionmind.tween.engine import Engine
+    from motionmind.tween.narrative import read_report
 
     motion = own_skeleton(read(file, **source), read_mapping(joints))
     engine = Engine.load(corpus, home)

@@ -117,7 +117,7 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 COUNT = click.IntRange(min=1)
 NATS = Number(min=0)
 OUTPUTS = "movement (.json, .bvh, .glb, .npz), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
-RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.motion.FASTEST`
+RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.motion.FASTEST`
 
 HOME = click.option(
     "--home",

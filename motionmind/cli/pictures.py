@@ -19,7 +19,7 @@ from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
-    from motionmind.motion import Motion
+    from motionmind.body.motion import Motion
 
 
 @app.command(epilog=example("motionmind sheet corpora/ballet/centre.score --clip adagio -o adagio.png"))

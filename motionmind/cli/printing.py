@@ -18,7 +18,7 @@ from motionmind.errors import MotionMindWarning
 
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
-    from motionmind.tween import Tween
+    from motionmind.tween.result import Tween
 
 
 class Notes(logging.Handler):

@@ -11,7 +11,7 @@ from motionmind.cli.files import read, read_mapping
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from motionmind.motion import Motion
+    from motionmind.body.motion import Motion
 
 
 def holds_clips(source: Path, home: Path | None) -> bool:
@@ -46,7 +46,7 @@ def movements(source: Path, wanted: Sequence[str], home: Path | None, **given: A
 
 def _movement(path: Path, joints: Path | None, **source: Any) -> Motion:
     """The movement in a file, on human23 where its joints map there, as the options of `reading` say."""
-    from motionmind.learned import own_skeleton
+    from motionmind.retarget.retarget import own_skeleton
 
     return own_skeleton(read(path, **source), read_mapping(joints))
 
@@ -60,7 +60,7 @@ def _clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motio
         score = read_score(source)
         written = {clip.name: clip for clip in score.clips}
         return motions(score, [written[name] for name in _chosen(source, list(written), wanted)])
-    from motionmind.learned import Learned
+    from motionmind.learned.model import Learned
 
     name, clip = in_corpus(source, home)
     if clip is not None:
@@ -84,7 +84,7 @@ def frames_of(clip: Path | str, length: int, start: int, end: int) -> range:
 
 
 def _chosen(source: Path, names: Sequence[str], wanted: Sequence[str]) -> Sequence[str]:
-    from motionmind.formats.text import listed, meant
+    from motionmind.errors import listed, meant
 
     if not names:
         raise MotionMindError(f"{source}: holds no clips")

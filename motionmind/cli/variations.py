@@ -36,9 +36,9 @@ from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
     from motionmind.corpus.corpus import Facing
-    from motionmind.engine import Engine
-    from motionmind.motion import Motion
+    from motionmind.tween.engine import Engine
     from motionmind.variation.variation import Variation
 
 _STILL = 0.25  # of the steps: where more of them stay, the variation stands still to the eye
@@ -303,7 +303,7 @@ def attractor(variation: Path, output: Path) -> None:
     from the piece, and where it jumps. In .svg the pointer tells more. The page turns in three dimensions, and a body
     dances the variation beside it.
     """
-    from motionmind.render.attractor import ATTRACTORS, write_attractor
+    from motionmind.plots.attractor import ATTRACTORS, write_attractor
     from motionmind.variation.variation_json import read_variation
 
     check_outputs([(output, ATTRACTORS)], [variation])
@@ -340,8 +340,8 @@ def _facing(corpus: str, home: Path | None) -> Facing:
 
 def _engine(corpus: str, home: Path | None) -> Engine:
     """What was learned from a corpus; on a terminal it says what the first search of all takes."""
-    from motionmind.engine import Engine
     from motionmind.jit import is_compiled
+    from motionmind.tween.engine import Engine
 
     if not is_compiled("search"):
         progress("compiling the search, which takes half a minute, once")

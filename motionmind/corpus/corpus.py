@@ -11,14 +11,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import CorpusError
-from motionmind.motion import Motion
-from motionmind.skeleton import Skeleton
-from motionmind.spline import natural_spline, rotation_spline
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline, rotation_spline
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Facing = Literal["free", "stage"]
 
 FACING = "facing"  # the lane of the body's turn about the vertical
@@ -210,7 +209,7 @@ class Corpus:
         return np.concatenate([pelvis[..., None, :], lanes[..., 1:-1, :]], axis=-2)
 
     @cached_property
-    def _clip_of(self) -> NDArray[np.int32]:
+    def _clip_of(self) -> Int32s:
         return np.repeat(np.arange(len(self.clips), dtype=np.int32), [clip.stop - clip.start for clip in self.clips])
 
     def where(self, posture: int) -> tuple[str, int]:

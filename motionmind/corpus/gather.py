@@ -10,13 +10,13 @@ from typing import Literal, NamedTuple, TypedDict, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind.body.mirror import mirrored
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, Fault, moments
 from motionmind.errors import CorpusError, SkeletonError
-from motionmind.mirror import mirrored
-from motionmind.motion import Motion
-from motionmind.skeleton import Skeleton
-from motionmind.spline import rotation_spline
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
 
 Flips = Literal["drop", "keep", "split"]
 

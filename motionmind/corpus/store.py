@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError
-from motionmind.formats.files import read_bytes
+from motionmind.files import read_bytes
 
 FORMAT, VERSION = "motionmind-corpus", 1
 BUILT = "motionmind-built-corpus"

@@ -6,16 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from motionmind._typing import Floats
 from motionmind.discretize.codebook import codebook
 from motionmind.discretize.library import Library, library_to_mapping, read_library
 from motionmind.discretize.protocol import check_range, per_joint_values, samples
 from motionmind.discretize.states import StateSpace
-from motionmind.formats.files import FilePath
-
-Array = NDArray[np.float64]
+from motionmind.files import FilePath
 
 
 @dataclass(frozen=True)
@@ -54,12 +50,12 @@ class ExpertLibrary:
         """From a file, or the bundled library of that name; see `read_library`."""
         return cls(read_library(name_or_path), tolerance, per_joint or {})
 
-    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+    def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """The library's states for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         tolerances = per_joint_values(names, self.tolerance, self.per_joint)
         tables = self.library.tables_of(names)
-        centres: list[Array] = []
+        centres: list[Floats] = []
         labels: list[tuple[str, ...]] = []
         for j, name in enumerate(names):
             table = tables.get(j)

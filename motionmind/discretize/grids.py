@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
 from motionmind.discretize.protocol import check_range, per_joint_values, samples
 from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.errors import MotionMindError
-
-Array = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
 
 # Beyond a step of 1 a quaternion can round to zero; beyond a third of a turn cells overlap more than they divide.
 _WIDEST_STEP = 0.9
@@ -47,7 +45,7 @@ class QuaternionGrid:
         """The step that keeps every orientation within `tolerance` degrees of its state."""
         return min(_WIDEST_STEP, float(np.sin(0.5 * np.radians(tolerance))))
 
-    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+    def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         steps = per_joint_values(names, self.step, self.per_joint)
@@ -59,7 +57,7 @@ class QuaternionGrid:
         return {"kind": self.kind, "step": self.step, "per_joint": dict(self.per_joint)}
 
     @staticmethod
-    def _cells(q: Array, step: float) -> Array:
+    def _cells(q: Floats, step: float) -> Floats:
         cells = np.unique(np.rint(rot.canonical(q) / step), axis=0)
         return _occurring(q, rot.normalise(cells))
 
@@ -97,7 +95,7 @@ class EulerGrid:
         """The width that keeps every orientation within `tolerance` degrees of its state."""
         return min(_WIDEST_CELL, float(tolerance * 2.0 / np.sqrt(5.0)))
 
-    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+    def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         widths = per_joint_values(names, self.degrees, self.per_joint)
@@ -108,13 +106,13 @@ class EulerGrid:
         """The widths and the order, as `from_spec` reads them."""
         return {"kind": self.kind, "degrees": self.degrees, "order": self.order, "per_joint": dict(self.per_joint)}
 
-    def _cells(self, q: Array, width: float) -> Array:
+    def _cells(self, q: Floats, width: float) -> Floats:
         # The canonical one of q and -q: both have the same angles, but perhaps not to the last bit.
         cells = np.unique(np.rint(rot.to_euler(self.order, rot.canonical(q)) / width), axis=0)
         return _occurring(q, rot.from_euler(self.order, cells * width))
 
 
-def _occurring(q: Array, cells: Array) -> Array:
+def _occurring(q: Floats, cells: Floats) -> Floats:
     """Those of `cells` [S, 4] that are the nearest to some of `q` [N, 4]: a state that nothing visits is none.
 
     Taking the others away changes nobody's nearest state.

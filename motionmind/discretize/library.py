@@ -26,18 +26,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
+from motionmind.body.human import BODIES
 from motionmind.corpus.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath, read_bytes, write_atomically
-from motionmind.formats.text import meant
-from motionmind.skeleton import BODIES
-
-Array = NDArray[np.float64]
+from motionmind.errors import FormatError, meant
+from motionmind.files import FilePath, read_bytes, write_atomically
+from motionmind.geometry import rotations as rot
 
 FORMAT = "motionmind-library"
 VERSION = 1
@@ -65,7 +62,7 @@ class Library:
     licence: str = ""
     skeleton: str = "human23"
     path: str = field(default="library", compare=False)
-    _rotations: dict[str, Array] = field(init=False, repr=False, compare=False)
+    _rotations: dict[str, Floats] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check it all, so that what is built can be used; FormatError names table and entry."""
@@ -78,7 +75,7 @@ class Library:
         if self.skeleton in BODIES:
             self.tables_of(BODIES[self.skeleton]().names)
 
-    def rotations(self, table: str) -> Array:
+    def rotations(self, table: str) -> Floats:
         """Orientations [S, 4] of the states in `table`, as written: for the left, where it is a pair."""
         return self._rotations[table]
 
@@ -99,7 +96,7 @@ class Library:
                 owner[j] = table
         return owner
 
-    def of_joint(self, table: str, joint: str) -> Array:
+    def of_joint(self, table: str, joint: str) -> Floats:
         """Orientations [S, 4] that `table` gives to `joint`, in a mirror where it is the right one of a pair."""
         q = self.rotations(table)
         return rot.mirror(q) if table != joint and joint.startswith("right_") else q
@@ -111,7 +108,7 @@ class Library:
         except UnicodeEncodeError:
             raise FormatError(f"{text!r:.60} is not text", path=self.path) from None
 
-    def _read_table(self, table: str) -> Array:
+    def _read_table(self, table: str) -> Floats:
         entries = self.tables[table]
         if not isinstance(entries, Mapping) or not entries:
             raise FormatError(f"[{table}] must be a table of states, with one at least", path=self.path)
@@ -128,7 +125,7 @@ class Library:
                 )
         return states
 
-    def _read_entry(self, table: str, name: str, value: object) -> Array:
+    def _read_entry(self, table: str, name: str, value: object) -> Floats:
         self._check_text(name)
         where = f'[{table}] "{name}": '
         if not name.strip():

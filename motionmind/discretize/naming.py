@@ -9,18 +9,17 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
+from motionmind.body.anatomy import Body, Joint
 from motionmind.discretize.library import Library
 from motionmind.discretize.protocol import check_range, per_joint_values
 from motionmind.errors import MotionMindError
-from motionmind.notation.anatomy import Body, Joint
+from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played
 from motionmind.notation.score import Score
 
-Array = NDArray[np.float64]
-_Named = list[tuple[str, Array]]  # what orientations were called, most frequent first
+_Named = list[tuple[str, Floats]]  # what orientations were called, most frequent first
 
 
 def name_states(
@@ -66,7 +65,7 @@ def name_states(
     return Library(tables, title=scores[0].title, skeleton=body.skeleton.name)
 
 
-def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Array]]:
+def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Floats]]:
     """Joint, name and rotation of every joint in every posture; a right one's as in the mirror."""
     body = score.body
     layers = {joint: index for index, joints in enumerate(body.layers.values()) for joint in joints}
@@ -106,7 +105,7 @@ def _table(body: Body, joint: str, named: _Named) -> dict[str, str]:
     return out
 
 
-def _turns(joint: Joint, turned: Array) -> str:
+def _turns(joint: Joint, turned: Floats) -> str:
     """A rotation [4] in whole degrees about the axes, the bone's own length last, or first where it is outermost."""
     order = "yxz" if joint.outer else "xzy" if joint.long == "y" and not joint.rest else "yzx"
     first, middle, last = np.round(np.degrees(rot.to_euler(order, turned)))

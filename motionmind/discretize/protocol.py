@@ -7,13 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats
 from motionmind.discretize.states import StateSpace, checked_rotations
-from motionmind.errors import MotionMindError, SkeletonError
-from motionmind.formats.text import meant
-
-Array = NDArray[np.float64]
+from motionmind.errors import MotionMindError, SkeletonError, meant
 
 SIDES = ("left_", "right_")
 
@@ -26,7 +23,7 @@ class Discretization(Protocol):
         """Which kind this is, such as "codebook"."""
         ...
 
-    def fit(self, names: Sequence[str], rotations: Array) -> StateSpace:
+    def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """The states for the joints `names` [J], given the orientations `rotations` [N, J, 4] of a corpus.
 
         The same orientations give the same states, whatever the order of the postures or the joints.
@@ -38,7 +35,7 @@ class Discretization(Protocol):
         ...
 
 
-def samples(names: Sequence[str], rotations: Array) -> Array:
+def samples(names: Sequence[str], rotations: Floats) -> Floats:
     """`rotations` [N, J, 4] as `fit` may use them; MotionMindError where there are none, or they are none."""
     if len(names) == 0 or len(set(names)) != len(names):
         raise MotionMindError("a discretization needs joints, each named once")
@@ -54,7 +51,7 @@ def joints_meant(name: str, names: Sequence[str]) -> list[int]:
     return exact or [j for j, joint in enumerate(names) if joint in {side + name for side in SIDES}]
 
 
-def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str, float]) -> Array:
+def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str, float]) -> Floats:
     """`value`, or what `per_joint` says, for each joint [J].
 
     A name without its side means both sides, unless that side is named too. A name that means no joint is a

@@ -11,8 +11,7 @@ from motionmind.discretize.expert import ExpertLibrary
 from motionmind.discretize.grids import EulerGrid, QuaternionGrid
 from motionmind.discretize.library import library_from_mapping, read_library
 from motionmind.discretize.protocol import Discretization
-from motionmind.errors import FormatError, MotionMindError
-from motionmind.formats.text import meant
+from motionmind.errors import FormatError, MotionMindError, meant
 
 KINDS = ("codebook", "quaternion", "euler")
 

@@ -9,12 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats, Ints, States
 from motionmind.errors import MotionMindError, SkeletonError
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-States = NDArray[np.int32]
+from motionmind.geometry import rotations as rot
 
 # Two orientations that turn into each other by less than this many radians are one state.
 SAME = 1e-5
@@ -46,10 +43,10 @@ class StateSpace:
     """
 
     names: tuple[str, ...]
-    centres: Array
-    starts: Integers
+    centres: Floats
+    starts: Ints
     kind: str
-    tolerances: Array
+    tolerances: Floats
     labels: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
@@ -86,10 +83,10 @@ class StateSpace:
     def of_joints(
         cls,
         names: Sequence[str],
-        centres: Sequence[Array],
+        centres: Sequence[Floats],
         *,
         kind: str,
-        tolerances: Array,
+        tolerances: Floats,
         labels: Sequence[Sequence[str]] = (),
     ) -> StateSpace:
         """The state space whose joint j has the states `centres[j]` [S_j, 4]."""
@@ -98,7 +95,7 @@ class StateSpace:
         return cls(tuple(names), flat, starts, kind, tolerances, tuple(tuple(named) for named in labels))
 
     @cached_property
-    def sizes(self) -> Integers:
+    def sizes(self) -> Ints:
         """Number of states of each joint [J]."""
         return np.diff(self.starts)
 
@@ -111,7 +108,7 @@ class StateSpace:
             raise SkeletonError(f"no joint {joint!r} among the states; there are {', '.join(self.names)}")
         return self.names.index(joint)
 
-    def of(self, joint: int | str) -> Array:
+    def of(self, joint: int | str) -> Floats:
         """The centres [S_j, 4] of a joint, by index or name."""
         j = self.index(joint) if isinstance(joint, str) else joint
         return self.centres[self.starts[j] : self.starts[j + 1]]
@@ -123,7 +120,7 @@ class StateSpace:
             raise MotionMindError(f"{self.names[j]} has states 0 to {self.sizes[j] - 1}, no state {state}")
         return self.labels[j][state] if self.labels[j] else f"state {state}"
 
-    def assign(self, rotations: Array) -> States:
+    def assign(self, rotations: Floats) -> States:
         """The nearest state [N, J] of every orientation in `rotations` [N, J, 4]; ties go to the lowest index."""
         rotations = checked_rotations(self.names, rotations)
         states = np.empty(rotations.shape[:2], dtype=np.int32)
@@ -131,7 +128,7 @@ class StateSpace:
             states[:, j] = nearest(rotations[:, j], self.of(j))[0]
         return states
 
-    def decode(self, states: NDArray[np.integer]) -> Array:
+    def decode(self, states: NDArray[np.integer]) -> Floats:
         """The orientations [N, J, 4] that `states` [N, J] stand for; `assign` takes them back."""
         states = np.asarray(states)
         if states.ndim != 2 or states.shape[1] != len(self) or not np.issubdtype(states.dtype, np.integer):
@@ -144,7 +141,7 @@ class StateSpace:
             )
         return np.asarray(self.centres[self.starts[:-1] + states])
 
-    def distance(self, rotations: Array, states: NDArray[np.integer]) -> Array:
+    def distance(self, rotations: Floats, states: NDArray[np.integer]) -> Floats:
         """Degrees [N, J] between `rotations` [N, J, 4] and the centres of `states` [N, J]."""
         rotations = checked_rotations(self.names, rotations)
         centres = self.decode(states)
@@ -153,7 +150,7 @@ class StateSpace:
         return np.degrees(rot.angle(rotations, centres))
 
 
-def nearest(rotations: Array, centres: Array, *, block: int = _BLOCK) -> tuple[States, Array]:
+def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple[States, Floats]:
     """For one joint: the index [N] of the nearest of `centres` [S, 4] to `rotations` [N, 4], and the cosine of
     half the angle to it [N].
 
@@ -175,7 +172,7 @@ def nearest(rotations: Array, centres: Array, *, block: int = _BLOCK) -> tuple[S
     return states, cosines
 
 
-def distinct(centres: Array) -> Array:
+def distinct(centres: Floats) -> Floats:
     """`centres` [S, 4] without those that an earlier one equals, up to sign and `SAME` radians."""
     keep = np.ones(len(centres), dtype=bool)
     limit = np.cos(0.5 * SAME)
@@ -187,7 +184,7 @@ def distinct(centres: Array) -> Array:
     return centres[keep]
 
 
-def checked_rotations(names: Sequence[str], rotations: Array) -> Array:
+def checked_rotations(names: Sequence[str], rotations: Floats) -> Floats:
     """`rotations` as float64 [N, J, 4], or a MotionMindError that names the joint and posture that is wrong."""
     rotations = np.asarray(rotations, dtype=np.float64)
     if rotations.ndim != 3 or rotations.shape[1:] != (len(names), 4):

@@ -6,16 +6,14 @@ import math
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-
-Array = NDArray[np.float64]
+from motionmind._typing import Floats
+from motionmind.geometry import rotations as rot
 
 _TURN = re.compile(r"([xyzXYZ])\s*([+-]?(?:\d+(?:\.\d*)?|\.\d+))", re.ASCII)
 
 
-def parse_turns(text: str) -> Array:
+def parse_turns(text: str) -> Floats:
     """The rotation [4] that a text such as "x -90, y 45" describes: turns in degrees, in sequence.
 
     Each turn is about an axis of the frame as the turns before it have left it (intrinsic). The empty text is the
@@ -34,7 +32,7 @@ def parse_turns(text: str) -> Array:
     return rot.normalise(rot.from_euler(letters, np.array(angles)))
 
 
-def format_turns(q: Array) -> str | None:
+def format_turns(q: Floats) -> str | None:
     """The shortest turns in hundredths of a degree that are the rotation `q` [4]; None where none are exactly it.
 
     The inverse of `parse_turns` up to sign and 1e-9 radians.

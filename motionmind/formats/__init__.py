@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
-from motionmind.formats.files import FilePath, write_atomically
+from motionmind.files import FilePath, write_atomically
 from motionmind.formats.lost import lost
-from motionmind.motion import Motion, Posture
-from motionmind.skeleton import Skeleton
 
 __all__ = ["lost", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
@@ -67,8 +67,8 @@ def read_motion(
         from motionmind.formats.npz import read_npz
 
         return read_npz(path, fps=fps)
+    from motionmind.files import read_bytes
     from motionmind.formats import _json
-    from motionmind.formats.files import read_bytes
 
     data = read_bytes(path)
     if _json.kind_of(data, path) == _json.POSTURE:

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import MOST_JOINTS, listed, meant, read_lines, shown, to_number, to_numbers
-from motionmind.skeleton import Skeleton
-
-Array = NDArray[np.float64]
+from motionmind._typing import Floats
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import FormatError, listed, meant, shown
+from motionmind.files import FilePath
+from motionmind.formats.text import MOST_JOINTS, read_lines, to_number, to_numbers
+from motionmind.geometry import rotations as rot
 
 _INCH = 0.0254
 _CHANNEL = re.compile(r"[TR][XYZ]|L")
@@ -28,9 +26,9 @@ class Bone:
 
     name: str
     line: int
-    direction: Array = field(default_factory=lambda: np.zeros(3))
+    direction: Floats = field(default_factory=lambda: np.zeros(3))
     length: float = 0.0
-    axis: Array = field(default_factory=lambda: rot.IDENTITY)
+    axis: Floats = field(default_factory=lambda: rot.IDENTITY)
     channels: list[str] = field(default_factory=list)  # "TX", "RX", ..., in the order of the AMC
 
 
@@ -41,7 +39,7 @@ class Acclaim:
     path: FilePath
     bones: dict[str, Bone]  # the root first, parents before their children
     parents: dict[str, str]
-    position: Array
+    position: Floats
     scale: float  # metres in one unit
     degrees: bool
 
@@ -57,7 +55,7 @@ class Acclaim:
         )
 
 
-def fixed_axes(order: str, angles: Array) -> Array:
+def fixed_axes(order: str, angles: Floats) -> Floats:
     """Rotation [..., 4] of turns by `angles` [..., len(order)] radians about fixed axes, the first letter's first."""
     # Turns about fixed axes are turns about moving ones in reverse.
     return rot.from_euler(order[::-1], angles[..., ::-1])
@@ -98,7 +96,7 @@ def read_asf(path: FilePath) -> Acclaim:
     return Acclaim(path, {name: bones[name] for name in order}, parents, position, _INCH / length, degrees)
 
 
-def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> tuple[Bone, Array]:
+def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> tuple[Bone, Floats]:
     """The root, and the place that is added to its movement."""
     root = Bone("root", section[0][0] if section else 1)
     position, orientation, order = np.zeros(3), np.zeros(3), "XYZ"
@@ -176,7 +174,7 @@ def _rotation_order(words: list[str], path: FilePath, line: int) -> str:
     return order
 
 
-def _vector(words: list[str], path: FilePath, line: int) -> Array:
+def _vector(words: list[str], path: FilePath, line: int) -> Floats:
     if len(words) != 3:
         raise FormatError(f"{len(words)} numbers where three were expected", path=path, line=line)
     return np.array(to_numbers(words, path, line))

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import MOST_JOINTS, shown, to_number
+from motionmind.errors import FormatError, shown
+from motionmind.files import FilePath
+from motionmind.formats.text import MOST_JOINTS, to_number
 
 _CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)")
 

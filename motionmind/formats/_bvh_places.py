@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.formats.text import listed
+from motionmind._typing import Floats
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import listed
 from motionmind.formats.units import bone_span
-from motionmind.skeleton import Skeleton
-
-Array = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
 
 # As shares of the body's span: what counts as standing still (exporters print 6 digits), and what is more than the
 # give of a joint or the stretch of a rig.
@@ -32,8 +30,8 @@ class Placed:
     """
 
     skeleton: Skeleton
-    rotations: Array
-    places: dict[int, Array]
+    rotations: Floats
+    places: dict[int, Floats]
 
     def stray(self, joint: int) -> float:
         """How far the joint moves against its parent, along the axis on which that is most."""
@@ -43,12 +41,12 @@ class Placed:
         """The largest angle in radians between the joint's first rotation and any other."""
         return float(np.max(rot.angle(self.rotations[:1, joint], self.rotations[:, joint])))
 
-    def place(self, joint: int) -> Array:
+    def place(self, joint: int) -> Floats:
         """Places [T, 3] of any joint in its parent's frame."""
         still = np.broadcast_to(self.skeleton.offsets[joint], (len(self.rotations), 3))
         return self.places.get(joint, still)
 
-    def mean_offsets(self) -> Array:
+    def mean_offsets(self) -> Floats:
         """Mean place of each joint [J, 3]; 0 for the root."""
         offsets = np.array(self.skeleton.offsets)
         for joint, place in self.places.items():
@@ -70,8 +68,8 @@ class Body:
     """
 
     skeleton: Skeleton
-    rotations: Array
-    root: Array
+    rotations: Floats
+    root: Floats
     notes: list[str]
     strays: list[tuple[str, float]]
 
@@ -154,8 +152,8 @@ def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
     """The part of the body below `top`, with `top` as root: all above it is in its rotation and place."""
     old = body.skeleton
     above, kept = _ancestors(old, top), _descendants(old, top)
-    turned: Array = np.broadcast_to(rot.IDENTITY, (len(body.rotations), 4))
-    root: Array = np.zeros((len(body.rotations), 3))
+    turned: Floats = np.broadcast_to(rot.IDENTITY, (len(body.rotations), 4))
+    root: Floats = np.zeros((len(body.rotations), 3))
     for joint in [*above, top]:
         root = root + rot.mul_vec(turned, body.place(joint))
         turned = rot.mul(turned, body.rotations[:, joint])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.motion import Motion
 
 
 def even_step(motion: Motion, form: str) -> float:

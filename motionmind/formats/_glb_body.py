@@ -10,13 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
-from motionmind.skeleton import Skeleton
-
-Array = NDArray[np.float64]
+from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 
 FRONT = "front"
 
@@ -48,12 +46,12 @@ class Bones:
         heads: whether it is a head: a leaf in the middle [B].
     """
 
-    joints: NDArray[np.intp]
-    starts: Array
-    ends: Array
-    radii: Array
+    joints: Indices
+    starts: Floats
+    ends: Floats
+    radii: Floats
     sides: tuple[str, ...]
-    heads: NDArray[np.bool_]
+    heads: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +65,13 @@ class Mesh:
             outside. No paint is there without a vertex.
     """
 
-    positions: Array
-    normals: Array
-    joints: NDArray[np.intp]
-    paints: Mapping[str, NDArray[np.intp]]
+    positions: Floats
+    normals: Floats
+    joints: Indices
+    paints: Mapping[str, Indices]
 
 
-def body_mesh(skeleton: Skeleton, root: Array) -> Mesh:
+def body_mesh(skeleton: Skeleton, root: Floats) -> Mesh:
     """The body at rest, its root at `root` [3]; its front is where +z is, on a bone that lies along z where +y is."""
     bones = bones_of(skeleton, root)
     corners = _corners(bones)  # [B, P, 3]
@@ -91,7 +89,7 @@ def body_mesh(skeleton: Skeleton, root: Array) -> Mesh:
     )
 
 
-def bones_of(skeleton: Skeleton, root: Array) -> Bones:
+def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
     """The bones that have a length, on a body at rest with its root at `root` [3]; one upwards where none has."""
     count, parents = len(skeleton), skeleton.parents
     both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (count, 1)), root)
@@ -99,7 +97,7 @@ def bones_of(skeleton: Skeleton, root: Array) -> Bones:
     span = float(np.ptp(both, axis=0).max()) or 1.0
     sides = sides_of(skeleton)
     radii = _radii(skeleton, sides, span)
-    rows: list[tuple[int, Array, float, float, str, bool]] = []
+    rows: list[tuple[int, Floats, float, float, str, bool]] = []
     for joint, parent in enumerate(parents):
         if parent >= 0:
             start = radii[parent] if sides[parent] == sides[joint] else radii[joint]
@@ -123,7 +121,7 @@ def bones_of(skeleton: Skeleton, root: Array) -> Bones:
     )
 
 
-def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Array:
+def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Floats:
     """How thick a body is at its joints [J], metres: the thinner the nearer to a limb's end, along the bones."""
     reach = np.linalg.norm(skeleton.tips, axis=-1)
     for joint in range(len(skeleton) - 1, 0, -1):
@@ -133,7 +131,7 @@ def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Array:
     return np.asarray((0.008 * span + 0.04 * np.minimum(reach, 0.6 * span)) * np.where(trunk, 1.5, 1.0))
 
 
-def _corners(bones: Bones) -> Array:
+def _corners(bones: Bones) -> Floats:
     """The prisms' corners [B, P, 3]: the rings' from the start on, then the two ends' points."""
     along = bones.ends - bones.starts
     axis = along / np.linalg.norm(along, axis=-1, keepdims=True)
@@ -154,7 +152,7 @@ def _corners(bones: Bones) -> Array:
     return np.concatenate([rings.reshape(len(axis), -1, 3), ends], axis=1)
 
 
-def _template() -> tuple[NDArray[np.intp], list[bool]]:
+def _template() -> tuple[Indices, list[bool]]:
     """The prism's triangles [F, 3] as indices of its corners, and which of them are the ridge's [F]."""
     count, rings = len(_CORNERS), len(_RINGS)
     bottom, top, last = rings * count, rings * count + 1, (rings - 1) * count

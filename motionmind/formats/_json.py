@@ -11,15 +11,15 @@ from typing import TypeVar
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError, MotionMindWarning, SkeletonError
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import LARGEST, MOST_JOINTS, listed, meant, shown
-from motionmind.skeleton import BODIES, Skeleton
+from motionmind._typing import Floats, Indices
+from motionmind.body.human import BODIES
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, listed, meant, shown
+from motionmind.files import FilePath
+from motionmind.formats.text import LARGEST, MOST_JOINTS
+from motionmind.geometry import rotations as rot
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
@@ -181,12 +181,12 @@ def text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def rounded(array: Array) -> Array:
+def rounded(array: Floats) -> Floats:
     """`array` to the decimals that are written; 0 for -0."""
     return np.asarray(np.round(array, DECIMALS) + 0.0, dtype=np.float64)
 
 
-def check_lengths(array: Array, what: str, path: FilePath) -> None:
+def check_lengths(array: Floats, what: str, path: FilePath) -> None:
     """FormatError if a length or a time in `array` [..., n] is beyond what any body reaches."""
     wrong = ~(np.abs(array) <= LARGEST)
     if wrong.any():
@@ -195,7 +195,7 @@ def check_lengths(array: Array, what: str, path: FilePath) -> None:
         raise FormatError(f"{what}{place} is {array[where]:g}, beyond {LARGEST:g}", path=path)
 
 
-def unit_rotations(array: Array, names: Sequence[str], path: FilePath) -> Array:
+def unit_rotations(array: Floats, names: Sequence[str], path: FilePath) -> Floats:
     """Make quaternions [J, 4] or [T, J, 4] unit, in place; zero is a FormatError, a length off by > 1e-6 a warning."""
     if not np.all(np.abs(array) <= LARGEST):
         joint = names[np.argwhere(~(np.abs(array) <= LARGEST))[0][-2]]
@@ -221,7 +221,7 @@ def unit_rotations(array: Array, names: Sequence[str], path: FilePath) -> Array:
     return array
 
 
-def _place(where: NDArray[np.intp], names: Sequence[str]) -> str:
+def _place(where: Indices, names: Sequence[str]) -> str:
     frame = f" in frame {where[0]}" if len(where) > 1 else ""
     return f"the rotation of {names[where[-1]]}{frame}"
 

@@ -20,16 +20,14 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, listed, meant, shown
+from motionmind.files import FilePath
 from motionmind.formats._asf import Acclaim, fixed_axes, read_asf
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import listed, meant, read_lines, shown, to_numbers
-from motionmind.motion import Motion
-
-Array = NDArray[np.float64]
+from motionmind.formats.text import read_lines, to_numbers
+from motionmind.geometry import rotations as rot
 
 
 def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0) -> Motion:
@@ -98,7 +96,7 @@ def _find_asf(path: FilePath) -> Path:
     raise FormatError(f"its skeleton, an .asf file, was not found in {folder} ({there}): name it", path=path)
 
 
-def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Array, Array, bool]:
+def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Floats, Floats, bool]:
     """Numbers of the frames [T], the bones' values [T, C] in the bones' order, and whether angles are degrees."""
     places: dict[str, slice] = {}
     column = 0

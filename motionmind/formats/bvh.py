@@ -15,20 +15,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, shown
+from motionmind.files import FilePath, write_atomically
 from motionmind.formats._bvh_hierarchy import Joint, is_comment, read_hierarchy
 from motionmind.formats._bvh_places import Body, Placed, settle
 from motionmind.formats._clock import even_step
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.formats.text import LARGEST, read_lines, shown, to_number, to_numbers
+from motionmind.formats.text import LARGEST, read_lines, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
-from motionmind.motion import Motion
-from motionmind.skeleton import Skeleton
-
-Array = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
 
 _FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
@@ -82,7 +80,7 @@ def bvh_unit(path: FilePath) -> tuple[str, float]:
     return guess_unit(_read_body(path)[0].skeleton)
 
 
-def _read_body(path: FilePath) -> tuple[Body, Array]:
+def _read_body(path: FilePath) -> tuple[Body, Floats]:
     """The whole file, in its own unit, and the frames' times [T] in seconds."""
     lines = read_lines(path)
     start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
@@ -135,7 +133,7 @@ def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[i
     raise FormatError(f"no line '{missing}: ...' between MOTION and the frames", path=path, line=start)
 
 
-def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Array:
+def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Floats:
     """Channel values [T, C], one line a frame; frames wrapped over several lines where their sum is right."""
     rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
     if not rows:
@@ -149,7 +147,7 @@ def _read_frames(lines: list[str], first: int, channels: int, declared: int, pat
     return frames
 
 
-def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Array:
+def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
     """Frames read word by word: to name the first fault, or to find that line ends mean nothing in this file."""
     values = [to_numbers(line.split(), path, number) for number, line in rows]
     flat = np.array([value for row in values for value in row])
@@ -160,11 +158,11 @@ def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, 
     raise FormatError(fault, path=path, line=rows[odd][0])
 
 
-def _assemble(joints: list[Joint], values: Array, name: str) -> Placed:
+def _assemble(joints: list[Joint], values: Floats, name: str) -> Placed:
     """Rotations and places of the joints from the channels' values [T, C]."""
     frames = len(values)
     rotations = np.tile(rot.IDENTITY, (frames, len(joints), 1))
-    places: dict[int, Array] = {}
+    places: dict[int, Floats] = {}
     groups: dict[str, list[tuple[int, list[int]]]] = {}  # joints that turn in the same order, all at once
     column = 0
     for index, joint in enumerate(joints):
@@ -249,7 +247,7 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 
 
 def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float, digits: int) -> Iterator[str]:
-    def offset(vector: Array) -> str:
+    def offset(vector: Floats) -> str:
         return "OFFSET " + " ".join(f"{value:.{digits}f}" for value in np.round(vector * scale, digits) + 0.0)
 
     leaves = set(order) - set(skeleton.parents)

@@ -25,15 +25,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats, Singles
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
+from motionmind.files import FilePath, write_atomically
 from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
 from motionmind.formats._json import rounded
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Motion
-from motionmind.skeleton import Skeleton
-
-Array = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
 
 # 3.6.2.2 and 5.11.5: the format's numbers.
 _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
@@ -151,14 +150,14 @@ def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
 # --- the armature ---------------------------------------------------------------------------------------------------
 
 
-def _at_rest(skeleton: Skeleton) -> Array:
+def _at_rest(skeleton: Skeleton) -> Floats:
     """Where the joints are at rest [J, 3], metres: the root above the origin, the lowest point of the body at 0."""
     both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
     both[:, 1] -= both[:, 1].min()
     return both[: len(skeleton)]
 
 
-def _joint_nodes(skeleton: Skeleton, root: Array) -> list[dict[str, Any]]:
+def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
     """The joints' nodes in their order, at rest: no rotation is the identity (3.5.3)."""
     nodes: list[dict[str, Any]] = []
     for joint, name in enumerate(skeleton.names):
@@ -177,7 +176,7 @@ def _posed_nodes(motion: Motion) -> list[dict[str, Any]]:
     return nodes
 
 
-def _inverse_binds(rest: Array) -> NDArray[np.float32]:
+def _inverse_binds(rest: Floats) -> Singles:
     """What takes a vertex at rest into each joint's frame [J, 16]: a matrix in columns (3.7.3).
 
     Frames at rest are turned as the world is, so the inverse is a step back.
@@ -248,7 +247,7 @@ def _animation(buffer: _Buffer, motion: Motion, name: str) -> dict[str, Any]:
     }
 
 
-def _continuous(rotations: Array) -> Array:
+def _continuous(rotations: Floats) -> Floats:
     """The same rotations [T, J, 4], each quaternion on the side of the one before it."""
     flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
     signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import listed
-from motionmind.motion import Motion
-from motionmind.skeleton import BODIES, Skeleton
+from motionmind.body.human import BODIES
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import listed
+from motionmind.files import FilePath
 
 _TINY = 1e-6  # seconds and metres
 

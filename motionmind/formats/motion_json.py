@@ -35,11 +35,11 @@ from itertools import chain
 import msgspec
 import numpy as np
 
+from motionmind.body.motion import Insertion, Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
+from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, read_bytes, write_atomically
-from motionmind.motion import Insertion, Motion
-from motionmind.skeleton import Skeleton
 
 
 class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):

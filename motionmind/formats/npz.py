@@ -30,17 +30,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
+from motionmind.body.human import human44
+from motionmind.body.motion import FASTEST, Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
+from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
-from motionmind.formats.files import FilePath, read_bytes, write_atomically
 from motionmind.formats.text import LARGEST
-from motionmind.mapping import joint_mapping
-from motionmind.motion import FASTEST, Motion
-from motionmind.retarget import to_human23
-from motionmind.skeleton import Skeleton, human44
-
-Array = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.joint_mapping import joint_mapping
+from motionmind.retarget.retarget import to_human23
 
 _RATES = ("mocap_framerate", "mocap_frame_rate")
 
@@ -130,9 +130,9 @@ def joints_without_place(motion: Motion) -> list[str]:
 # --- in -------------------------------------------------------------------------------------------------------------
 
 
-def _read_arrays(path: FilePath) -> dict[str, Array]:
+def _read_arrays(path: FilePath) -> dict[str, Floats]:
     """The arrays of movement that the file has, all finite numbers; nothing else of it is unpacked."""
-    found: dict[str, Array] = {}
+    found: dict[str, Floats] = {}
     data = read_bytes(path)
     if not data.startswith(b"PK"):
         raise FormatError("no .npz file, which is a zip of numpy's arrays", path=path)
@@ -154,7 +154,7 @@ def _read_arrays(path: FilePath) -> dict[str, Array]:
     return found
 
 
-def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Array:
+def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Floats:
     """The array as floats; FormatError says which element is no number."""
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise FormatError(f"{name!r} holds no numbers", path=path)
@@ -167,7 +167,7 @@ def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Array:
     return numbers
 
 
-def _rate(arrays: dict[str, Array], fps: float | None, path: FilePath) -> float:
+def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float:
     """Frames a second that the file says, or else `fps`."""
     name = next((name for name in _RATES if name in arrays), "fps")
     said = arrays.get(name, np.array(math.nan if fps is None else fps))
@@ -285,7 +285,7 @@ def _body(name: str, rows: _Rows) -> Skeleton:
     return Skeleton(name, tuple(joints), tuple(above), offsets, tips)
 
 
-def _on_smpl(motion: Motion) -> tuple[Skeleton, Array, Array]:
+def _on_smpl(motion: Motion) -> tuple[Skeleton, Floats, Floats]:
     """One of SMPL's bodies, its joints' rotations [T, J, 4], and the pelvis's places [T, 3], in our world."""
     own = _own_body(motion.skeleton)
     if own:

@@ -26,16 +26,15 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.formats.text import listed, meant, read_lines, shown, to_numbers
-from motionmind.motion import Motion
-from motionmind.skeleton import BODIES, Skeleton
-
-Array = NDArray[np.float64]
+from motionmind._typing import Floats, Indices
+from motionmind.body.human import BODIES
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, listed, meant, shown
+from motionmind.files import FilePath, write_atomically
+from motionmind.formats.text import read_lines, to_numbers
+from motionmind.geometry import rotations as rot
 
 # A number is what begins like one: joints' names do not.
 _NUMBER = re.compile(r"[+-]?(\.?[0-9]|(inf|infinity|nan)\b)", re.IGNORECASE)
@@ -175,7 +174,7 @@ def _body(postures: list[list[_Entry]]) -> Skeleton:
     return min((body() for body in BODIES.values()), key=lambda body: len(named - set(body.names)))
 
 
-def _rotations(postures: list[list[_Entry]], skeleton: Skeleton, path: FilePath) -> Array:
+def _rotations(postures: list[list[_Entry]], skeleton: Skeleton, path: FilePath) -> Floats:
     """Unit quaternions [T, J, 4] of all postures; joints that none of them names are at rest."""
     find = cache(partial(_find, skeleton=skeleton))
     rotations = np.tile(rot.IDENTITY, (len(postures), len(skeleton), 1))
@@ -216,7 +215,7 @@ def _find(name: str, skeleton: Skeleton) -> int | None:
     return keys.index(_key(name)) if _key(name) in keys else None
 
 
-def _unit(rotations: Array, lines: NDArray[np.intp], skeleton: Skeleton, path: FilePath) -> Array:
+def _unit(rotations: Floats, lines: Indices, skeleton: Skeleton, path: FilePath) -> Floats:
     """The quaternions [T, J, 4] made unit; a zero is an error, far from unit a warning."""
     length = np.linalg.norm(rotations, axis=-1)
     if np.any(length < 1e-6):

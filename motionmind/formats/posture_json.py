@@ -23,10 +23,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
+from motionmind.body.motion import Posture
 from motionmind.errors import FormatError
+from motionmind.files import FilePath, write_atomically
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Posture
 
 
 class PostureSchema(msgspec.Struct, forbid_unknown_fields=True):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import codecs
 import math
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath, read_bytes
+from motionmind.errors import FormatError, shown
+from motionmind.files import FilePath, read_bytes
 
 # No length in any unit and no angle of a body comes near this; below it no sum or product can overflow.
 LARGEST = 1e9
@@ -52,21 +51,3 @@ def to_numbers(tokens: Sequence[str], path: FilePath, line: int) -> list[float]:
     if all(-LARGEST <= value <= LARGEST for value in values) and "_" not in "".join(tokens):
         return values
     return [to_number(token, path, line) for token in tokens]  # names the one that is none
-
-
-def shown(text: str, most: int = 40) -> str:
-    """`text` in quotes for a message, its middle left out where it is long."""
-    return repr(text if len(text) <= most else f"{text[: most - 13]}...{text[-10:]}")
-
-
-def meant(name: str, known: Iterable[str]) -> str:
-    """'; did you mean X?' for the known name nearest to `name`, or nothing where none is near."""
-    close = get_close_matches(name, list(known), n=1)
-    return f"; did you mean {close[0]}?" if close else ""
-
-
-def listed(names: Iterable[str], most: int = 5) -> str:
-    """Names in a row for a message: the first few and how many more."""
-    names = list(names)
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

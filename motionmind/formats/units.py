@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats, Indices
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
-from motionmind.skeleton import Skeleton
 
 # Metres in one unit. The "cmu" unit is that of the CMU Motion Capture Database, whose ASF files say `length 0.45`:
 # a length divided by 0.45 is in inches (mocap.cs.cmu.edu/faqs.php gives this conversion, "(1.0/0.45)*2.54/100.0");
@@ -62,7 +62,7 @@ def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
     return name, UNITS[name]
 
 
-def bone_span(parents: NDArray[np.intp], offsets: NDArray[np.float64], tips: NDArray[np.float64]) -> float:
+def bone_span(parents: Indices, offsets: Floats, tips: Floats) -> float:
     """Length of the longest way from one end of a body to another along its bones, in the unit of `offsets`.
 
     This is the diameter of the tree. It depends neither on the pose, nor on which joint is the root.

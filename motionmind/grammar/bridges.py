@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.grammar.transitions import Transitions
 
 NEAREST = 3  # states to which a bridge leads from each state
@@ -23,9 +23,9 @@ class Bridges:
         degrees: the angle that it spans [B].
     """
 
-    indptr: NDArray[np.int64]
-    targets: NDArray[np.int32]
-    degrees: NDArray[np.float64]
+    indptr: Ints
+    targets: Int32s
+    degrees: Floats
 
     def span(self, row: int, target: int) -> float:
         """Degrees that the bridge from the state of `row` to `target` spans."""
@@ -33,7 +33,7 @@ class Bridges:
         return float(self.degrees[first + np.searchsorted(self.targets[first:last], target)])
 
 
-def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Bridges:
+def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
     """Bridges between the states of each lane, whose orientations are `centres` [G, 4].
 
     From every state to its three nearest within 45 degrees, and, both ways, along a minimum spanning tree of the
@@ -55,12 +55,12 @@ def find_bridges(centres: NDArray[np.float64], transitions: Transitions) -> Brid
     return Bridges(np.concatenate(indptr), np.concatenate(targets), np.concatenate(degrees))
 
 
-def _angles(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+def _angles(centres: Floats) -> Floats:
     """Angle between all pairs of orientations [S, S]; arccos serves, for states are no less than degrees apart."""
     return np.asarray(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
 
 
-def _nearest(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _nearest(angles: Floats) -> Bools:
     near = np.zeros(angles.shape, dtype=bool)
     others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
     order = np.argsort(others, axis=1, kind="stable")[:, :NEAREST]
@@ -68,7 +68,7 @@ def _nearest(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
     return near
 
 
-def _spanning_tree(angles: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _spanning_tree(angles: Floats) -> Bools:
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     # The offset keeps edges of zero length, which a sparse matrix would drop, and leaves the tree what it is.

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from motionmind._typing import Floats, Int32s, Ints
 
 if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 PSEUDO_COUNT = 1.0
 
@@ -47,7 +46,7 @@ class Coordination:
     parents: Ints
     pair_starts: Ints
     pair_ptr: Ints
-    pair_states: NDArray[np.int32]
+    pair_states: Int32s
     pair_costs: Floats
     child_costs: Floats
     parent_costs: Floats
@@ -72,7 +71,7 @@ class Coordination:
 
 
 def fit_network(
-    names: tuple[str, ...], parents: Ints, states: NDArray[np.int32], sizes: Ints, weights: Floats | None = None
+    names: tuple[str, ...], parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None = None
 ) -> DiscreteBayesianNetwork:
     """The pgmpy network over joints `names` [J] with `parents` [J], from `states` [N, J] of a corpus's postures.
 
@@ -107,7 +106,7 @@ def compile_network(
     network: DiscreteBayesianNetwork,
     names: tuple[str, ...],
     parents: Ints,
-    states: NDArray[np.int32],
+    states: Int32s,
     sizes: Ints,
     weights: Floats | None = None,
 ) -> Coordination:

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.bridges import Bridges, find_bridges
 from motionmind.grammar.coordination import Coordination, compile_network, fit_network
 from motionmind.grammar.transitions import Transitions, count_transitions
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +33,7 @@ def learn(
     lanes: tuple[str, ...],
     parents: Ints,
     centres: Floats,
-    states: NDArray[np.int32],
+    states: Int32s,
     sizes: Ints,
     begins: Ints,
     seconds: Floats,

@@ -16,17 +16,17 @@ coding and partial string matching", IEEE Transactions on Communications 32(4), 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, Floats, Ints
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
 
 
 def fit_progression(
     parents: Ints,
     starts: Ints,
     indptr: Ints,
-    targets: NDArray[np.int32],
-    states: NDArray[np.int32],
+    targets: Int32s,
+    states: Int32s,
     begins: Ints,
     ends: Ints,
     weights: Floats,

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from motionmind._typing import Floats, Int32s, Ints
 
 Weights = Literal["conditional", "printed"]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +33,11 @@ class Transitions:
 
     starts: Ints
     indptr: Ints
-    targets: Indices
+    targets: Int32s
     counts: Floats
     visits: Floats
-    attests: Indices
-    arrives: Indices
+    attests: Int32s
+    arrives: Int32s
     seconds: Floats
 
     @property
@@ -79,7 +77,7 @@ class Transitions:
         at = int(first + np.searchsorted(self.targets[first:last], target))
         return at if at < last and self.targets[at] == target else -1
 
-    def edges(self, path: NDArray[np.int32]) -> Ints:
+    def edges(self, path: Int32s) -> Ints:
         """Indices of the transitions of all lanes in each move of a path of states [T + 1, L]: [T, L], as `edge`."""
         width = int(self.sizes().max()) + 1
         keys = self.sources * width + self.targets  # in order, for rows are, and the targets in each
@@ -89,7 +87,7 @@ class Transitions:
 
 
 def count_transitions(
-    states: NDArray[np.int32],
+    states: Int32s,
     sizes: Ints,
     begins: Ints,
     seconds: Floats,

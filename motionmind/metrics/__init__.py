@@ -1,6 +1,6 @@
 """Measures of movement: how far from the truth, how smooth, whether feet stay, how likely, how new, in whose style."""
 
-from motionmind.metrics.feet import find_feet, find_floor, foot_slide, skating
+from motionmind.body.contact import find_feet, find_floor, foot_slide, skating
 from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
 from motionmind.metrics.paths import Habits, arrival_spread, arrivals, find_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc

@@ -11,13 +11,11 @@ on the other. Here q and -q are the same rotation: the nearer sign counts.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
-from motionmind.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
+from motionmind.geometry import rotations as rot
 
 
 def seen(

@@ -9,20 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind._typing import Floats, States
+from motionmind.body.contact import RATE, find_feet, find_floor, foot_slide, skating
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
-from motionmind.learned import Learned, own_skeleton
-from motionmind.metrics.feet import RATE, find_feet, find_floor, foot_slide, skating
+from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.learned.model import Learned
 from motionmind.metrics.paths import Habits, arrival_spread, find_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
 from motionmind.metrics.verbatim import LONGEST, Phrasebook, find_phrases
-from motionmind.motion import Motion
-from motionmind.realise.timing import usual
-from motionmind.skeleton import Skeleton
-from motionmind.spline import natural_spline, rotation_spline
-
-Floats = NDArray[np.float64]
-Path = NDArray[np.int32]
+from motionmind.realise.timeline import usual
+from motionmind.retarget.retarget import own_skeleton
 
 RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
 _SHORTEST = 4  # frames that a jerk needs
@@ -73,7 +72,7 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
 }
 
 
-def measure(motion: Motion, learned: Learned, path: Path | None = None) -> dict[str, Figure]:
+def measure(motion: Motion, learned: Learned, path: States | None = None) -> dict[str, Figure]:
     """All measures of a movement beside a corpus.
 
     How it moves is seen at 30 frames a second, keyframes joined by splines, as tweens join them. What it says in states
@@ -141,7 +140,7 @@ def _on(skeleton: Skeleton, motion: Motion) -> Motion:
     return motion
 
 
-def _path(motion: Motion, learned: Learned, step: float) -> Path:
+def _path(motion: Motion, learned: Learned, step: float) -> States:
     """The states [T + 1, L] that a movement passes: of its keyframes, or every `step` seconds where it has many frames,
     or move by move where the engine made it."""
     whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
@@ -171,7 +170,7 @@ def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
     return out
 
 
-def _path_figures(path: Path, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
+def _path_figures(path: States, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
     """What is measured of states; `clip` is the clip of the corpus that they are from."""
     runs = phrases.runs(path, clip) or [0]
     return {

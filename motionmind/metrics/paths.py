@@ -8,24 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Bools, Floats, Ints, States
 from motionmind.corpus.corpus import FACING
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-Path = NDArray[np.int32]
 
-
-def arrivals(path: Path) -> Ints:
+def arrivals(path: States) -> Ints:
     """The number of moves after which each lane is where it stays to the end [L]; 0 for one that never leaves it."""
     return np.asarray(len(path) - np.cumprod(path[::-1] == path[-1], axis=0).sum(axis=0), dtype=np.int64)
 
 
-def arrival_spread(path: Path) -> float:
+def arrival_spread(path: States) -> float:
     """Standard deviation, in moves, of when the lanes that move arrive for good; 0 where fewer than two move.
 
     What [MM] balances lengths for: that all parts of the body arrive together.
@@ -57,7 +52,7 @@ class Habits:
     percentile: Floats
     log_likelihood: Floats
 
-    def cliches(self, path: Path) -> Bools:
+    def cliches(self, path: States) -> Bools:
         """For each joint's move of a path out of a state with a choice, whether it is the likeliest one.
 
         The mean is the cliche rate. A move that the corpus does not attest is none; where all that lead out of a state
@@ -67,7 +62,7 @@ class Habits:
         chosen = moved & self.choice[rows]
         return (self.likeliest[edges] & (edges >= 0))[chosen]
 
-    def percentiles(self, path: Path) -> Floats:
+    def percentiles(self, path: States) -> Floats:
         """For each joint's move of a path the percentile of how often the corpus made it: 0 where it never did.
 
         Of the corpus's own moves the mean is 50.
@@ -75,16 +70,16 @@ class Habits:
         moved, edges, _ = self._moves(path)
         return np.where(edges >= 0, self.percentile[edges], 0.0)[moved]
 
-    def log_likelihoods(self, path: Path) -> Floats:
+    def log_likelihoods(self, path: States) -> Floats:
         """For each attested transition of a joint in a path, holds among them, its log P, nats."""
         _, edges, _ = self._moves(path)
         return self.log_likelihood[edges[edges >= 0]]
 
-    def attested(self, path: Path) -> Bools:
+    def attested(self, path: States) -> Bools:
         """For each transition of a joint in a path, holds among them, whether the corpus attests it."""
         return (self._moves(path)[1] >= 0).ravel()
 
-    def _moves(self, path: Path) -> tuple[Bools, Ints, Ints]:
+    def _moves(self, path: States) -> tuple[Bools, Ints, Ints]:
         """Whether each joint moves, the transition that it makes or -1, and the row that it leaves [T, joints]."""
         graph = self.transitions
         before, after = path[:-1, : self.joints], path[1:, : self.joints]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-
-Floats = NDArray[np.float64]
+from motionmind._typing import Floats
+from motionmind.geometry import rotations as rot
 
 _PADDING = 4  # the spectrum is taken of 2^4 times as many samples, zeros added
 _HIGHEST = 10.0  # Hz; above it is no movement of a person

@@ -14,12 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats
 from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
 
-Floats = NDArray[np.float64]
 Sequences = Mapping[str, Sequence[Floats]]  # the unbroken pieces [T, J, 4] of each sequence, at 30 frames a second
 
 RATE = 30.0

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind.chaos.baselines import limbs
+from motionmind._typing import Int32s, Ints, States
+from motionmind.body.limbs import limbs
 from motionmind.corpus.corpus import Corpus
-
-Path = NDArray[np.int32]
-Ints = NDArray[np.int64]
 
 LONGEST = 5  # states that n-grams have at most
 _SEVERAL = -1  # in place of the one clip that has an n-gram
@@ -35,7 +32,7 @@ class Phrasebook:
     places: dict[bytes, list[int]]
     clip_of: Ints
 
-    def copied(self, path: Path, size: str, n: int, besides: int | None = None) -> float:
+    def copied(self, path: States, size: str, n: int, besides: int | None = None) -> float:
         """Share of the sequences of `n` states in a path that the corpus has, the mean over parts of a `size`.
 
         Args:
@@ -53,7 +50,7 @@ class Phrasebook:
         ]
         return float(np.mean(found)) if found else float("nan")
 
-    def runs(self, path: Path, besides: int | None = None) -> list[int]:
+    def runs(self, path: States, besides: int | None = None) -> list[int]:
         """Lengths in postures of the runs of whole postures, wherever they face, that the path has from one clip of
         the corpus in its order: of those that cannot be longer, in the order of their ends."""
         lengths: list[int] = []
@@ -68,7 +65,7 @@ class Phrasebook:
         return [now for now, after in zip(lengths, [*lengths[1:], 0], strict=True) if now and after <= now]
 
 
-def find_phrases(corpus: Corpus, states: NDArray[np.int32]) -> Phrasebook:
+def find_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
     """What a corpus, with its postures' states [N, L], says word by word."""
     joints = list(range(len(corpus.skeleton)))
     parts = [part.tolist() for part in limbs(corpus.skeleton).values()]
@@ -87,7 +84,7 @@ def find_phrases(corpus: Corpus, states: NDArray[np.int32]) -> Phrasebook:
     return Phrasebook(groups, grams, places, clip_of)
 
 
-def _grams(path: Path, part: Sequence[int], n: int) -> list[bytes]:
+def _grams(path: States, part: Sequence[int], n: int) -> list[bytes]:
     """All sequences of `n` states of a part of the body in a path, each with what part it is of."""
     own = np.ascontiguousarray(path[:, list(part)], dtype=np.int32)
     head = np.array(part, dtype=np.int32).tobytes()

@@ -6,21 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import listed, meant
-from motionmind.motion import Motion, Posture
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy import SIDES, Body
+from motionmind.body.motion import Motion, Posture
+from motionmind.errors import FormatError, listed, meant
+from motionmind.files import FilePath
+from motionmind.geometry import rotations as rot
 from motionmind.notation import rows as phrases
-from motionmind.notation.anatomy import SIDES, Body
 from motionmind.notation.read import read_score
 from motionmind.notation.rows import Row
 from motionmind.notation.score import Clip, Score, Setting
 from motionmind.notation.stance import Feet, place
-
-Array = NDArray[np.float64]
 
 LENIENT = 0.5  # degrees past a limit that rounding explains
 SUNK = 0.01  # metres under the floor that no eye sees
@@ -88,14 +85,14 @@ class _Posed:
         pivot: how far that way it is to the place about which the foot turns [T, F, 1], metres.
     """
 
-    rotations: Array
-    root: Array
-    weight: Array
-    rests: NDArray[np.bool_]
-    balls: Array
-    tips: Array
-    back: Array
-    pivot: Array
+    rotations: Floats
+    root: Floats
+    weight: Floats
+    rests: Bools
+    balls: Floats
+    tips: Floats
+    back: Floats
+    pivot: Floats
 
     def part(self, start: int, stop: int) -> _Posed:
         """Those from `start` up to `stop`."""
@@ -154,7 +151,7 @@ def _settings(body: Body, rows: list[Row]) -> dict[tuple[str, str], list[Setting
     return out
 
 
-def _degrees(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Array]:
+def _degrees(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Floats]:
     """Angles [T, 3] of each joint, by its name."""
     out = {name: np.zeros((count, 3)) for name in body.skeleton.names}
     for (_, side), limbs in settings.items():
@@ -172,7 +169,7 @@ def _feet(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int
     layer = next(layer for layer, joints in body.layers.items() if body.leg.hip in joints)
     legs = [settings[layer, side] for side in SIDES]
 
-    def read(key: str, otherwise: float) -> Array:
+    def read(key: str, otherwise: float) -> Floats:
         return np.array([[limb[t].get(key, otherwise) for limb in legs] for t in range(count)])
 
     stands = read("stand", 0.0) > 0.0
@@ -195,15 +192,13 @@ def _feet(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int
     )
 
 
-def _either(legs: list[list[Setting]], key: str, count: int) -> Array:
+def _either(legs: list[list[Setting]], key: str, count: int) -> Floats:
     """A value [T] of the whole body that either leg may speak of; their mean where both do."""
     said = [[leg[t][key] for leg in legs if key in leg[t]] for t in range(count)]
     return np.array([sum(values) / max(len(values), 1) for values in said])
 
 
-def _planted(
-    body: Body, settings: dict[tuple[str, str], list[Setting]], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _planted(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> tuple[Ints, Bools]:
     """The last joint of each limb [F], and whether it is planted [T, F]."""
     limbs = [(layer, side) for layer, side in settings if side]
     ends = np.array([body.named(body.layers[layer][-1], side) for layer, side in limbs], dtype=np.int64)
@@ -211,7 +206,7 @@ def _planted(
     return ends, planted.reshape(count, len(limbs))
 
 
-def _lifted(body: Body, rows: list[Row], rotations: Array, root: Array, stands: NDArray[np.bool_]) -> Array:
+def _lifted(body: Body, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
     """How far to lift each posture [T], metres: its lowest point on the floor, or as high as its row says.
 
     Where a leg stands the height is right already, and nothing may be under the floor.
@@ -228,7 +223,7 @@ def _lifted(body: Body, rows: list[Row], rotations: Array, root: Array, stands: 
     return np.where(stands, 0.0, up - lowest)
 
 
-def _check_reach(rows: list[Row], feet: Feet, short: Array) -> None:
+def _check_reach(rows: list[Row], feet: Feet, short: Floats) -> None:
     for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
         raise rows[t].where.error("a leg touches the floor, but none stands on it")
     weightless = feet.stands.any(axis=1) & ~(feet.stands & (feet.weight > 0.0)).any(axis=1)
@@ -241,7 +236,7 @@ def _check_reach(rows: list[Row], feet: Feet, short: Array) -> None:
         raise rows[t].where.error(f"the {SIDES[side]} foot is {far} further from the hip than the leg is long")
 
 
-def _check_limits(body: Body, rows: list[Row], degrees: dict[str, Array]) -> None:
+def _check_limits(body: Body, rows: list[Row], degrees: dict[str, Floats]) -> None:
     """Refuse what no body can do: FormatError names line, joint, angle and limit."""
     for name in body.skeleton.names:
         _, joint = body.anatomy(name)

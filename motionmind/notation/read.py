@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from unicodedata import normalize
 
-from motionmind.errors import FormatError
-from motionmind.formats.files import FilePath
-from motionmind.formats.text import listed, meant, read_lines
-from motionmind.notation.anatomy import SIDES, Body
-from motionmind.notation.body_file import HEADINGS, body, read_body
+from motionmind.body.anatomy import SIDES, Body
+from motionmind.body.anatomy_file import HEADINGS, body, read_body
+from motionmind.errors import FormatError, listed, meant
+from motionmind.files import FilePath
+from motionmind.formats.text import read_lines
 from motionmind.notation.score import (
     KINDS,
     NOTHING,

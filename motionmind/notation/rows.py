@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import cos, radians, sin
 
-from motionmind.notation.anatomy import SIDES
+from motionmind.body.anatomy import SIDES
 from motionmind.notation.score import NUMBER, Clip, Line, Phrase, Score, Setting, Where, number, tempo
 
 DEEPEST = 50  # phrases within phrases: deeper, and they go round in a circle

@@ -11,9 +11,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from motionmind.errors import FormatError
-from motionmind.formats.text import meant
-from motionmind.notation.anatomy import SIDES, Body
+from motionmind.body.anatomy import SIDES, Body
+from motionmind.errors import FormatError, meant
 
 Setting = Mapping[object, float]
 

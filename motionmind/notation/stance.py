@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.notation.anatomy import SIDES, Body, Leg
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from motionmind._typing import Bools, Floats
+from motionmind.body.anatomy import SIDES, Body, Leg
+from motionmind.geometry import rotations as rot
 
 ON_BALL = 24.0  # degrees that the heel is lifted from which on the ball alone carries
 ROUNDS = 60  # of moving the pelvis until the weight is where it should be; each leaves about a fifth of the fault
@@ -36,18 +33,18 @@ class Feet:
         lean: how far the weight is off its place, to the left and ahead [T, 2], metres.
     """
 
-    stands: Flags
-    touches: Flags
-    out: Array
-    ahead: Array
-    turn: Array
-    knee: Array
-    heel: Array
-    bend: Array
-    towards: Array
-    weight: Array
-    pivot: Array
-    lean: Array
+    stands: Bools
+    touches: Bools
+    out: Floats
+    ahead: Floats
+    turn: Floats
+    knee: Floats
+    heel: Floats
+    bend: Floats
+    towards: Floats
+    weight: Floats
+    pivot: Floats
+    lean: Floats
 
 
 @dataclass(frozen=True)
@@ -62,10 +59,10 @@ class Stance:
         astray: how far the weight is off its place [T], metres: next to nothing, unless no place of the pelvis will do.
     """
 
-    rotations: Array
-    root: Array
-    short: Array
-    astray: Array
+    rotations: Floats
+    root: Floats
+    short: Floats
+    astray: Floats
 
 
 class _Bones:
@@ -83,7 +80,7 @@ class _Bones:
         self.heel = np.array(leg.heel)
 
 
-def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
+def place(body: Body, leg: Leg, rotations: Floats, feet: Feet) -> Stance:
     """Postures [T, J, 4] in the frame that the body faces in, their legs as `feet` says.
 
     The hips are as high as the legs that stand allow with their knees bent as little as they may be, and moved over the
@@ -116,12 +113,12 @@ def place(body: Body, leg: Leg, rotations: Array, feet: Feet) -> Stance:
     return Stance(out, root, short, np.abs(wrong).max(axis=1))
 
 
-def _ball(bones: _Bones, feet: Feet, side: int) -> Array:
+def _ball(bones: _Bones, feet: Feet, side: int) -> Floats:
     """Where the ball of a foot is [T, 3], as of the left leg."""
     return np.stack([bones.hips[0, 0] + feet.out[:, side], np.zeros(len(feet.out)), feet.ahead[:, side]], axis=-1)
 
 
-def _support(bones: _Bones, feet: Feet, shares: Array) -> Array:
+def _support(bones: _Bones, feet: Feet, shares: Floats) -> Floats:
     """The place [T, 2] on the floor, left and ahead, over which the centre of mass belongs.
 
     Halfway between ankle and ball of a flat foot, over the ball of one whose heel is lifted by `ON_BALL` or more.
@@ -135,7 +132,9 @@ def _support(bones: _Bones, feet: Feet, shares: Array) -> Array:
     return out
 
 
-def _stand(bones: _Bones, out: Array, pelvis: Array, hips: Array, shift: Array, feet: Feet) -> tuple[Array, Array]:
+def _stand(
+    bones: _Bones, out: Floats, pelvis: Floats, hips: Floats, shift: Floats, feet: Feet
+) -> tuple[Floats, Floats]:
     """Place the legs that stand; the middle of the hips [T, 3], and by how much legs are too short [T, 2].
 
     `hips` [T, 2, 3] are seen from their middle.
@@ -179,7 +178,7 @@ def _stand(bones: _Bones, out: Array, pelvis: Array, hips: Array, shift: Array, 
     return np.stack([shift[:, 0], height, shift[:, 1]], axis=-1), short
 
 
-def _reach(bones: _Bones, target: Array, towards: Array) -> tuple[Array, Array]:
+def _reach(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floats]:
     """Rotations of hip and knee [T, 4] that bring the ankle to `target` [T, 3], seen from the hip.
 
     The knee points `towards` [T] radians outward: the thigh, the shank and that direction are in one plane. By the law
@@ -200,7 +199,7 @@ def _reach(bones: _Bones, target: Array, towards: Array) -> tuple[Array, Array]:
     return rot.mul(line, rot.from_axis_angle([1.0, 0.0, 0.0], np.arctan2(end[:, 2], -end[:, 1]))), knee
 
 
-def _touch(bones: _Bones, out: Array, given: Array, root: Array, hips: Array, feet: Feet) -> Array:
+def _touch(bones: _Bones, out: Floats, given: Floats, root: Floats, hips: Floats, feet: Feet) -> Floats:
     """Raise the legs that touch until their feet's lowest point is on the floor, by bisection of the angle raised.
 
     How far above the floor the feet of legs that hang straight down are already [T, 2], metres.
@@ -227,7 +226,7 @@ def _touch(bones: _Bones, out: Array, given: Array, root: Array, hips: Array, fe
     return above
 
 
-def _lowest(bones: _Bones, thigh: Array, joints: Array) -> Array:
+def _lowest(bones: _Bones, thigh: Floats, joints: Floats) -> Floats:
     """Height [T] over the hip of the lowest point of a foot whose leg hangs at `thigh`."""
     turned = rot.mul(thigh, joints[:, 1])
     place = rot.mul_vec(thigh, bones.knee) + rot.mul_vec(turned, bones.ankle)

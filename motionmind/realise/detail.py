@@ -8,14 +8,11 @@ whole body's from one move, for what its joints do within a fifth of a second th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus, Moves
+from motionmind.geometry.distances import squared
 from motionmind.jit import jit
-from motionmind.realise.ways import squared
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer a posture must be for a run to end before it
 

@@ -12,15 +12,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.realise.limits import within_limits
+from motionmind._typing import Bools, Floats
+from motionmind.body.limbs import fork_of, limbs_of
+from motionmind.body.limits import within_limits
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 from motionmind.realise.root import BEARS, lows, stand
-from motionmind.realise.ways import fork_of, limbs_of
-from motionmind.skeleton import Skeleton
-
-Floats = NDArray[np.float64]
 
 HOLDS = 0.04  # metres above the floor at which a foot's hold on it has fallen to a half
 EVEN = 0.03  # what it weighs, beside a foot that stands, that a track departs evenly from the one that was
@@ -44,7 +42,7 @@ def plant(
     heights: Floats,
     clearance: Floats,
     stands: Floats,
-    loose: NDArray[np.bool_],
+    loose: Bools,
     fps: float,
     given: Floats,
 ) -> tuple[Floats, Floats]:
@@ -98,7 +96,7 @@ def _planted(
     floor: Floats,
     under: Floats,
     stands: Floats,
-    loose: NDArray[np.bool_],
+    loose: Bools,
     fps: float,
 ) -> tuple[Floats, Floats]:
     """The same movement, three frames or more, between two that stay; legs are lifted by so much that they are `under`
@@ -174,7 +172,7 @@ def _legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
     return numbers, out
 
 
-def _departure(ends: Floats, heights: Floats, stands: Floats, others_stand: NDArray[np.bool_], fps: float) -> Floats:
+def _departure(ends: Floats, heights: Floats, stands: Floats, others_stand: Bools, fps: float) -> Floats:
     """How far a foot is to be from where it was [N, 3], metres: 0 in the first and in the last frame.
 
     Args:

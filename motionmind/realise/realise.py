@@ -7,29 +7,28 @@ from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.limbs import parts_of
+from motionmind.body.limits import within_limits
+from motionmind.body.motion import Insertion, Motion, Posture
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, moments
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
-from motionmind.motion import Insertion, Motion, Posture
+from motionmind.learned.carriage import Carriage
 from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.feet import plant
-from motionmind.realise.limits import within_limits
-from motionmind.realise.root import Carriage, carry, lowest, stand
-from motionmind.realise.timing import durations
-from motionmind.realise.ways import CLOSELY, NEAR, likely, mean_rotations, nearness, parts_of
-from motionmind.skeleton import Skeleton
-from motionmind.spline import natural_spline, rotation_spline
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from motionmind.realise.root import carry, lowest, stand
+from motionmind.realise.timeline import durations
+from motionmind.realise.walks import CLOSELY, NEAR, likely, mean_rotations, nearness
 
 RUN = 1.0  # seconds for which a body that turns goes on turning
 
 
 def realise(
-    path: NDArray[np.int32],
+    path: Int32s,
     a: Posture,
     b: Posture,
     corpus: Corpus,
@@ -44,7 +43,7 @@ def realise(
 
     Its first and last frames are `a` and `b`, exactly, and at the moves that `through` names its joints and its facing
     are as in the postures there. Between them the body is, at the times of the moves, where the mean of all ways is
-    that the corpus knows from `a` to `b` in that time (`motionmind.realise.ways`); a C2 spline joins them, and fine
+    that the corpus knows from `a` to `b` in that time (`motionmind.realise.walks`); a C2 spline joins them, and fine
     detail of the corpus's recordings is added to it (`motionmind.realise.detail`). With `within` ways count the more
     the nearer they are to the path, and each joint is then brought into its state.
 
@@ -135,7 +134,7 @@ def realise(
     return Motion(a.skeleton, rotations, root, times, "tween", (Insertion(keys),)), detailed
 
 
-def _clock(path: NDArray[np.int32], grammar: Grammar, fps: float, length: float | None) -> tuple[Floats, Floats, int]:
+def _clock(path: Int32s, grammar: Grammar, fps: float, length: float | None) -> tuple[Floats, Floats, int]:
     """Times of a path's moves [T + 1], and of as many frames at about `fps` as they take, or as `length` seconds do;
     and how many moves the corpus makes in that time."""
     seconds = durations(path, grammar.transitions)
@@ -155,7 +154,7 @@ def _on_feet(
     halves: Floats,
     heights: Floats,
     stands: Floats,
-    loose: NDArray[np.bool_],
+    loose: Bools,
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
@@ -284,9 +283,7 @@ def _drift(travel: Floats, headings: Floats) -> Floats:
     return np.asarray(along * np.array([1.0, 0.0, 1.0]))
 
 
-def _headings(
-    path: NDArray[np.int32], grammar: Grammar, seconds: Floats, stops: Mapping[int, NDArray[np.float64]]
-) -> Floats:
+def _headings(path: Int32s, grammar: Grammar, seconds: Floats, stops: Mapping[int, Floats]) -> Floats:
     """Headings in radians [T + 1] of a path through facing states, unwrapped, at `stops` those of their turns [4].
 
     Each move turns the short way between its states, as it was counted. A state is a step of the circle, and the body

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.mirror import LEFT, MIDDLE, RIGHT, sides_of
-from motionmind.notation.body_file import body
+from motionmind._typing import Floats
+from motionmind.body.anatomy_file import body
+from motionmind.body.human import human23
+from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 from motionmind.render.solids import Cones, Ellipsoids
-from motionmind.skeleton import Skeleton, human23
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 
 FACE, HAIR, MARK = "face", "hair", "mark"  # paints, beside the sides
@@ -102,7 +102,7 @@ class Body:
         """What each solid is painted with."""
         return tuple([cone.paint for cone in self.cones] + [ball.paint for ball in self.balls])
 
-    def solids(self, rotations: Array, root: Array) -> tuple[Cones, Ellipsoids]:
+    def solids(self, rotations: Floats, root: Floats) -> tuple[Cones, Ellipsoids]:
         """The solids in the world of postures given by local rotations [..., J, 4] and the root's place [..., 3]."""
         turned = self.skeleton.global_rotations(rotations)
         joints = self.skeleton.positions(rotations, root)
@@ -111,7 +111,7 @@ class Body:
         first, second = turned[..., turns[:, 0], :], turned[..., turns[:, 1], :]
         axes = rot.slerp(first, second, 0.5)
 
-        def put(frames: list[int], points: list[Place]) -> Array:
+        def put(frames: list[int], points: list[Place]) -> Floats:
             local = np.array(points).reshape(-1, 3)
             return np.asarray(origin[..., frames, :] + rot.mul_vec(axes[..., frames, :], local))
 
@@ -128,7 +128,7 @@ class Body:
         )
         return cones, balls
 
-    def centre_of_mass(self, cones: Cones, balls: Ellipsoids) -> Array:
+    def centre_of_mass(self, cones: Cones, balls: Ellipsoids) -> Floats:
         """The centre of mass [..., 3] of a body whose solids are there, metres.
 
         A person's parts weigh what people's do, and each is as dense as another of its solids; any other body is as
@@ -293,7 +293,7 @@ class _Person:
         root: int,
         beside: Place,
         radii: tuple[float, float],
-        least: Array,
+        least: Floats,
         share: float = 1.0,
     ) -> Iterator[Cone]:
         """Fingers or toes from the joint `root` on, through the joints below it up to the tip; metres for 1.70 m.
@@ -350,7 +350,7 @@ class _Person:
     def _joint(self, name: str) -> int:
         return self.skeleton.index(name)
 
-    def _step(self, start: str, end: str) -> Array:
+    def _step(self, start: str, end: str) -> Floats:
         """From one joint to another at rest [3], metres."""
         return np.asarray(self.rest[self._joint(end)] - self.rest[self._joint(start)])
 
@@ -387,6 +387,6 @@ def _span(skeleton: Skeleton) -> float:
     return float(np.ptp(rest, axis=0).max()) or 1.0
 
 
-def _place(point: Array) -> Place:
+def _place(point: Floats) -> Place:
     x, y, z = (float(number) for number in point)
     return x, y, z

@@ -8,12 +8,12 @@ from functools import cached_property
 from math import ceil, cos, floor, radians, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats
+from motionmind.render.depth_buffer import Canvas
 from motionmind.render.figure import ABOVE, View, seen
-from motionmind.render.solids import Canvas, Cones, Ellipsoids
+from motionmind.render.solids import Cones, Ellipsoids
 
-Array = NDArray[np.float64]
 Corner = tuple[int, int]
 
 SMOOTH = 2  # samples a pixel, each way
@@ -54,7 +54,7 @@ class Camera:
     """
 
     view: View
-    origin: Array
+    origin: Floats
     left: float
     top: float
     scale: float
@@ -62,19 +62,19 @@ class Camera:
     height: int
     margin: int
 
-    def to_pixels(self, points: Array) -> Array:
+    def to_pixels(self, points: Floats) -> Floats:
         """Where points of the world [..., 3], metres, are in the picture [..., 2], pixels."""
         there = (points - self.origin) @ self.view.axes.T
         return np.stack([there[..., 0] - self.left, self.top - there[..., 1]], axis=-1) * self.scale
 
     @cached_property
-    def on_floor(self) -> Array:
+    def on_floor(self) -> Floats:
         """The affine map [2, 3] from x, y, 1 in the picture, pixels, to x, z on the floor, metres from the origin."""
         right, up, towards = self.view.axes
         along = up - towards * (up[1] / towards[1])  # up the picture, and along the floor
         return np.column_stack([right / self.scale, -along / self.scale, self.left * right + self.top * along])[[0, 2]]
 
-    def solids(self, cones: Cones, balls: Ellipsoids, middle: Array) -> tuple[Cones, Ellipsoids]:
+    def solids(self, cones: Cones, balls: Ellipsoids, middle: Floats) -> tuple[Cones, Ellipsoids]:
         """Solids of the world in the view's axes; z is counted from the place `middle` [3], for haze."""
         towards = np.array(self.view.towards)
         return seen(cones, balls, self.view, self.origin + towards * (towards @ (middle - self.origin)))
@@ -90,7 +90,7 @@ class Camera:
         return (x, y), Canvas(*place, width, height, SMOOTH * self.scale)
 
 
-def aim(view: View, origin: Array, boxes: Array, points: Array, least: float, size: int, strip: int) -> Camera:
+def aim(view: View, origin: Floats, boxes: Floats, points: Floats, least: float, size: int, strip: int) -> Camera:
     """The camera that takes in all of a path, as large as the picture allows.
 
     A long path makes the picture wider, up to twice its height, before it makes the body smaller.

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.mirror import LEFT, MIDDLE, RIGHT
+from motionmind._typing import Bools, Floats, Pixels
+from motionmind.body.mirror import LEFT, MIDDLE, RIGHT
+from motionmind.geometry import rotations as rot
 from motionmind.render.anatomy import FACE, HAIR, MARK, Body
-from motionmind.render.solids import Canvas, Cones, Ellipsoids
-
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
+from motionmind.render.depth_buffer import Canvas
+from motionmind.render.solids import Cones, Ellipsoids
 
 COLOURS = {
     LEFT: (222, 98, 66),
@@ -50,7 +48,7 @@ class View:
     towards: tuple[float, float, float]
 
     @property
-    def axes(self) -> Array:
+    def axes(self) -> Floats:
         """The matrix [3, 3] that takes the world's coordinates to the viewer's."""
         return np.array([self.right, self.up, self.towards])
 
@@ -66,7 +64,7 @@ STAGE_LEFT = View(
 ABOVE = View("from above: the audience is below", (1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 
 
-def seen(cones: Cones, balls: Ellipsoids, view: View, origin: Array) -> tuple[Cones, Ellipsoids]:
+def seen(cones: Cones, balls: Ellipsoids, view: View, origin: Floats) -> tuple[Cones, Ellipsoids]:
     """Solids in a viewer's axes, with `origin` [..., 3] of the world, metres, in the middle of the view."""
     turn, origin = view.axes.T, np.asarray(origin)[..., None, :]
     return (
@@ -90,17 +88,17 @@ def draw(canvas: Canvas, cones: Cones, balls: Ellipsoids, only: frozenset[int] |
     canvas.draw(cones, balls, numbers)
 
 
-def plain(body: Body) -> Array:
+def plain(body: Body) -> Floats:
     """RGB [N, 3] of a body's solids, from 0 to 255: left is warm, right is cool, the trunk is neutral."""
     return np.array([COLOURS[paint] for paint in body.paints], dtype=np.float64)
 
 
-def inserted(body: Body) -> Array:
+def inserted(body: Body) -> Floats:
     """RGB [N, 3] of a body's solids where the engine made the movement: violet, left still warmer than right."""
     return np.array([INSERTED[paint] for paint in body.paints], dtype=np.float64)
 
 
-def bridge_balls(body: Body, joints: Array, which: NDArray[np.bool_]) -> Ellipsoids:
+def bridge_balls(body: Body, joints: Floats, which: Bools) -> Ellipsoids:
     """Balls around the bridged ones, `which` [J], of a body's joints, which are at `joints` [..., J, 3], metres.
 
     They are larger than the body is there. Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they
@@ -111,7 +109,7 @@ def bridge_balls(body: Body, joints: Array, which: NDArray[np.bool_]) -> Ellipso
 
 
 @lru_cache(maxsize=8)
-def _girths(body: Body) -> Array:
+def _girths(body: Body) -> Floats:
     """Radii [J] in metres of balls that stand out from the solids that the joints are in."""
     skeleton, rest = body.skeleton, np.tile(rot.IDENTITY, (len(body.skeleton), 1))
     cones, balls = body.solids(rest, np.zeros(3))
@@ -132,7 +130,7 @@ def haze(body: Body) -> tuple[float, float, float]:
     return _DEEP * body.size, -_DEEP * body.size, _HAZE
 
 
-def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints: Array | None = None) -> Pixels:
+def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints: Floats | None = None) -> Pixels:
     """The picture [H, W, 3] of what is on a canvas, before a background of the same shape.
 
     The solids have the RGB `paints` [N, 3], `plain(body)` by default; any whose number is beyond those of the body are

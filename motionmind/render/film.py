@@ -14,18 +14,14 @@ from tempfile import TemporaryDirectory
 from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import GifImagePlugin, Image
 
+from motionmind._typing import Floats, Int16s, Pixels
+from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.formats.files import FilePath, write_atomically
+from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
-from motionmind.motion import Motion
-from motionmind.render.figure import Pixels
 from motionmind.render.stage import HOLD, SLOWEST, Stage, frame_rate, moments
-
-Indices = NDArray[np.uint8]
-Table = NDArray[np.int16]
 
 _GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second, at most: by default; and the most that browsers show in time
 _MP4_RATE, _MP4_MOST = 60.0, 120.0
@@ -129,7 +125,7 @@ def _short(number: int) -> bytes:
 
 
 @jit
-def _count(picture: Pixels, tally: NDArray[np.float64]) -> None:
+def _count(picture: Pixels, tally: Floats) -> None:
     """Add the colours of a picture [H, W, 3] to the sums of red, green and blue in each cell, and their number."""
     for row in picture:
         for r, g, b in row:
@@ -142,7 +138,7 @@ def _count(picture: Pixels, tally: NDArray[np.float64]) -> None:
 
 @jit
 def _index(
-    picture: Pixels, palette: Pixels, table: Table, shown: Indices, changed: Indices
+    picture: Pixels, palette: Pixels, table: Int16s, shown: Pixels, changed: Pixels
 ) -> tuple[int, int, int, int]:
     """Bring a picture [H, W, 3] onto the palette, and find what is new in it.
 

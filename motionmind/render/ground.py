@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from math import ceil, floor, log10
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageChops, ImageFilter
 
+from motionmind._typing import Floats, Pixels, Singles
+from motionmind.body.human import human23
 from motionmind.render.camera import Camera, Corner
-from motionmind.render.figure import Pixels, View, draw, seen
-from motionmind.render.solids import Canvas, Cones, Ellipsoids
-from motionmind.skeleton import human23
-
-Array = NDArray[np.float64]
-Single = NDArray[np.float32]
+from motionmind.render.depth_buffer import Canvas
+from motionmind.render.figure import View, draw, seen
+from motionmind.render.solids import Cones, Ellipsoids
 
 PAPER, GROUND, GRID, SHADOW = (252, 251, 249), (234, 230, 224), (217, 212, 205), (52, 44, 60)
 _APRON = 1.1  # of a body's height: around the path, over which the floor fades into the paper
@@ -36,7 +34,7 @@ class Shadow:
     """
 
     corner: Corner
-    dark: Single
+    dark: Singles
 
 
 class Ground:
@@ -49,7 +47,7 @@ class Ground:
         step: metres between the grid's lines: one for people, a hundredth for insects.
     """
 
-    def __init__(self, camera: Camera, low: Array, high: Array, height: float) -> None:
+    def __init__(self, camera: Camera, low: Floats, high: Floats, height: float) -> None:
         """The floor for a path of a body that is `height` metres tall."""
         self.camera, self.low, self.high = camera, low, high
         self._height = height
@@ -106,7 +104,7 @@ class Ground:
         return image.filter(ImageFilter.GaussianBlur(soft * self._height * fine))
 
 
-def darken(picture: Pixels, shadow: Shadow, bare: Single) -> None:
+def darken(picture: Pixels, shadow: Shadow, bare: Singles) -> None:
     """Lay a shadow on a picture [H, W, 3], as far as the floor is `bare` [H, W], from 0 to 1."""
     (x, y), (height, width) = shadow.corner, shadow.dark.shape
     box = slice(y, y + height), slice(x, x + width)

@@ -21,12 +21,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Motion
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.files import FilePath, write_atomically
 from motionmind.render.anatomy import Body, body_of
 from motionmind.render.figure import BRIDGED, COLOURS, INK, INSERTED, bridge_balls
-
-Array = NDArray[np.float64]
 
 _PLAYER = Path(__file__).parent / "player"
 _THREE = {"three": "three.module.min.js", "three/core": "three.core.min.js", "three/OrbitControls": "OrbitControls.js"}
@@ -122,7 +121,7 @@ def _body_data(body: Body) -> dict[str, Any]:
     }
 
 
-def packed(rotations: Array) -> NDArray[np.uint64]:
+def packed(rotations: Floats) -> NDArray[np.uint64]:
     """Unit quaternions [..., 4] in 64 bits each [...], to 1e-6 a coefficient.
 
     The coefficient that is largest in size follows from the others, so it is left out; `q` and `-q` being the same

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Motion
+from motionmind.files import FilePath, write_atomically
 from motionmind.render import PICTURES
 
 ON_A_SHEET = 48  # postures on a sheet where nobody says which

@@ -9,18 +9,13 @@ from __future__ import annotations
 from math import ceil, hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats, Indices, Int16s, Pixels, Singles
 from motionmind.jit import jit
 from motionmind.render.solids import EMPTY
 
-Array = NDArray[np.float64]
-Depths = NDArray[np.float32]
-Indices = NDArray[np.int16]
-Parts = NDArray[np.intp]
-Pixels = NDArray[np.uint8]
 Place = tuple[float, float, float]  # x and y of a canvas's upper left corner, and its pixels to a metre
-Buffers = tuple[Indices, Depths, Depths, Place]
+Buffers = tuple[Int16s, Singles, Singles, Place]
 
 _UP, _TOWARDS = 0.6, 0.8  # where light comes from: above the viewer; no side, so that a mirrored body looks mirrored
 _SHADE = 0.62  # brightness of what the light does not reach
@@ -30,7 +25,7 @@ _END_ON = 1e-3  # of a cone's thickness: one whose ends lie no farther apart in 
 
 @jit
 def draw(
-    solid: Indices, depth: Depths, shade: Depths, place: Place, cones: Array, balls: Array, numbers: Indices
+    solid: Int16s, depth: Singles, shade: Singles, place: Place, cones: Floats, balls: Floats, numbers: Int16s
 ) -> None:
     """Draw solids on a canvas: what is nearest stays, and of solids that touch, as in a joint, the higher number.
 
@@ -151,11 +146,11 @@ def _shows(canvas: Buffers, row: int, column: int, z: float, number: int) -> boo
 @jit
 def colour(
     picture: Pixels,
-    solid: Indices,
-    depth: Depths,
-    shade: Depths,
-    paints: Array,
-    parts: Parts,
+    solid: Int16s,
+    depth: Singles,
+    shade: Singles,
+    paints: Floats,
+    parts: Indices,
     haze: tuple[float, float, float],
     step: float,
     line: int,

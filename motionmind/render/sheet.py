@@ -10,12 +10,13 @@ from math import ceil, sqrt
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from motionmind._typing import Floats, Pixels
+from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.motion import Motion
 from motionmind.render.anatomy import Body, body_of
+from motionmind.render.depth_buffer import Canvas
 from motionmind.render.figure import (
     ABOVE,
     BRIDGED,
@@ -24,7 +25,6 @@ from motionmind.render.figure import (
     INSERTED,
     STAGE_LEFT,
     STAGE_RIGHT,
-    Pixels,
     View,
     bridge_balls,
     colour,
@@ -34,9 +34,8 @@ from motionmind.render.figure import (
     plain,
     seen,
 )
-from motionmind.render.solids import EMPTY, Canvas, Cones, Ellipsoids
+from motionmind.render.solids import EMPTY, Cones, Ellipsoids
 
-Array = NDArray[np.float64]
 Side = Literal["right", "left"]
 
 MOST = 400  # postures on a sheet: nobody looks through more
@@ -288,7 +287,7 @@ class _Sheet:
             x += length + 14.0
         return lines
 
-    def _reach(self, view: View) -> Array:
+    def _reach(self, view: View) -> Floats:
         """Least and greatest coordinates [2, F, N, 3] in a view's axes, metres, of the solids and of bridges' balls."""
         bridges = bridge_balls(self.body, self.joints, np.asarray(self.bridged.any(axis=0)))
         cones, balls = seen(self.cones, self.balls, view, self.origin)

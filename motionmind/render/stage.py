@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from motionmind._typing import Floats, Pixels, Singles
+from motionmind.body.motion import Insertion, Motion
 from motionmind.errors import MotionMindError
-from motionmind.motion import Insertion, Motion
 from motionmind.render.anatomy import body_of
 from motionmind.render.camera import SMOOTH, VIEWS, Camera, Corner, aim
+from motionmind.render.depth_buffer import Canvas
 from motionmind.render.figure import (
     BRIDGED,
     INSERTED,
-    Pixels,
     bridge_balls,
     colour,
     draw,
@@ -32,10 +32,8 @@ from motionmind.render.figure import (
     seen,
 )
 from motionmind.render.ground import PAPER, Ground, Shadow, darken
-from motionmind.render.solids import EMPTY, Canvas, Cones, Ellipsoids
+from motionmind.render.solids import EMPTY, Cones, Ellipsoids
 
-Array = NDArray[np.float64]
-Single = NDArray[np.float32]
 Ink = tuple[int, int, int]
 
 SMALLEST, LARGEST = 120, 2160  # pixels of a picture's height
@@ -63,7 +61,7 @@ class Drawing:
 
     corner: Corner
     canvas: Canvas
-    paints: Array
+    paints: Floats
 
     @property
     def box(self) -> tuple[slice, slice]:
@@ -78,7 +76,7 @@ class _Scene:
 
     insertion: Insertion | None
     backdrop: Pixels
-    bare: Single
+    bare: Singles
     ghosts: list[Drawing]
 
 
@@ -87,7 +85,7 @@ def frame_rate(motion: Motion) -> float:
     return motion.fps if motion.fps >= _LEAST_RATE else _RATE
 
 
-def moments(motion: Motion, rate: float) -> Array:
+def moments(motion: Motion, rate: float) -> Floats:
     """When to draw a motion, seconds: evenly from its first posture to its last, both of them among the moments.
 
     They are no closer than at `rate` a second; where the last posture is not on that beat, they lie a little wider.
@@ -113,7 +111,7 @@ class Stage:
     """
 
     def __init__(
-        self, motion: Motion, times: Array | None = None, *, view: str = "quarter", size: int = 480, first: int = 0
+        self, motion: Motion, times: Floats | None = None, *, view: str = "quarter", size: int = 480, first: int = 0
     ) -> None:
         """The stage for the moments `times` of a motion (its own by default).
 
@@ -255,7 +253,7 @@ class Stage:
             balls = balls.joined(bridge_balls(self.body, joints, self._bridged[number]))
         return cones, balls
 
-    def _draw(self, cones: Cones, balls: Ellipsoids, root: Array, paints: Array) -> Drawing:
+    def _draw(self, cones: Cones, balls: Ellipsoids, root: Floats, paints: Floats) -> Drawing:
         cones, balls = self.camera.solids(cones, balls, root)
         corner, canvas = self.camera.canvas(cones, balls, self.line // SMOOTH + 1)  # room for the line round the body
         draw(canvas, cones, balls)
@@ -345,7 +343,7 @@ def _one(cones: Cones, balls: Ellipsoids, number: int) -> tuple[Cones, Ellipsoid
     )
 
 
-def _reach(cones: Cones, balls: Ellipsoids) -> Array:
+def _reach(cones: Cones, balls: Ellipsoids) -> Floats:
     """Least and greatest coordinates [..., 2, 3] of postures' solids [..., N]."""
     low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
     return np.stack([low.min(axis=-2), high.max(axis=-2)], axis=-2)

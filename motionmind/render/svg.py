@@ -13,19 +13,17 @@ from math import ceil, floor
 from xml.sax.saxutils import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats, Int16s, Singles
+from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.formats.files import FilePath, write_atomically
-from motionmind.motion import Motion
+from motionmind.files import FilePath, write_atomically
 from motionmind.render.camera import SMOOTH, Corner
 from motionmind.render.figure import BRIDGED, INK, STEP, haze
 from motionmind.render.ground import GRID, GROUND, PAPER, SHADOW, Ground
 from motionmind.render.solids import EMPTY
 from motionmind.render.stage import GHOST, HOLD, SLOWEST, TRACK, VIOLET, WORDS, Drawing, Stage, moments
 from motionmind.render.trace import Lines, outlines, path, ridges, smooth
-
-Array = NDArray[np.float64]
 
 _RATE, _MOST = 12.0, 60.0  # frames a second: by default, as drawn animation has them; and those that screens have
 _FINE = 10  # units of the file's whole numbers to a pixel
@@ -115,12 +113,12 @@ def _floor(ground: Ground, line: float) -> Iterator[str]:
     )
 
 
-def _steps(low: float, high: float, step: float) -> Array:
+def _steps(low: float, high: float, step: float) -> Floats:
     """Multiples of a step from `low` to `high`."""
     return step * np.arange(ceil(low / step), floor(high / step) + 1, dtype=np.float64)
 
 
-def _reel(times: Array) -> Iterator[str]:
+def _reel(times: Floats) -> Iterator[str]:
     """What shows the frames one after another; to those who want no motion, the middle one."""
     if len(times) == 1:
         yield '<use href="#f0"/>'
@@ -208,7 +206,7 @@ class _Artist:
         text += f' d="{self._path(lines, drawing.corner)}"/>'
         return f'<g transform="scale({1 / _FINE:g})" stroke-width="{_BLEED * _FINE:g}">{text}</g>'
 
-    def _dusk(self, dark: NDArray[np.float32], corner: Corner) -> str:
+    def _dusk(self, dark: Singles, corner: Corner) -> str:
         """The shadow on the floor, in layers that together are as dark as it is."""
         layers = (1.0 - (1.0 - _DUSK) ** (level + 0.5) for level in count())
         ways = [
@@ -238,7 +236,7 @@ class _Artist:
         return text
 
 
-def _numbers(numbers: list[int]) -> NDArray[np.int16]:
+def _numbers(numbers: list[int]) -> Int16s:
     """Numbers of solids, EMPTY, the last, among them."""
     return np.array([*numbers, EMPTY], dtype=np.int16)
 

@@ -16,12 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind._typing import Bools, Floats, Indices, Int16s, Singles
 from motionmind.jit import jit
-from motionmind.render.solids import EMPTY, Depths, Indices
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
-Flags = NDArray[np.bool_]
+from motionmind.render.solids import EMPTY
 
 _FAINT = 0.5  # of a step: lines end where what they run along stands out by less
 _SLACK = 0.5  # samples: how far a smooth line may pass from the middle of an edge
@@ -43,12 +40,12 @@ class Lines:
         closed: whether each returns to its first point, which is not repeated [K].
     """
 
-    points: Array
-    starts: Numbers
-    labels: Numbers
-    closed: Flags
+    points: Floats
+    starts: Indices
+    labels: Indices
+    closed: Bools
 
-    def areas(self) -> Array:
+    def areas(self) -> Floats:
         """The area within each [K]; below 0 for a hole, 0 for a line that is not closed."""
         after = np.arange(1, len(self.points) + 1)
         after[self.starts[1:] - 1] = self.starts[:-1]
@@ -56,23 +53,23 @@ class Lines:
         twice = np.add.reduceat(x * y[after] - x[after] * y, self.starts[:-1]) if len(self.labels) else np.zeros(0)
         return np.asarray(np.where(self.closed, 0.5 * twice, 0.0))
 
-    def lengths(self) -> Numbers:
+    def lengths(self) -> Indices:
         """How many points each has [K]."""
         return np.diff(self.starts)
 
-    def only(self, which: Flags) -> Lines:
+    def only(self, which: Bools) -> Lines:
         """Those of them that are flagged [K]."""
         lengths = self.lengths()
         starts = np.concatenate([[0], np.cumsum(lengths[which])])
         return Lines(self.points[np.repeat(which, lengths)], starts, self.labels[which], self.closed[which])
 
 
-def outlines(labels: Indices) -> Lines:
+def outlines(labels: Int16s) -> Lines:
     """The outlines of the regions of samples [H, W] of one label, but for EMPTY, along the edges of samples."""
     return Lines(*_outlines(np.pad(labels, 1, constant_values=EMPTY)))
 
 
-def ridges(parts: Indices, depth: Depths, step: float) -> Lines:
+def ridges(parts: Int16s, depth: Singles, step: float) -> Lines:
     """Where samples [H, W] stand before those of another part by more than `step`, along their edges.
 
     A line goes on where they stand before them by less, down to half of it: so it does not break up where a limb comes
@@ -132,7 +129,7 @@ _CORNER_X, _CORNER_Y = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])  # where e
 
 
 @jit
-def _outlines(labels: Indices) -> tuple[Array, Numbers, Numbers, Flags]:
+def _outlines(labels: Int16s) -> tuple[Floats, Indices, Indices, Bools]:
     """The fields of Lines; regions meet at sides of samples, not at corners."""
     height, width = labels.shape
     known = np.zeros((height, width), dtype=np.bool_)  # upper sides that are on a line already
@@ -161,7 +158,7 @@ def _outlines(labels: Indices) -> tuple[Array, Numbers, Numbers, Flags]:
 
 
 @jit
-def _ridges(parts: Indices, depth: Depths, step: float) -> tuple[Array, Numbers, Numbers, Flags]:
+def _ridges(parts: Int16s, depth: Singles, step: float) -> tuple[Floats, Indices, Indices, Bools]:
     """The fields of Lines. A line goes on with the part it is of where it can, and else with any."""
     height, width = parts.shape
     rises = np.zeros((height, width, 4), dtype=np.float32)  # how far each side's sample stands before that beyond it
@@ -216,7 +213,7 @@ def _ridges(parts: Indices, depth: Depths, step: float) -> tuple[Array, Numbers,
 
 
 @jit
-def _next(parts: Indices, rises: Depths, x: int, y: int, to: int, step: float) -> tuple[int, int, int]:
+def _next(parts: Int16s, rises: Singles, x: int, y: int, to: int, step: float) -> tuple[int, int, int]:
     """The side that goes on where one ends, or direction -1; of the same part, unless it alone is faint."""
     found, best, left = (x, y, -1), 0, (to + 3) % 4
     ahead_x, ahead_y = x + _X[to], y + _Y[to]
@@ -230,7 +227,7 @@ def _next(parts: Indices, rises: Depths, x: int, y: int, to: int, step: float) -
 
 
 @jit
-def _relax(points: Array, starts: Numbers, closed: Flags) -> None:
+def _relax(points: Floats, starts: Indices, closed: Bools) -> None:
     """Move each point towards the middle of its neighbours, again and again, but by _SLACK at most."""
     tied = points.copy()
     for line in range(len(closed)):
@@ -245,7 +242,7 @@ def _relax(points: Array, starts: Numbers, closed: Flags) -> None:
 
 
 @jit
-def _knots(points: Array, starts: Numbers, closed: Flags) -> tuple[Array, Numbers]:
+def _knots(points: Floats, starts: Indices, closed: Bools) -> tuple[Floats, Indices]:
     """Control points of quadratic B-splines through points of lines, and where those of each line begin.
 
     The more a line bends, the closer they are.
@@ -277,7 +274,7 @@ def _knots(points: Array, starts: Numbers, closed: Flags) -> tuple[Array, Number
 
 
 @jit
-def _spread(one: Array, whole: bool) -> Array:
+def _spread(one: Floats, whole: bool) -> Floats:
     """How many points of a spline a line takes from its beginning to each of its points, and to its end."""
     count = len(one)
     sides = count if whole else count - 1

@@ -19,9 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.problem import Floats, Grid, Ints
-from motionmind.search.strips import Strips, step
+from motionmind.search.pair_chains import Strips, step
+from motionmind.search.trellis import Grid
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
@@ -33,17 +34,17 @@ _FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what is tallied
 class _Nodes(NamedTuple):
     """Up to N nodes and what finds them. `tally` holds the counters above."""
 
-    var: NDArray[np.int32]  # the last variable that is fixed [N]
+    var: Int32s  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each lane, as an index into its domain [N, L]
     f: Floats  # cost so far + bound on the cost to go [N]
     key: Floats  # what orders the open list: f, or the greater f backed up from forgotten children [N]
-    parent: NDArray[np.int32]  # [N]
-    children: NDArray[np.int32]  # number of children in memory [N]
-    slot: NDArray[np.int32]  # place in the heap, -1 where closed [N]
-    following: NDArray[np.int32]  # next node of the same bucket, -1 at the end [N]
-    bucket: NDArray[np.int32]  # first node of each bucket [a power of two]
-    heap: NDArray[np.int32]  # open nodes, a binary heap [N]
-    free: NDArray[np.int32]  # stack of unused nodes [N]
+    parent: Int32s  # [N]
+    children: Int32s  # number of children in memory [N]
+    slot: Int32s  # place in the heap, -1 where closed [N]
+    following: Int32s  # next node of the same bucket, -1 at the end [N]
+    bucket: Int32s  # first node of each bucket [a power of two]
+    heap: Int32s  # open nodes, a binary heap [N]
+    free: Int32s  # stack of unused nodes [N]
     tally: Ints
 
 
@@ -56,7 +57,7 @@ def search(
     path: Ints,
     budget: int,
     expansions: int,
-    ended: NDArray[np.bool_],
+    ended: Bools,
 ) -> tuple[float, float, int, int]:
     """Search for a path that costs less than `cost`; write the best to `path` [n] (positions).
 
@@ -206,7 +207,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
 
 
 @jit
-def _unmarked(nodes: _Nodes, kept: NDArray[np.bool_], node: int) -> int:
+def _unmarked(nodes: _Nodes, kept: Bools, node: int) -> int:
     """How many of a node and its ancestors are not marked."""
     count = 0
     while node >= 0 and not kept[node]:
@@ -216,7 +217,7 @@ def _unmarked(nodes: _Nodes, kept: NDArray[np.bool_], node: int) -> int:
 
 
 @jit
-def _mark(nodes: _Nodes, kept: NDArray[np.bool_], node: int) -> int:
+def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
     """Mark a node and its ancestors as kept; how many were not yet."""
     count = 0
     while node >= 0 and not kept[node]:

@@ -10,8 +10,9 @@ import json
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from motionmind.search.problem import Ints, Model, leg_grids
-from motionmind.search.solve import Rules, Via
+from motionmind._typing import Ints
+from motionmind.search.problem import Model, Rules, Via
+from motionmind.search.trellis import leg_grids
 
 DECIMALS = 6
 

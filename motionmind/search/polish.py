@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.bound import correction
-from motionmind.search.problem import Floats, Grid, Ints
+from motionmind.search.trellis import Grid
+from motionmind.search.trws import correction
 
 
 @jit

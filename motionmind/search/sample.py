@@ -19,11 +19,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.bound import correction
 from motionmind.search.polish import coupling, edge_cost, path_cost
-from motionmind.search.problem import Floats, Grid, Ints, Model, leg_grids
-from motionmind.search.solve import Certificate, Rules, Via
+from motionmind.search.problem import Model, Rules, Via
+from motionmind.search.solve import Certificate
+from motionmind.search.trellis import Grid, leg_grids
+from motionmind.search.trws import correction
 
 ROUNDS = 100  # each draws every lane and every moment once
 

@@ -9,12 +9,15 @@ from time import perf_counter
 from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind.search import astar, bound, strips
-from motionmind.search.legs import Legs
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.search import astar
+from motionmind.search import pair_chains as strips
+from motionmind.search import trws as bound
 from motionmind.search.polish import path_cost, polish
-from motionmind.search.problem import Floats, Grid, Ints, Model, build_grid, costs_to_go, with_waits
+from motionmind.search.problem import Model, Rules, Via, costs_to_go, with_waits
+from motionmind.search.segments import Legs
+from motionmind.search.trellis import Grid, build_grid
 
 SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
 STALLED = 0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to strips
@@ -28,13 +31,6 @@ PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as o
 
 _Result = TypeVar("_Result")
 Status = Literal["optimal", "bounded", "interrupted", "sampled"]
-
-
-class Via(NamedTuple):
-    """States [L] to pass through between start and goal, at a certain move or, for None, at any."""
-
-    states: Ints
-    move: int | None = None
 
 
 class Progress(NamedTuple):
@@ -65,7 +61,7 @@ class Certificate:
         passed: the moves at which it passes its vias.
     """
 
-    path: NDArray[np.int32]
+    path: Int32s
     cost: float
     lower_bound: float
     status: Status
@@ -73,27 +69,6 @@ class Certificate:
     peak_nodes: int
     seconds: dict[str, float]
     passed: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What the search may do and what that costs beside the model's own costs.
-
-    Attributes:
-        wait: beta, nats for each move that a lane waits at its goal.
-        per_move: tau, nats for each move.
-        shortest: least number of moves.
-        longest: greatest number of moves.
-        node_budget: nodes that A* may hold at once; it stops after as many expansions.
-        sweeps: pairs of sweeps of messages at most, for each number of moves; at least 1.
-    """
-
-    wait: float
-    per_move: float
-    shortest: int
-    longest: int
-    node_budget: int
-    sweeps: int = 160
 
 
 def solve(
@@ -267,7 +242,7 @@ class _Searched(NamedTuple):
     """The best path that A* found, what it proved, and what it took."""
 
     cost: float
-    states: NDArray[np.int32]
+    states: Int32s
     proven: float
     expansions: int
     peak: int
@@ -324,7 +299,7 @@ def _parts(grid: Grid) -> Ints:
     return part
 
 
-def _states(grid: Grid, chosen: Ints) -> NDArray[np.int32]:
+def _states(grid: Grid, chosen: Ints) -> Int32s:
     """States [T + 1, L] of a path of positions."""
     return grid.dom[chosen].reshape(grid.moves + 1, grid.lanes)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Floats
 from motionmind.errors import MotionMindError
 
 
@@ -34,7 +34,7 @@ def numbers(name: str, value: object) -> tuple[float, ...]:
     return tuple(map(float, found.reshape(-1)))
 
 
-def _finite(value: object) -> NDArray[np.float64] | None:
+def _finite(value: object) -> Floats | None:
     try:
         found = np.asarray(value)
     except ValueError:  # rows of different lengths

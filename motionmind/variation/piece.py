@@ -13,16 +13,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
+from motionmind._typing import Floats, Ints
+from motionmind.body.motion import FASTEST, Insertion, Motion, Posture
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
-from motionmind.motion import FASTEST, Insertion, Motion, Posture
+from motionmind.geometry import rotations as rot
 from motionmind.variation.arguments import number
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _ROUNDING = 1e-9  # seconds
 ALONE = 1.0  # seconds that a posture lasts where the piece has no other

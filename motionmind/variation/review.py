@@ -14,13 +14,11 @@ from typing import Literal
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind.errors import MotionMindError
-from motionmind.formats.text import listed
+from motionmind._typing import Ints
+from motionmind.errors import MotionMindError, listed
 from motionmind.variation.seams import Candidate, Join
 
-Ints = NDArray[np.int64]
 Decision = Literal["open", "approved", "discarded"]
 
 

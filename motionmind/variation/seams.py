@@ -15,19 +15,18 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from motionmind import rotations as rot
-from motionmind.engine import Engine
-from motionmind.errors import NoPathError, SkeletonError
-from motionmind.formats.text import meant
-from motionmind.motion import Motion, Posture
+from motionmind._typing import Floats, Int32s
+from motionmind.body.motion import Motion, Posture
+from motionmind.errors import NoPathError, SkeletonError, meant
+from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
-from motionmind.tween import Bridge, Tween, Wait, gap_of
+from motionmind.tween.certificate import Bridge, Wait
+from motionmind.tween.engine import Engine
+from motionmind.tween.result import Tween, gap_of
 from motionmind.variation.arguments import whole
 from motionmind.variation.piece import Piece
 
-Floats = NDArray[np.float64]
 Told = Callable[[int, int], None]
 
 _ROUNDING = 1.0 + 1e-6  # a corpus's fastest move, made again, is not faster than itself
@@ -67,7 +66,7 @@ class Candidate:
     """
 
     motion: Motion
-    path: NDArray[np.int32]
+    path: Int32s
     status: Status
     cost: float
     lower_bound: float
@@ -191,7 +190,7 @@ class Judge:
         turned = np.degrees(rot.angle(lanes[moves.begins], lanes[moves.ends]))
         return np.asarray((turned / moves.seconds[:, None]).max(axis=0))
 
-    def _has_made(self, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
+    def _has_made(self, before: Int32s, after: Int32s) -> bool:
         """Whether a body of the corpus went from states [J] to states [J] of its joints."""
         states, moves = self.engine.states[:, : len(before)], self.engine.corpus.moves
         return bool(((states[moves.begins] == before).all(axis=1) & (states[moves.ends] == after).all(axis=1)).any())

@@ -8,15 +8,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motionmind._typing import Ints
+from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary
 from motionmind.chaos.trajectories import largest_exponent
-from motionmind.engine import Engine
 from motionmind.errors import MotionMindError
-from motionmind.motion import Motion
 from motionmind.search.solve import Watch
+from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import number, numbers, whole
 from motionmind.variation.piece import Arranged, Piece
 from motionmind.variation.review import (
@@ -32,9 +32,6 @@ from motionmind.variation.review import (
     edited,
 )
 from motionmind.variation.seams import Join, Told, check_asked, judge, smooth
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewhere than with the first posture
 SKIP = 10

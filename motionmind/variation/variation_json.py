@@ -24,14 +24,14 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import FormatError, MotionMindError
+from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
-from motionmind.formats.files import FilePath, read_bytes
 from motionmind.formats.motion_json import FramesSchema, InsertionSchema, MotionSchema, motion_of, write_motion_json
-from motionmind.motion import Motion
 from motionmind.search.solve import Status
-from motionmind.tween import Bridge, Wait
+from motionmind.tween.certificate import Bridge, Wait
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam
 from motionmind.variation.seams import Break, Candidate, Join

@@ -1,0 +1,209 @@
+"""Posture and Motion: arrays on a skeleton. A motion is a sequence of postures with their times.
+
+A motion knows which of its movement the engine made: that is an `Insertion` each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
+
+FASTEST = 10_000.0  # frames a second; more is a slip of the keyboard, not a camera
+_MOMENT = 1e-6  # seconds: times that are no further apart are one
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """One moment of a body.
+
+    Attributes:
+        skeleton: the body.
+        rotations: unit quaternions x, y, z, w [J, 4], each local to the parent's frame.
+        root: position of the root joint [3], metres.
+    """
+
+    skeleton: Skeleton
+    rotations: Floats
+    root: Floats
+
+    def __post_init__(self) -> None:
+        _settle(self, (len(self.skeleton), 4), (3,))
+
+    def as_motion(self) -> Motion:
+        """This posture as a motion of one frame at time 0."""
+        return Motion(self.skeleton, self.rotations[None], self.root[None], np.zeros(1))
+
+
+@dataclass(frozen=True, eq=False)
+class Insertion:
+    """Movement that the engine put between two postures, A and B.
+
+    Attributes:
+        times: when the postures are that its M moves lead from and to [M + 1], seconds; the first is A, the last B.
+        bridged: joints' moves that no corpus attests: the joint's name, and the number of the move from 0.
+    """
+
+    times: Floats
+    bridged: tuple[tuple[str, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        times = np.array(self.times, dtype=np.float64)
+        if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+            raise MotionMindError("an insertion's times must be finite and increasing, one at least")
+        for joint, move in self.bridged:
+            if not 0 <= move < len(times) - 1:
+                raise MotionMindError(f"an insertion of {len(times) - 1} moves has no move {move}, bridged by {joint}")
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
+
+    def renamed(self, joints: Mapping[str, str]) -> Insertion:
+        """The same on a body where `joints` are called something else; those that it does not name are left out."""
+        return replace(self, bridged=tuple((joints[joint], move) for joint, move in self.bridged if joint in joints))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A sequence of postures.
+
+    Attributes:
+        skeleton: the body.
+        rotations: unit quaternions x, y, z, w [T, J, 4], each local to the parent's frame.
+        root: positions of the root joint [T, 3], metres.
+        times: seconds, strictly increasing [T].
+        name: what the clip is called.
+        insertions: what of it the engine made, from the earliest to the latest; empty for movement that is all given.
+    """
+
+    skeleton: Skeleton
+    rotations: Floats
+    root: Floats
+    times: Floats
+    name: str = ""
+    insertions: tuple[Insertion, ...] = ()
+
+    def __post_init__(self) -> None:
+        times = np.array(self.times, dtype=np.float64)
+        if times.ndim != 1 or len(times) == 0:
+            raise MotionMindError(f"{self.name or 'motion'}: no frames")
+        if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+            raise MotionMindError(f"{self.name or 'motion'}: times must be finite and increasing")
+        _settle(self, (len(times), len(self.skeleton), 4), (len(times), 3))
+        times.setflags(write=False)
+        object.__setattr__(self, "times", times)
+        # A file's name may hold bytes that are no text, and no format writes those.
+        object.__setattr__(self, "name", self.name.encode("utf-8", "replace").decode())
+        for before, after in pairwise(self.insertions):
+            if after.times[0] < before.times[-1] - _MOMENT:
+                raise MotionMindError(f"{self.name or 'motion'}: insertions must follow one another")
+        for joint, _ in (bridge for insertion in self.insertions for bridge in insertion.bridged):
+            if joint not in self.skeleton.names:
+                raise MotionMindError(f"{self.name or 'motion'}: {self.skeleton.name} has no joint {joint!r} to bridge")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def posture(self, frame: int) -> Posture:
+        """The posture at index `frame`, negative ones from the end; MotionMindError past either end."""
+        if not -len(self) <= frame < len(self):
+            name = self.name or "the motion"
+            raise MotionMindError(f"{name} has frames 0 to {len(self) - 1}, no frame {frame}")
+        return Posture(self.skeleton, self.rotations[frame], self.root[frame])
+
+    def slice(self, start: int, stop: int) -> Motion:
+        """The frames from `start` up to, not including, `stop`; times are kept as they are."""
+        part = replace(
+            self,
+            rotations=self.rotations[start:stop],
+            root=self.root[start:stop],
+            times=self.times[start:stop],
+            insertions=(),
+        )
+        first, last = part.times[0], part.times[-1]
+        kept = (one for one in self.insertions if one.times[-1] >= first and one.times[0] <= last)
+        return replace(part, insertions=tuple(kept))
+
+    def inserted(self) -> Bools:
+        """Whether the engine made each frame [T]: those between the A and the B of an insertion."""
+        found = np.zeros(len(self), dtype=bool)
+        for one in self.insertions:
+            found |= (self.times > one.times[0] + _MOMENT) & (self.times < one.times[-1] - _MOMENT)
+        return found
+
+    def bridged(self) -> Bools:
+        """Whether each joint is, in each frame, amid a move that no corpus attests [T, J]."""
+        found = np.zeros((len(self), len(self.skeleton)), dtype=bool)
+        for one in self.insertions:
+            for joint, move in one.bridged:
+                start, end = one.times[move : move + 2]
+                found[:, self.skeleton.index(joint)] |= (self.times > start - _MOMENT) & (self.times < end + _MOMENT)
+        return found & self.inserted()[:, None]
+
+    @property
+    def fps(self) -> float:
+        """Frames per second, from the median step; 0 for a single frame."""
+        return 0.0 if len(self) < 2 else float(1.0 / np.median(np.diff(self.times)))
+
+    def resample(self, rate: float) -> Motion:
+        """The motion at `rate` postures a second, from its first time on; rotations by slerp, root linear.
+
+        Frames that fall on a frame of the source are that frame. A motion shorter than one step keeps its
+        first posture. Jitter of the source's clock of up to a thousandth of a step does not lose the last one.
+        """
+        if not 0.0 < rate <= FASTEST:
+            raise MotionMindError(
+                f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
+            )
+        span = self.times[-1] - self.times[0]
+        steps = int(np.floor(span * rate + 1e-3))
+        return self.at(self.times[0] + np.arange(steps + 1) / rate)
+
+    def at(self, times: Floats) -> Motion:
+        """The motion at increasing `times`, seconds: rotations by slerp, root linear; its ends stay beyond them."""
+        if len(self) == 1:
+            frames = np.zeros(len(times), dtype=int)
+            return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times)
+        after = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self) - 1)
+        before = after - 1
+        share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
+        return replace(
+            self,
+            rotations=rot.normalise(rot.slerp(self.rotations[before], self.rotations[after], share[:, None])),
+            root=self.root[before] + share[:, None] * (self.root[after] - self.root[before]),
+            times=times,
+        )
+
+
+def _settle(thing: Posture | Motion, rotations: tuple[int, ...], root: tuple[int, ...]) -> None:
+    """Check shapes and values at the door, then freeze the arrays: what is built is right from then on."""
+    name = getattr(thing, "name", "") or type(thing).__name__.lower()
+    for what, shape in (("rotations", rotations), ("root", root)):
+        array = np.array(getattr(thing, what), dtype=np.float64)
+        if array.shape != shape:
+            raise MotionMindError(f"{name}: {what} must have the shape {shape}, not {array.shape}")
+        if not np.isfinite(array).all():
+            where = np.argwhere(~np.isfinite(array))[0]
+            raise MotionMindError(f"{name}: {_place(thing, what, where)} is not a finite number")
+        array.setflags(write=False)
+        object.__setattr__(thing, what, array)
+    length = np.linalg.norm(thing.rotations, axis=-1)
+    if np.any(np.abs(length - 1.0) > 1e-6):
+        where = np.argwhere(np.abs(length - 1.0) > 1e-6)[0]
+        raise MotionMindError(
+            f"{name}: {_place(thing, 'rotations', where)} has length {length[tuple(where)]:.6g}, not 1"
+        )
+
+
+def _place(thing: Posture | Motion, what: str, where: Indices) -> str:
+    moving = isinstance(thing, Motion)
+    frame = f" in frame {where[0]}" if moving else ""
+    if what == "root":
+        return f"the root's position{frame}"
+    return f"the rotation of {thing.skeleton.names[where[1 if moving else 0]]}{frame}"

@@ -1,0 +1,161 @@
+"""Skeletons: joints in topological order, each with its parent and its place in the parent's frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from motionmind._typing import Floats, Indices
+from motionmind.errors import SkeletonError
+from motionmind.geometry import rotations as rot
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A tree of joints. Metres; Y up; a person at rest faces +Z, so that +X is to the person's left.
+
+    Attributes:
+        name: what the skeleton is called, such as "human23".
+        names: the joints' names [J], each after its parent; the first is the root.
+        parents: index of each joint's parent [J], -1 for the root.
+        offsets: place of each joint in its parent's frame [J, 3], metres (the root's is 0).
+        tips: place of each leaf's far end (fingertip, toe tip, crown) in the leaf's own frame [J, 3], metres;
+            0 where there is none.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Floats
+    tips: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        offsets = np.array(self.offsets, dtype=np.float64)
+        tips = np.zeros((count, 3)) if len(self.tips) == 0 else np.array(self.tips, dtype=np.float64)
+        if count == 0:
+            raise SkeletonError(f"skeleton {self.name!r} has no joints")
+        if len(self.parents) != count or offsets.shape != (count, 3) or tips.shape != (count, 3):
+            raise SkeletonError(
+                f"skeleton {self.name!r}: {count} joints need as many parents, offsets and tips in metres x, y, z, "
+                f"not {len(self.parents)}, {list(offsets.shape)} and {list(tips.shape)}"
+            )
+        twice = sorted(name for name, times in Counter(self.names).items() if times > 1)
+        if twice:
+            raise SkeletonError(f"skeleton {self.name!r} names {', '.join(twice)} more than once")
+        if self.parents[0] != -1:
+            raise SkeletonError(f"skeleton {self.name!r}: the first joint must be the root, with parent -1")
+        for child, parent in enumerate(self.parents[1:], start=1):
+            if not 0 <= parent < child:
+                raise SkeletonError(f"skeleton {self.name!r}: the parent of {self.names[child]!r} must stand before it")
+        if not (np.isfinite(offsets).all() and np.isfinite(tips).all()):
+            raise SkeletonError(f"skeleton {self.name!r} has an offset that is not a finite number")
+        offsets.setflags(write=False)
+        tips.setflags(write=False)
+        object.__setattr__(self, "offsets", offsets)
+        object.__setattr__(self, "tips", tips)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        """Same joints, same tree, same proportions."""
+        return (
+            isinstance(other, Skeleton)
+            and self.difference(other) is None
+            and np.array_equal(self.offsets, other.offsets)
+            and np.array_equal(self.tips, other.tips)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def index(self, joint: str) -> int:
+        """Index of the joint called `joint`; SkeletonError names the joints there are."""
+        if joint not in self.names:
+            raise SkeletonError(f"no joint {joint!r} in {self.name}; its joints are {', '.join(self.names)}")
+        return self.names.index(joint)
+
+    def children(self, joint: int) -> list[int]:
+        """Indices of the joints whose parent is `joint`."""
+        return [child for child, parent in enumerate(self.parents) if parent == joint]
+
+    def difference(self, other: Skeleton) -> str | None:
+        """How the tree of `other` differs from this one, in words; None where names and parents are the same.
+
+        Proportions do not count: orientations mean the same on a taller body.
+        """
+        mine, theirs = self._parent_names(), other._parent_names()
+        missing = [name for name in mine if name not in theirs]
+        extra = [name for name in theirs if name not in mine]
+        if missing or extra:
+            parts = [f"lacks {_some(missing)}"] * bool(missing) + [f"adds {_some(extra)}"] * bool(extra)
+            return f"{other.name} {' and '.join(parts)}"
+        for name, parent in mine.items():
+            if theirs[name] != parent:
+                return f"{name} hangs from {theirs[name]} in {other.name}, from {parent} in {self.name}"
+        if self.names != other.names:
+            return f"{other.name} lists the same joints in another order"
+        return None
+
+    def _parent_names(self) -> dict[str, str]:
+        above = ("nothing" if parent < 0 else self.names[parent] for parent in self.parents)
+        return dict(zip(self.names, above, strict=True))
+
+    @cached_property
+    def height(self) -> float:
+        """Vertical extent in metres of the body at rest (identity rotations), tips included."""
+        positions = self.positions(np.tile(rot.IDENTITY, (len(self), 1)), np.zeros(3))
+        heights = np.concatenate([positions[:, 1], (positions + self.tips)[:, 1]])
+        return float(np.ptp(heights))
+
+    def global_rotations(self, rotations: Floats) -> Floats:
+        """Rotations [..., J, 4] of each joint's frame against the world, from local ones [..., J, 4]."""
+        out = np.array(rotations, dtype=np.float64)
+        for joints, parents in self._generations:
+            out[..., joints, :] = rot.mul(out[..., parents, :], out[..., joints, :])
+        return out
+
+    def local_rotations(self, turned: Floats) -> Floats:
+        """Local rotations [..., J, 4] from global ones; the inverse of `global_rotations`."""
+        parents = np.array(self.parents[1:], dtype=np.intp)
+        local = rot.inv_mul(turned[..., parents, :], turned[..., 1:, :])
+        return np.concatenate([turned[..., :1, :], local], axis=-2)
+
+    def positions(self, rotations: Floats, root: Floats) -> Floats:
+        """Forward kinematics: joint positions [..., J, 3] in metres.
+
+        `rotations` [..., J, 4] are local, `root` [..., 3] is the root's position.
+        """
+        return self._positions(self.global_rotations(rotations), root)
+
+    def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
+        """Positions [..., J + J, 3] in metres of all joints, then of all tips (a joint without one twice)."""
+        turned = self.global_rotations(rotations)
+        positions = self._positions(turned, root)
+        return np.concatenate([positions, positions + rot.mul_vec(turned, self.tips)], axis=-2)
+
+    def _positions(self, turned: Floats, root: Floats) -> Floats:
+        out = np.empty((*turned.shape[:-1], 3))
+        out[..., 0, :] = root
+        for joints, parents in self._generations:
+            out[..., joints, :] = out[..., parents, :] + rot.mul_vec(turned[..., parents, :], self.offsets[joints])
+        return out
+
+    @cached_property
+    def _generations(self) -> list[tuple[Indices, Indices]]:
+        """Joints as far from the root as each other, and their parents: from its children outward."""
+        depth = [0] * len(self)
+        for joint, parent in enumerate(self.parents):
+            depth[joint] = depth[parent] + 1 if parent >= 0 else 0
+        steps = [np.flatnonzero(np.array(depth) == far) for far in range(1, max(depth) + 1)]
+        return [(joints, np.array(self.parents, dtype=np.intp)[joints]) for joints in steps]
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+# --- the bodies that go by their names -------------------------------------------------------------------------------

@@ -1,0 +1,16 @@
+"""Distances between postures, compiled."""
+
+from __future__ import annotations
+
+from motionmind._typing import Floats
+from motionmind.jit import jit
+
+
+@jit
+def squared(a: Floats, b: Floats) -> float:
+    """Sum over joints of 4 sin^2 of half the angle between rotations [m, 4]: its square, where it is small."""
+    total = 0.0
+    for j in range(len(a)):
+        cosine = a[j, 0] * b[j, 0] + a[j, 1] * b[j, 1] + a[j, 2] * b[j, 2] + a[j, 3] * b[j, 3]
+        total += 4.0 * max(1.0 - cosine * cosine, 0.0)
+    return total

@@ -1,0 +1,217 @@
+"""Rotations as plain arrays of unit quaternions, shape [..., 4], in the order x, y, z, w.
+
+`q` and `-q` are the same rotation. `mul(a, b)` turns by `b` first, then by `a`, as matrices do, so a joint's
+global rotation is `mul(parent_global, local)`. Angles are in radians. Formulas are those of Shoemake,
+"Animating rotation with quaternion curves", SIGGRAPH 1985, unless a function names another source.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from motionmind._typing import Floats
+
+IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
+IDENTITY.setflags(write=False)
+
+
+def mul(a: Floats, b: Floats) -> Floats:
+    """Product [..., 4]: the rotation `b` followed by the rotation `a`."""
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 4))
+    out[..., 0] = aw * bx + ax * bw + ay * bz - az * by
+    out[..., 1] = aw * by - ax * bz + ay * bw + az * bx
+    out[..., 2] = aw * bz + ax * by - ay * bx + az * bw
+    out[..., 3] = aw * bw - ax * bx - ay * by - az * bz
+    return out
+
+
+def inv(q: Floats) -> Floats:
+    """Inverse rotation [..., 4] of a unit quaternion."""
+    return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
+
+
+def inv_mul(a: Floats, b: Floats) -> Floats:
+    """`inv(a) * b`: what turns `a` into `b`, seen from `a`."""
+    return mul(inv(a), b)
+
+
+def mul_inv(a: Floats, b: Floats) -> Floats:
+    """`a * inv(b)`: what turns `b` into `a`, seen from outside."""
+    return mul(a, inv(b))
+
+
+def mul_vec(q: Floats, v: Floats) -> Floats:
+    """The vectors `v` [..., 3] turned by `q` [..., 4]."""
+    # v + w t + u x t with t = 2 (u x v) and u the vector part: fewer products than two of quaternions.
+    u, w = q[..., :3], q[..., 3:]
+    t = 2.0 * _cross(u, v)
+    return np.asarray(v + w * t + _cross(u, t))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Vector product [..., 3]; np.cross takes several times as long on small arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 3))
+    out[..., 0] = ay * bz - az * by
+    out[..., 1] = az * bx - ax * bz
+    out[..., 2] = ax * by - ay * bx
+    return out
+
+
+def normalise(q: ArrayLike) -> Floats:
+    """Unit quaternions [..., 4] of the same direction; a zero quaternion is a ValueError."""
+    q = np.asarray(q, dtype=np.float64)
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not np.all(length > 1e-12):
+        raise ValueError("a quaternion of length zero is no rotation")
+    return np.asarray(q / length, dtype=np.float64)
+
+
+def canonical(q: Floats) -> Floats:
+    """The one of `q` and `-q` whose last nonzero coefficient of (x, y, z, w) is positive."""
+    sign = np.sign(q[..., 3])
+    for i in (2, 1, 0):
+        sign = np.where(sign == 0.0, np.sign(q[..., i]), sign)
+    return np.asarray(q * np.where(sign < 0.0, -1.0, 1.0)[..., None], dtype=np.float64)
+
+
+def angle(a: Floats, b: Floats) -> Floats:
+    """Angle in [0, pi] between rotations [..., 4]; accurate near 0 and near pi."""
+    # atan2 of the relative rotation's vector and scalar parts; acos of the dot product loses half the digits.
+    r = inv_mul(a, b)
+    return np.asarray(2.0 * np.arctan2(np.linalg.norm(r[..., :3], axis=-1), np.abs(r[..., 3])))
+
+
+def exp(v: Floats) -> Floats:
+    """Quaternion [..., 4] of the rotation vector `v` [..., 3] (axis times angle in radians)."""
+    theta = np.linalg.norm(v, axis=-1, keepdims=True)
+    # sin(theta/2)/theta, by numpy's sin(pi x)/(pi x) with x = theta / 2 pi: exact at 0.
+    return np.concatenate([v * 0.5 * np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)], axis=-1)
+
+
+def log(q: Floats) -> Floats:
+    """Rotation vector [..., 3] of `q` with angle in [0, pi]; the inverse of `exp` there."""
+    q = np.where(q[..., 3:] < 0.0, -q, q)
+    s = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    theta = 2.0 * np.arctan2(s, q[..., 3:])
+    # theta / s tends to 2 as s does to 0: theta = 2 asin(s) = 2 s + s^3/3 + ...
+    scale = np.where(s > 1e-8, theta / np.where(s > 1e-8, s, 1.0), 2.0)
+    return np.asarray(q[..., :3] * scale)
+
+
+def from_axis_angle(axis: ArrayLike, theta: ArrayLike) -> Floats:
+    """Rotation [..., 4] by `theta` radians [...] about the unit vectors `axis` [..., 3]."""
+    half = 0.5 * np.asarray(theta, dtype=np.float64)[..., None]
+    vector = np.asarray(axis, dtype=np.float64) * np.sin(half)
+    return np.asarray(np.concatenate([vector, np.broadcast_to(np.cos(half), (*vector.shape[:-1], 1))], axis=-1))
+
+
+def from_euler(order: str, angles: Floats) -> Floats:
+    """Rotation [..., 4] of intrinsic turns by `angles` [..., len(order)] radians about the axes in `order`.
+
+    "ZXY" turns about z, then about the new x, then about the newest y: the product Rz Rx Ry, BVH's meaning of
+    channels in that order. Any number of letters x, y, z, in either case.
+    """
+    axes = np.eye(3)
+    turns = [from_axis_angle(axes["xyz".index(letter)], angles[..., i]) for i, letter in enumerate(order.lower())]
+    return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
+
+
+def to_euler(order: str, q: Floats) -> Floats:
+    """Angles [..., 3] in radians with `from_euler(order, angles) == q`, for three different axes.
+
+    At gimbal lock (middle angle within 1e-9 of a right angle) the last angle is set to 0. Source: Shuster, "A survey
+    of attitude representations", J. Astronaut. Sci. 41:4 (1993), the asymmetric sequences.
+    """
+    i, j, k = ("xyz".index(letter) for letter in order.lower())
+    if len({i, j, k}) != 3:
+        raise ValueError(f"rotation order must name x, y and z once each, not {order!r}")
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    m = to_matrix(q)
+    cosine = np.hypot(m[..., i, i], m[..., i, j])
+    middle = np.arctan2(sign * m[..., i, k], cosine)  # arcsin would lose half the digits near a right angle
+    locked = cosine < 1e-9
+    first = np.where(
+        locked,
+        np.arctan2(sign * m[..., k, j], m[..., j, j]),
+        np.arctan2(-sign * m[..., j, k], m[..., k, k]),
+    )
+    # Of what is left when the first turn is undone: near the lock, where the first is ill-determined, the last
+    # makes up for it.
+    undone = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
+    last = np.where(locked, 0.0, np.arctan2(sign * undone[..., i], undone[..., j]))
+    return np.stack([first, middle, last], axis=-1)
+
+
+def to_matrix(q: Floats) -> Floats:
+    """Rotation matrices [..., 3, 3]; columns are where x, y and z go."""
+    return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
+
+
+def from_matrix(m: Floats) -> Floats:
+    """Quaternions [..., 4] of rotation matrices [..., 3, 3].
+
+    Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1:223 (1978): of the four
+    equivalent formulas the one with the largest divisor is used.
+    """
+    xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    # Four times the products q_i q_j, as a symmetric matrix [..., 4, 4]; its largest row is along q.
+    k = np.empty((*m.shape[:-2], 4, 4))
+    k[..., 0, 0], k[..., 1, 1], k[..., 2, 2] = 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz
+    k[..., 3, 3] = 1 + xx + yy + zz
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        k[..., a, b] = k[..., b, a] = m[..., a, b] + m[..., b, a]
+    for a, b, c in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
+        k[..., a, 3] = k[..., 3, a] = m[..., b, c] - m[..., c, b]
+    best = np.argmax(np.diagonal(k, axis1=-2, axis2=-1), axis=-1)
+    return normalise(np.take_along_axis(k, best[..., None, None], axis=-2)[..., 0, :])
+
+
+def between(a: Floats, b: Floats) -> Floats:
+    """The smallest rotation [..., 4] that turns the direction `a` [..., 3] into `b` [..., 3].
+
+    For opposite directions the axis is ambiguous: one at right angles to `a` is taken.
+    """
+    a, b = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (a, b))
+    cosine = np.sum(a * b, axis=-1, keepdims=True)
+    least = np.eye(3)[np.argmin(np.abs(a), axis=-1)]
+    opposite = np.concatenate([np.cross(a, least), np.zeros_like(cosine)], axis=-1)
+    q = np.concatenate([np.cross(a, b), 1.0 + cosine], axis=-1)
+    return normalise(np.where(cosine < -1.0 + 1e-12, opposite, q))
+
+
+def slerp(a: Floats, b: Floats, t: ArrayLike) -> Floats:
+    """The rotation a share `t` [...] of the way from `a` to `b` [..., 4], the short way round."""
+    return mul(a, exp(np.asarray(t, dtype=np.float64)[..., None] * log(inv_mul(a, b))))
+
+
+def heading(q: Floats) -> Floats:
+    """Turn [...] in radians about the vertical (y) in `q`: the twist of the swing-twist decomposition.
+
+    `q = mul(from_axis_angle(y, heading), swing)` with the swing's axis level. Where `q` turns y upside down the
+    twist is undefined and 0 is given. Source: Dobrowolski, "Swing-twist decomposition in Clifford algebra",
+    arXiv:1506.05481 (2015).
+    """
+    # With twist * swing, the twist is the normalised projection of q on (y, w), whichever side it stands on.
+    y, w = q[..., 1], q[..., 3]
+    turn = 2.0 * np.arctan2(y, w)
+    turn = np.where(np.hypot(y, w) < 1e-9, 0.0, turn)
+    return np.asarray(turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi)))
+
+
+def about_vertical(theta: ArrayLike) -> Floats:
+    """Rotation [..., 4] by `theta` radians about the vertical (y)."""
+    return from_axis_angle([0.0, 1.0, 0.0], theta)
+
+
+def mirror(q: Floats, axis: int = 0) -> Floats:
+    """The rotation [..., 4] seen in a mirror that exchanges + and - of an axis: left and right (x) by default."""
+    sign = np.array([-1.0, -1.0, -1.0, 1.0])
+    sign[axis] = 1.0
+    return np.asarray(q * sign)

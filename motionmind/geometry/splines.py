@@ -1,0 +1,115 @@
+"""Natural cubic splines, for numbers and for rotations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.geometry import rotations as rot
+
+_LONG = 64  # knots; of more, pieces are splined with those on either side that bear on them
+_PIECE, _MARGIN = 32, 14  # a knot bears on a natural spline a quarter as much for each knot between: 1e-8 of it is lost
+
+
+def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
+    """The natural cubic spline through `values` [K, ...] at `times` [K], evaluated at `at` [N]: [N, ...].
+
+    Twice continuously differentiable, its second derivative 0 at both ends. Two knots give a straight line.
+    """
+    if len(times) == 1:
+        return np.broadcast_to(values[0], (len(at), *values.shape[1:])).copy()
+    if len(times) > _LONG:
+        return _by_pieces(natural_spline, times, values, at)
+    piece, bends = _pieces(times, at), _bends(times, values)
+    return _cubic(times, piece, at, values[piece], values[piece + 1], bends[piece], bends[piece + 1])
+
+
+def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
+    """A twice continuously differentiable curve of rotations through `keys` [K, ..., 4] at `times` [K]: [N, ..., 4].
+
+    Around each key the natural spline of the rotation vectors that lead from it to all keys (the chart of SO(3) centred
+    there), unrolled so that neighbouring keys lie within half a turn of each other. From each key to the next the curve
+    passes from the one's spline to the other's, by a weight whose first two derivatives are 0 at both. It is exact at
+    the keys, and for keys that turn about one axis all charts agree: it is the spline of their angle. One chart for
+    all would not do, for it ends a whole turn from its centre, where vectors in all directions are one rotation.
+    """
+    if len(times) == 1:
+        return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
+    if len(times) > _LONG:
+        return _by_pieces(rotation_spline, times, keys, at)
+    vectors = _unroll(rot.log(rot.inv_mul(keys[None], keys[:, None])))
+    piece, bends = _pieces(times, at), _bends(times, vectors)
+
+    def around(key: Ints) -> Floats:
+        ends = vectors[piece, key], vectors[piece + 1, key], bends[piece, key], bends[piece + 1, key]
+        return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, *ends)))
+
+    s = ((at - times[piece]) / np.diff(times)[piece]).reshape(-1, *(1,) * (keys.ndim - 2))
+    return rot.slerp(around(piece), around(piece + 1), s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+
+
+def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats, knots: Floats, at: Floats) -> Floats:
+    """What `spline` makes of many knots [K, ...], from those near each piece alone: [N, ...]."""
+    out = np.empty((len(at), *knots.shape[1:]))
+    piece = _pieces(times, at) // _PIECE
+    for number in range(piece.min(initial=0), piece.max(initial=-1) + 1):
+        near = slice(max(number * _PIECE - _MARGIN, 0), (number + 1) * _PIECE + _MARGIN + 1)
+        here = piece == number
+        out[here] = spline(times[near], knots[near], at[here])
+    return out
+
+
+def _unroll(vectors: Floats) -> Floats:
+    """Rotation vectors [K, K, ..., 3] to each key from each centre, whole turns added so that each is nearest to that
+    of the neighbouring key towards the centre."""
+    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max() < np.pi:
+        return vectors  # all neighbours are as near as that already
+    out = vectors.copy()
+    for distance in range(2, len(out)):
+        for side in (1, -1):
+            key = np.arange(distance, len(out)) if side > 0 else np.arange(len(out) - distance)
+            centre = key - side * distance
+            toward, own = out[key - side, centre], out[key, centre]
+            angle = np.linalg.norm(own, axis=-1, keepdims=True)
+            # No rotation at all may be a turn about any axis; where its neighbour has none either, about none.
+            along = np.where(angle > 1e-9, own, toward)
+            axis = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
+            turns = np.round((np.sum(axis * toward, axis=-1, keepdims=True) - angle) / (2.0 * np.pi))
+            out[key, centre] += 2.0 * np.pi * turns * axis
+    return out
+
+
+def _pieces(times: Floats, at: Floats) -> Ints:
+    """Index [N] of the knot at which the piece begins that each of `at` lies in."""
+    return np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+
+
+def _bends(times: Floats, values: Floats) -> Floats:
+    """Second derivatives [K, ...] of the natural spline at its knots.
+
+    They solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with
+    steps h and slopes d; source: de Boor, "A Practical Guide to Splines" (1978), chapter IV.
+    """
+    h = np.diff(times)
+    bends = np.zeros_like(values, dtype=np.float64)
+    if len(h) > 1:
+        slopes = np.diff(values, axis=0) / h.reshape(-1, *(1,) * (values.ndim - 1))
+        system = np.diag(2.0 * (h[:-1] + h[1:])) + np.diag(h[1:-1], 1) + np.diag(h[1:-1], -1)
+        right = 6.0 * np.diff(slopes, axis=0)
+        bends[1:-1] = np.linalg.solve(system, right.reshape(len(right), -1)).reshape(right.shape)
+    return bends
+
+
+def _cubic(
+    times: Floats, piece: Ints, at: Floats, left: Floats, right: Floats, left_bend: Floats, right_bend: Floats
+) -> Floats:
+    """Values [N, ...] on pieces between knots with these values and second derivatives [N, ...]."""
+    column = (-1, *(1,) * (left.ndim - 1))
+    after, before = (times[piece + 1] - at).reshape(column), (at - times[piece]).reshape(column)
+    step = after + before
+    # On each piece: the straight line, plus what both bends add, which is 0 at its knots.
+    line = (left * after + right * before) / step
+    bent = left_bend * (after**3 / step - step * after) + right_bend * (before**3 / step - step * before)
+    return np.asarray(line + bent / 6.0)

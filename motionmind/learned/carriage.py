@@ -1,0 +1,138 @@
+"""How a corpus's bodies hold themselves, travel and stand, moment by moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
+from motionmind.body.limits import find_loose
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared
+from motionmind.jit import jit
+from motionmind.realise.root import lowest
+
+SLIDES = 0.3  # metres a second at which a limb that touches the floor stands no more than half
+
+
+@dataclass(frozen=True, eq=False)
+class Carriage:
+    """How a corpus's bodies hold themselves, travel and stand, in its postures and midway between them.
+
+    There are N moments: the postures, then the middle of each of the M moves. A step is half a move, two in each.
+
+    Attributes:
+        orientations: of the lanes [N, L, 4].
+        weights: what each moment counts [N].
+        begins: moments from which the steps lead [2 M].
+        ends: the moment that each leads to [2 M].
+        shares: of each step among those that leave the same moment [2 M].
+        kinds: of which kind each part of each moment is [N, P], as `motionmind.realise.walks` says.
+        turn: turn about the vertical in each half of each move [M], radians.
+        travel: displacement of the root in it, metres, in the body's heading midway [M, 3].
+        clearance: height of the lowest point above the clip's floor [N], metres, at least 0. The floor is where the
+            lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
+        stands: how still the lowest point of each limb, and last of the trunk, is [N, limbs + 1]: 1 where it does not
+            move level, 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
+        loose: which joints do not keep to their limits in the corpus [J].
+    """
+
+    orientations: Floats
+    weights: Floats
+    begins: Ints
+    ends: Ints
+    shares: Floats
+    kinds: Int32s
+    turn: Floats
+    travel: Floats
+    clearance: Floats
+    stands: Floats
+    loose: Bools
+
+
+def learn_carriage(corpus: Corpus) -> Carriage:
+    """How the bodies of a corpus hold themselves, travel and stand."""
+    low = lowest(corpus.skeleton, corpus.rotations, corpus.root)
+    floor = [np.quantile(low[clip.start : clip.stop], 0.05) for clip in corpus.clips]
+    clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
+    begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
+    shares = weights / np.bincount(begins, weights, len(corpus))[begins]
+    heading = rot.heading(corpus.rotations[:, 0])
+    turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
+    moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
+    lanes = corpus.to_lanes(corpus.rotations)
+    orientations = np.concatenate([lanes, rot.normalise(rot.slerp(lanes[begins], lanes[ends], 0.5))])
+    middles = len(corpus) + np.arange(len(begins))
+    return Carriage(
+        orientations,
+        np.concatenate([corpus.weights, weights]),
+        np.concatenate([begins, middles]),
+        np.concatenate([middles, ends]),
+        np.concatenate([shares, np.ones(len(begins))]),
+        kinds_of(corpus.skeleton, orientations),
+        0.5 * turned,
+        0.5 * moved,
+        np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
+        _stands(corpus),
+        find_loose(corpus.skeleton, corpus.rotations),
+    )
+
+
+def _stands(corpus: Corpus) -> Floats:
+    """How still limbs and trunk are, as in Carriage: 1 / (1 + (v / SLIDES)^2) of the level speed v of the point that is
+    lowest in a move; in a posture the mean of the moves there."""
+    begins, ends = corpus.moves.begins, corpus.moves.ends
+    places = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
+    limb = limb_of_points(corpus.skeleton)
+    out = np.ones((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
+    counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
+    for number in range(out.shape[1]):
+        points = places[:, limb == number]
+        if not points.shape[1]:
+            continue  # all joints are of limbs
+        lowest = np.argmin(points[begins, :, 1] + points[ends, :, 1], axis=1)
+        moved = points[ends, lowest] - points[begins, lowest]
+        speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds
+        still = 1.0 / (1.0 + (speed / SLIDES) ** 2)
+        out[len(corpus) :, number] = still
+        sums = np.bincount(begins, still, len(corpus)) + np.bincount(ends, still, len(corpus))
+        out[: len(corpus), number] = sums / counts
+    return out
+
+
+ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are of one kind
+
+
+def kinds_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
+    """Which kind each part of a body is of in lanes' orientations [N, L, 4]: [N, P], parts as in `parts_of`, kinds from
+    0.
+
+    In the order of the postures one founds a kind unless a founder lies within ALIKE; then each joins the nearest.
+    """
+    parts = parts_of(skeleton)
+    out = np.empty((len(orientations), len(parts)), dtype=np.int32)
+    for part, joints in enumerate(parts):
+        out[:, part] = _kinds(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
+    return out
+
+
+@jit
+def _kinds(orientations: Floats, within: float) -> Ints:
+    founders = np.empty(len(orientations), np.int64)
+    out = np.empty(len(orientations), np.int64)
+    count = 0
+    for late in (False, True):
+        for i in range(len(orientations)):
+            least = np.inf
+            for k in range(count):
+                distance = squared(orientations[i], orientations[founders[k]])
+                if distance < least:
+                    least, out[i] = distance, k
+            if not late and least > within:
+                founders[count] = i
+                count += 1
+    return out

@@ -1,0 +1,245 @@
+"""Rigs: how the joints of well-known files are called, and how their axes lie in the body.
+
+Names are written here without case, punctuation or namespace, as `plain_names` gives them: "mixamorig:LeftUpLeg" is
+"leftupleg". Several joints in a row may stand for one of human23's: it stands where the first does and turns as the
+last does.
+
+Sources of the names: the CMU Motion Capture Database's ASF files and their conversion to BVH by B. Hahne
+(cgspeed.com); Mixamo's and Autodesk HumanIK's rigs (the same but for the namespace); Biovision's own names, in use
+since the format's first files; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its kin.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.human import human23, human44
+from motionmind.geometry import rotations as rot
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A family of skeletons that share their joints' names.
+
+    Attributes:
+        name: what the rig is called.
+        joints: plain name of a file's joint -> the joint of human23 that it stands for, without the spine. Of
+            names for one joint that do not hang from each other, the first that a skeleton has counts.
+        spine: plain names of all joints from the pelvis to the one that carries the arms, upwards. As many as a
+            skeleton has are shared out among lumbar and thorax.
+        marks: plain names without which a skeleton is not of this rig, whatever else it has.
+        frames: for rigs whose zero pose is no standing body, where human23's axes lie in each joint's own frame:
+            joint of human23 -> quaternion [4]. Empty where the zero pose stands.
+        neck_leans: whether the slope of the neck in the zero pose is posture, so that a neck and head at rest are
+            turned upright from it, and not anatomy.
+        twists: joint of human23 -> radians by which human23's axes are turned about +x in the file's, once the
+            bones' directions agree: what the direction of a bone cannot tell.
+    """
+
+    name: str
+    joints: Mapping[str, str]
+    spine: Sequence[str]
+    marks: frozenset[str] = frozenset()
+    frames: Mapping[str, Floats] = field(default_factory=dict)
+    neck_leans: bool = False
+    twists: Mapping[str, float] = field(default_factory=dict)
+
+
+def plain_names(names: Sequence[str]) -> list[str]:
+    """The names without what varies from file to file: namespaces, a common prefix, case, punctuation."""
+    bare = [re.split(r"[:|]", name)[-1] or name for name in names]
+    # "Character1_Hips", "Character1_Spine": what all share, if it ends where a word does.
+    first = re.match(r".*[^A-Za-z0-9]", bare[0])
+    prefix = first[0] if first and all(name.startswith(first[0]) for name in bare) else ""
+    return [re.sub(r"[^a-z0-9]", "", name.removeprefix(prefix).lower()) for name in bare]
+
+
+def spine_shares(chain: Sequence[str]) -> dict[str, str]:
+    """Which joints of a spine, listed upwards, are the lumbar's, and which the thorax's.
+
+    The last is always the thorax, since it carries the arms. Of an odd number the lumbar has the more: so the
+    thorax stands where human23's does in CMU's spines of three (0.24 m and 0.23 m above the pelvis).
+    """
+    upper = max(1, len(chain) // 2)
+    return {name: "lumbar" if i < len(chain) - upper else "thorax" for i, name in enumerate(chain)}
+
+
+def _both_sides(sided: Mapping[str, str]) -> dict[str, str]:
+    """Names for left and right: "{side}" is the word, "{s}" its initial."""
+    return {
+        name.format(side=side, s=side[0]): f"{side}_{joint}"
+        for side in ("left", "right")
+        for name, joint in sided.items()
+    }
+
+
+def _axes(x: str, y: str, pitch: float = 0.0) -> Floats:
+    """Quaternion [4] that takes +x and +y to signed axes such as "-z"; first `pitch` degrees about +x."""
+    columns = [(-1.0 if name[0] == "-" else 1.0) * np.eye(3)["xyz".index(name[1])] for name in (x, y)]
+    turned = rot.from_matrix(np.stack([*columns, np.cross(*columns)], axis=-1))
+    return rot.mul(turned, rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(pitch)))
+
+
+_HUMANIK = {
+    "hips": "pelvis",
+    "neck": "cervical",
+    "neck1": "cervical",
+    "neck2": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{side}upleg": "hip",
+        "{side}leg": "knee",
+        "{side}foot": "ankle",
+        "{side}toebase": "toes",
+        "{side}shoulder": "clavicle",
+        "{side}arm": "shoulder",
+        "{side}forearm": "elbow",
+        "{side}hand": "wrist",
+        "{side}fingerbase": "wrist",  # CMU's hand; its {side}hand only rolls the forearm
+        "{side}handmiddle1": "fingers",
+        "{side}handindex1": "fingers",
+        "{side}handend": "fingers",
+    }
+)
+_HUMANIK_SPINE = ("lowerback", "spine", "spine1", "spine2", "spine3", "spine4", "spine5")
+
+# CMU's neck has two bones, too. The upper one stands where human23's cervical joint does, and the head strays half as
+# far from its place as when both are joined (16 mm instead of 23 mm in five clips of karate).
+_CMU_BVH = {name: joint for name, joint in _HUMANIK.items() if name != "neck"}
+
+# lwrist only rolls the forearm: the joint that the hand turns in is lhand.
+_CMU_ASF = {
+    "root": "pelvis",
+    "upperneck": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{s}femur": "hip",
+        "{s}tibia": "knee",
+        "{s}foot": "ankle",
+        "{s}toes": "toes",
+        "{s}clavicle": "clavicle",
+        "{s}humerus": "shoulder",
+        "{s}radius": "elbow",
+        "{s}hand": "wrist",
+        "{s}fingers": "fingers",
+    }
+)
+
+_BIOVISION = {
+    "hips": "pelvis",
+    "lowerneck": "cervical",
+    "neck": "cervical",
+    "neck1": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{side}hip": "hip",
+        "{side}upleg": "hip",
+        "{side}knee": "knee",
+        "{side}lowleg": "knee",
+        "{side}ankle": "ankle",
+        "{side}foot": "ankle",
+        "{side}toes": "toes",
+        "{side}toe": "toes",
+        "{side}collar": "clavicle",
+        "{side}shoulder": "shoulder",
+        "{side}uparm": "shoulder",
+        "{side}elbow": "elbow",
+        "{side}lowarm": "elbow",
+        "{side}wrist": "wrist",
+        "{side}hand": "wrist",
+        "{s}hand": "wrist",
+        "{s}fingers": "fingers",
+    }
+)
+
+_BANDAI = {"hips": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "upperleg{s}": "hip",
+        "lowerleg{s}": "knee",
+        "foot{s}": "ankle",
+        "toes{s}": "toes",
+        "shoulder{s}": "clavicle",
+        "upperarm{s}": "shoulder",
+        "lowerarm{s}": "elbow",
+        "hand{s}": "wrist",
+    }
+)
+
+# Bandai's zero pose is no body that stands: in each joint's frame the bone lies along +x (right limbs: -x) and the
+# hinge of knee and elbow is y. Where human23's +x (to the left) and +y (up) lie follows from that for limbs, for the
+# trunk from where hips and shoulders are attached. The sense of the hinges is the movement's: knees turn about +y,
+# elbows about -y. With the soles flat on the floor (where the feet of walk, kick and slash rest most of the time) the
+# bone from ankle to toes points 39.6 degrees down, the toes' own x axis 23.0 degrees.
+_TRUNK, _LEG = _axes("+z", "+x"), {"left": ("+y", "-x"), "right": ("+y", "+x")}
+_ARM = {"left": _axes("+x", "+y"), "right": _axes("+x", "-y")}
+_BANDAI_FRAMES = (
+    {"pelvis": _axes("-y", "+x")}
+    | dict.fromkeys(("lumbar", "thorax", "cervical", "atlantal"), _TRUNK)
+    | {f"{side}_{joint}": _axes(*axes) for side, axes in _LEG.items() for joint in ("hip", "knee")}
+    | {f"{side}_ankle": _axes(*axes, pitch=90.0 - 39.6) for side, axes in _LEG.items()}
+    | {f"{side}_toes": _axes(*axes, pitch=90.0 - 23.0) for side, axes in _LEG.items()}
+    | {f"{side}_{j}": axes for side, axes in _ARM.items() for j in ("clavicle", "shoulder", "elbow", "wrist")}
+)
+
+# CMU's elbows are hinges about (0, -0.866, 0.5) in the zero pose of the left arm, 30 degrees off the vertical (the
+# axis of lradius is "180 -30 -90" in the ASF files, and so the BVH's LeftForeArm turns). The hand is not turned with
+# them: its palm is down in that pose. Necks are as they were when the performer was measured: that of subject 05 leans
+# back by 22 degrees, and forward by as much in all movement; that of 135 is straight.
+_CMU_TWISTS = {f"{side}_{joint}": np.radians(-30.0) for side in ("left", "right") for joint in ("shoulder", "elbow")}
+
+# At rest SMPL stands as human23 does, all axes the world's. spine2 is as high above the pelvis as human23's thorax, and
+# of four fingers the middle one is taken.
+_SMPL = {
+    "pelvis": "pelvis",
+    "spine1": "lumbar",
+    "spine2": "thorax",
+    "spine3": "thorax",
+    "neck": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{side}hip": "hip",
+        "{side}knee": "knee",
+        "{side}ankle": "ankle",
+        "{side}foot": "toes",
+        "{side}collar": "clavicle",
+        "{side}shoulder": "shoulder",
+        "{side}elbow": "elbow",
+        "{side}wrist": "wrist",
+        "{side}middle1": "fingers",
+        "{side}hand": "fingers",
+    }
+)
+
+_OWN = {name.replace("_", ""): name for name in human23().names}
+_OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
+
+# Of human44's rows only the spine's are joined; the turn of the axial joint goes to the head, as it does in the body. A
+# fist is folded further than the fingers of human23 can be: they turn with the first row of knuckles, as toes do.
+_HUMAN44 = _OWN | {
+    "lumbarmiddle": "lumbar",
+    "lumbarupper": "lumbar",
+    "thoraxmiddle": "thorax",
+    "thoraxupper": "thorax",
+    "cervicalmiddle": "cervical",
+    "cervicalupper": "cervical",
+}
+
+RIGS: tuple[Rig, ...] = (
+    Rig("human44", _HUMAN44, (), frozenset(plain_names(human44().names)), frames=_OWN_FRAMES),
+    Rig("human23", _OWN, (), frames=_OWN_FRAMES),
+    Rig("CMU, BVH", _CMU_BVH, _HUMANIK_SPINE, frozenset({"lhipjoint", "neck1"}), neck_leans=True, twists=_CMU_TWISTS),
+    Rig("CMU, ASF", _CMU_ASF, ("lowerback", "upperback", "thorax"), neck_leans=True, twists=_CMU_TWISTS),
+    Rig("Mixamo", _HUMANIK, _HUMANIK_SPINE),
+    Rig("Biovision", _BIOVISION, ("lowerback", "ab", "abdomen", "chest", "chest2", "chest3", "chest4")),
+    Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
+    Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
+)

@@ -1,0 +1,220 @@
+"""Why nothing joins A and B: which joints cannot get through, from where to where, and what would let them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order, shortest_path
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.mirror import find_sides
+from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.discretize import StateSpace
+from motionmind.discretize.codebook import codebook
+from motionmind.discretize.states import nearest
+from motionmind.errors import SkeletonError
+from motionmind.geometry import rotations as rot
+from motionmind.grammar.grammar import Grammar
+from motionmind.search.problem import Model, Rules
+
+_COARSER = (1.25, 1.5, 2.0, 3.0)  # times the tolerance that are tried
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """Something that would let a joint through: what, and how many moves it then needs at least."""
+
+    what: str
+    moves: int
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A pair of states that come nearest to joining, and the angle between them."""
+
+    before: str
+    after: str
+    degrees: float
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A joint that does not get from its state in A to that in B.
+
+    Attributes:
+        joint: its name.
+        start: what its state in A is called.
+        goal: what its state in B is called.
+        needs: moves that it needs at least; None where no number is enough.
+        ahead: states that its state in A leads to, itself among them.
+        behind: states that lead to its state in B.
+        gap: where `needs` is None, of these the two that lie nearest.
+        remedies: what would let it through.
+    """
+
+    joint: str
+    start: str
+    goal: str
+    needs: int | None
+    ahead: int
+    behind: int
+    gap: Gap | None
+    remedies: tuple[Remedy, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Why there is no path: the greatest number of moves allowed, whether bridges were not, and the joints at fault.
+
+    `helps` is what lets all of them through.
+    """
+
+    max_moves: int
+    strict: bool
+    faults: tuple[Fault, ...]
+    helps: tuple[str, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """As plain values for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        many = f"{self.max_moves} move{'s' * (self.max_moves != 1)}"
+        helps = (
+            "without strict, bridges may join them; so may a coarser tolerance" if self.strict else "allow more moves"
+        )
+        return "\n".join([f"no path from A to B in at most {many} ({helps}):", *self._lines()])
+
+    def _lines(self) -> Iterator[str]:
+        for fault in self.faults:
+            if fault.gap:
+                yield (
+                    f"  {fault.joint}: of the {fault.ahead} states that {fault.start} leads to and the {fault.behind} "
+                    f"that lead to {fault.goal} none are the same; nearest are {fault.gap.before} and "
+                    f"{fault.gap.after}, {fault.gap.degrees:.1f} degrees apart"
+                )
+            else:
+                yield f"  {fault.joint} needs {fault.needs} moves from {fault.start} to {fault.goal}"
+            if fault.remedies:
+                found = (f"{r.what} (in {r.moves} move{'s' * (r.moves != 1)})" for r in fault.remedies)
+                yield f"    would join them: {', '.join(found)}"
+        if len(self.faults) > 1 and self.helps:
+            yield f"  would join all of them: {', '.join(self.helps)}"
+
+
+def diagnose(
+    model: Model,
+    grammar: Grammar,
+    corpus: Corpus,
+    space: StateSpace,
+    start: Ints,
+    goal: Ints,
+    rules: Rules,
+    strict: bool,
+) -> Diagnosis:
+    """What is wrong where no path leads from states `start` [L] to `goal` [L] under `rules`, and what would help.
+
+    Remedies are tried joint by joint: bridges, if `strict` forbade them; the corpus played backwards too, and seen in a
+    mirror too, as far as it has states for what is there; and coarser states. A joint that has arrived may wait, so
+    where all have a way of few enough moves, there is a path.
+    """
+    faults = []
+    for lane in range(len(grammar.lanes)):
+        first, last = model.starts[lane], model.starts[lane + 1]
+        rows = slice(model.indptr[first], model.indptr[last])
+        edges = np.repeat(np.arange(last - first), np.diff(model.indptr[first : last + 1])), model.targets[rows]
+        graph, a, b = _graph(*edges, last - first), int(start[lane]), int(goal[lane])
+        needs = _moves(graph, a, b)
+        if needs is not None and needs <= rules.longest:
+            continue
+        tried = _remedies(graph, grammar, corpus, space, lane, a, b, strict)
+        remedies = tuple(Remedy(what, moves) for what, moves in tried if moves is not None and moves <= rules.longest)
+        ahead = breadth_first_order(graph, a, return_predecessors=False)
+        behind = breadth_first_order(graph.T.tocsr(), b, return_predecessors=False)
+        centres = space.of(lane)
+        cosines = np.abs(centres[ahead] @ centres[behind].T)
+        i, k = np.unravel_index(int(cosines.argmax()), cosines.shape)
+        degrees = float(np.degrees(2.0 * np.arccos(min(1.0, cosines[i, k]))))
+        gap = Gap(_called(space, lane, ahead[i]), _called(space, lane, behind[k]), degrees) if needs is None else None
+        ends = _called(space, lane, a), _called(space, lane, b)
+        faults.append(Fault(grammar.lanes[lane], *ends, needs, len(ahead), len(behind), gap, remedies))
+    every = [{remedy.what for remedy in fault.remedies} for fault in faults]
+    helps = tuple(sorted(set.intersection(*every))) if every else ()
+    return Diagnosis(rules.longest, strict, tuple(faults), helps)
+
+
+def _remedies(
+    graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, lane: int, a: int, b: int, strict: bool
+) -> Iterator[tuple[str, int | None]]:
+    """Moves that a lane needs from state `a` to `b`, None where none suffice, with each thing that might help."""
+    if strict:
+        first, last = grammar.transitions.starts[lane], grammar.transitions.starts[lane + 1]
+        indptr = grammar.bridges.indptr[first : last + 1]
+        sources = np.repeat(np.arange(last - first), np.diff(indptr))
+        bridged = _graph(sources, grammar.bridges.targets[indptr[0] : indptr[-1]], last - first)
+        yield "bridges, without strict", _moves(graph + bridged, a, b)
+    yield "the corpus learned backwards too (--reverse)", _moves(graph + graph.T, a, b)
+    mirrored = _mirrored(grammar, corpus, space, lane)
+    if mirrored is not None:
+        yield "the corpus learned in a mirror too (--mirror)", _moves(graph + mirrored, a, b)
+    if grammar.lanes[lane] != FACING:
+        for times in _COARSER:
+            degrees = times * float(space.tolerances[lane])
+            moves = _coarser(corpus, space.of(lane)[[a, b]], lane, min(degrees, 180.0))
+            if moves is not None:
+                yield f"a tolerance of {degrees:g} degrees for {grammar.lanes[lane]}", moves
+                break
+
+
+def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, lane: int) -> csr_array | None:
+    """The moves that a lane's partner makes, seen in a mirror, between the lane's own states; None where the body has
+    no mirror image, or the lane's image is more than its partner's reflection."""
+    graph = grammar.transitions
+    if grammar.lanes[lane] == FACING:
+        partner, image = lane, space.of(lane) * np.array([-1.0, -1.0, -1.0, 1.0])
+    else:
+        try:
+            sides = find_sides(corpus.skeleton)
+        except SkeletonError:
+            return None
+        if lane == 0 and sides.axis != sides.world:
+            return None
+        partner = int(sides.partners[lane])
+        image = rot.mirror(space.of(partner), sides.axis)
+    here, cosines = nearest(image, space.of(lane))
+    near = np.degrees(2.0 * np.arccos(np.minimum(cosines, 1.0))) <= space.tolerances[lane]
+    first, last = graph.starts[partner], graph.starts[partner + 1]
+    rows = slice(graph.indptr[first], graph.indptr[last])
+    sources = np.repeat(np.arange(last - first), np.diff(graph.indptr[first : last + 1]))
+    targets = graph.targets[rows]
+    kept = near[sources] & near[targets]
+    return _graph(here[sources[kept]], here[targets[kept]], int(space.sizes[lane]))
+
+
+def _coarser(corpus: Corpus, ends: Floats, lane: int, degrees: float) -> int | None:
+    """Moves that a joint needs between two orientations [2, 4], if its states are learned anew, `degrees` wide."""
+    orientations = corpus.to_lanes(corpus.rotations)[:, lane]
+    centres = codebook(orientations, degrees)
+    states, (a, b) = nearest(orientations, centres)[0], nearest(ends, centres)[0]
+    return _moves(_graph(states[corpus.moves.begins], states[corpus.moves.ends], len(centres)), int(a), int(b))
+
+
+def _graph(sources: NDArray[Any], targets: NDArray[Any], size: int) -> csr_array:
+    return csr_array((np.ones(len(sources)), (sources, targets)), shape=(size, size))
+
+
+def _moves(graph: csr_array, a: int, b: int) -> int | None:
+    """The least number of moves from one state to another; None where there is no way."""
+    hops = shortest_path(graph, unweighted=True, indices=a)[b]
+    return int(hops) if np.isfinite(hops) else None
+
+
+def _called(space: StateSpace, lane: int, state: int) -> str:
+    """A state by its number, and its name where it has one."""
+    number, name = f"state {state}", space.label(lane, int(state))
+    return number if name == number else f"{number} ({name})"

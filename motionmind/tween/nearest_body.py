@@ -1,0 +1,60 @@
+"""Tweens through whole postures of a corpus: which posture is nearest, and why there may be no way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.search.problem import Rules
+from motionmind.tween.whole_body import Bodies
+
+_COMPARED = 4000  # postures that are compared with as many others at most, to say which come nearest
+
+
+def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
+    """The posture of the corpus with the least sum of squared angles between its joints' rotations and `rotations`
+    [J, 4], but for where it faces, if that is free."""
+    count = len(corpus.skeleton)
+    angles = rot.angle(corpus.to_lanes(corpus.rotations)[:, :count], corpus.to_lanes(rotations)[:count])
+    return int(np.argmin(np.sum(angles**2, axis=1)))
+
+
+def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], rules: Rules) -> str:
+    """Why no whole postures lead from one posture of the corpus to another, `near` A and B, and which come nearest."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import shortest_path
+
+    (a, b), (start, goal) = near, bodies.of[list(near)]
+    count, shape = len(bodies.targets), (len(bodies.states), len(bodies.states))
+    graph = csr_array((np.ones(count), bodies.targets, bodies.indptr), shape=shape)
+    ahead = shortest_path(graph, unweighted=True, indices=start)
+    back = shortest_path(graph.T.tocsr(), unweighted=True, indices=goal)
+    within = f"at most {rules.longest} move{'s' * (rules.longest != 1)}"
+    first = f"no path from A to B in {within} through whole postures (without posturewise joints move on their own):"
+    ends = f"{_place(corpus, a)}, nearest to A, and {_place(corpus, b)}, nearest to B"
+    if np.isfinite(ahead[goal]) and start != goal:
+        needs = f"{ahead[goal]:.0f} moves lie between {ends}"
+        if ahead[goal] <= rules.longest:
+            needs += f", but not in as many as were asked for, or the {FACING} does not come round in them"
+        return f"{first}\n  {needs}"
+    # One posture of each body is enough to tell how far apart they are.
+    one = np.unique(bodies.of, return_index=True)[1]
+    found, led = one[np.isfinite(ahead)], one[np.isfinite(back)]
+    joints = corpus.to_lanes(corpus.rotations)[:, : len(corpus.skeleton)]
+    some, others = (which[:: 1 + len(which) // _COMPARED] for which in (found, led))
+    # The sum over joints of (q . p)^2 = cos^2 of half the angle is a product of what each posture brings to it.
+    squares = [(q[..., :, None] * q[..., None, :]).reshape(len(q), -1) for q in (joints[some], joints[others])]
+    i, k = np.unravel_index(int(np.argmax(squares[0] @ squares[1].T)), (len(some), len(others)))
+    degrees = np.degrees(rot.angle(joints[some[i]], joints[others[k]])).mean()
+    return (
+        f"{first}\n  of the {len(found)} postures that {_place(corpus, a)}, nearest to A, leads to and the {len(led)} "
+        f"that lead to {_place(corpus, b)}, nearest to B, none are the same; nearest are "
+        f"{_place(corpus, some[i])} and {_place(corpus, others[k])}, {degrees:.1f} degrees a joint apart"
+    )
+
+
+def _place(corpus: Corpus, posture: int) -> str:
+    clip = corpus.clip_of(posture)
+    return f"posture {posture - clip.start} of {clip.label}"

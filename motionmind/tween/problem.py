@@ -1,0 +1,110 @@
+"""From a grammar to what the search reads: every edge and coupling with its cost in nats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.grammar.coordination import Coordination
+from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.transitions import Weights
+from motionmind.search.problem import Model
+
+
+def price(
+    grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float = 0.0
+) -> Model:
+    """The costs of a grammar.
+
+    Args:
+        grammar: what was learned.
+        weights: how transitions are weighed.
+        coordination: lambda, the factor of the network's -log P.
+        bridge_price: nats for each degree that a bridge spans; None leaves bridges out.
+        novelty: from 0 to 1, how little it matters which attested transitions are frequent.
+    """
+    graph, bridges, net = grammar.transitions, grammar.bridges, grammar.coordination
+    rows, targets, costs = graph.sources, graph.targets, graph.weights(weights, novelty)
+    if bridge_price is not None:
+        bridged = np.repeat(np.arange(len(bridges.indptr) - 1), np.diff(bridges.indptr))
+        rows = np.concatenate([rows, bridged])
+        targets = np.concatenate([targets, bridges.targets])
+        costs = np.concatenate([costs, bridge_price * bridges.degrees])
+        order = np.lexsort((targets, rows))
+        rows, targets, costs = rows[order], targets[order], costs[order]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(graph.visits)))]).astype(np.int64)
+
+    return Model(
+        starts=np.array(graph.starts),  # a copy, for what was loaded is mapped read-only: another type to compile for
+        **couplings(net, graph.starts, coordination)._asdict(),
+        indptr=indptr,
+        targets=targets,
+        costs=costs,
+        allowed=np.ones(len(graph.visits), dtype=bool),
+        place=np.concatenate([np.arange(size) for size in graph.sizes()]).astype(np.int32),
+    )
+
+
+class Couplings(NamedTuple):
+    """How the lanes of a Model are coupled; attributes as there."""
+
+    parents: Ints
+    unary: Floats
+    alone: Floats
+    pair_starts: Ints
+    pair_ptr: Ints
+    pair_states: Int32s
+    pair_costs: Floats
+
+
+def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
+    """The costs of a network with a factor; lane j has the rows `starts[j]` to `starts[j + 1]` of its states."""
+    unary, alone = factor * net.child_costs, np.zeros(starts[-1])
+    corrections = np.zeros(len(net.pair_costs))
+    for lane, parent in enumerate(net.parents):
+        if parent < 0:
+            continue
+        mine, above = (slice(starts[k], starts[k + 1]) for k in (lane, parent))
+        rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
+        unary[above] += factor * net.parent_costs[rows]
+        pairs = slice(net.pair_ptr[rows.start], net.pair_ptr[rows.stop])
+        row_of_pair = np.repeat(net.parent_costs[rows], np.diff(net.pair_ptr[rows.start : rows.stop + 1]))
+        separable = net.child_costs[mine][net.pair_states[pairs]] + row_of_pair
+        corrections[pairs] = factor * (net.pair_costs[pairs] - separable)
+        least = net.child_costs[mine] + net.parent_costs[rows].min()
+        np.minimum.at(least, net.pair_states[pairs], net.pair_costs[pairs])
+        alone[mine] = factor * least
+    pair_starts, pair_ptr, parents = (np.array(part) for part in (net.pair_starts, net.pair_ptr, net.parents))
+    return Couplings(parents, unary, alone, pair_starts, pair_ptr, np.array(net.pair_states), corrections)
+
+
+def changes(path: Int32s) -> list[tuple[int, int, int]]:
+    """The moves of a path of states [T + 1, L] from one state to another: lane, from, to."""
+    before, after = path[:-1], path[1:]
+    moves, lanes = np.nonzero(before != after)
+    return list(zip(lanes.tolist(), before[moves, lanes].tolist(), after[moves, lanes].tolist(), strict=True))
+
+
+def dearer(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
+    """The model in which each move from one state to another costs `nats` more for every one of `paths` that makes it.
+
+    To hold still is no move that could be shared.
+    """
+    costs = model.costs.copy()
+    for path in paths:
+        for lane, state, target in set(changes(path)):
+            row = model.starts[lane] + state
+            first, last = model.indptr[row], model.indptr[row + 1]
+            at = first + np.searchsorted(model.targets[first:last], target)
+            if at < last and model.targets[at] == target:
+                costs[at] += nats
+    return model._replace(costs=costs)
+
+
+def shared_moves(path: Int32s, others: Sequence[Int32s]) -> int:
+    """How many moves of lanes from one state to another a path shares with others, counted for each of these."""
+    made = changes(path)
+    return sum(move in theirs for theirs in map(set, map(changes, others)) for move in made)

@@ -1,0 +1,114 @@
+"""The search that the papers began with, as a baseline: whole postures of a corpus, in the order that they were in.
+
+Its nodes are whole bodies, states of all lanes at once, and its edges the moves that the corpus made between them. Both
+cost what they cost the search that moves lanes on their own, so this is that search restricted, and no path of it is
+cheaper. Lanes beyond those of the nodes (the facing, which goes with nothing) travel on their own.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.solve import Certificate
+
+
+class Bodies(NamedTuple):
+    """Whole bodies and the moves between them.
+
+    Attributes:
+        states: of the first K lanes, each body once [P, K].
+        of: the body that each posture of the corpus is [N].
+        indptr: moves from each body [P + 1]; `targets` from `indptr[body]` to `indptr[body + 1]`.
+        targets: the body that a move leads to [M].
+    """
+
+    states: Int32s
+    of: Ints
+    indptr: Ints
+    targets: Ints
+
+    @property
+    def sources(self) -> Ints:
+        """The body that each move leaves [M]."""
+        return np.repeat(np.arange(len(self.states)), np.diff(self.indptr))
+
+
+def find_bodies(states: Int32s, begins: Ints, ends: Ints) -> Bodies:
+    """The bodies of postures with `states` [N, K], and the moves from postures `begins` [M] to `ends` [M]."""
+    bodies, of = np.unique(states, axis=0, return_inverse=True)
+    of = of.reshape(-1).astype(np.int64)
+    sources, targets = np.unique(np.stack([of[begins], of[ends]]), axis=1)
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(sources, minlength=len(bodies)))])
+    return Bodies(bodies, of, indptr.astype(np.int64), targets)
+
+
+def solve_posturewise(model: Model, bodies: Bodies, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
+    """The best path through whole bodies from states `start` [L] to `goal` [L] over all numbers of moves; None where
+    there is none.
+
+        V[0, goal] = 0,   V[k, p] = min over moves p -> q of  cost(p, q) + V[k - 1, q]
+
+    with the costs of the model. Exact: what is returned is the least that any such path costs.
+    """
+    began, count = perf_counter(), bodies.states.shape[1]
+    held = with_waits(model, goal, rules.wait)
+    costs = _costs(held, bodies)
+    a, b = _body(bodies, start[:count]), _body(bodies, goal[:count])
+    to_go = costs_to_go(held, goal, rules.longest)
+    alone = to_go[:, held.starts[count:-1] + start[count:]].sum(axis=1) + rules.per_move * np.arange(len(to_go))
+    posed = perf_counter()
+    rows = np.flatnonzero(np.diff(bodies.indptr))
+    value = [np.where(np.arange(len(bodies.states)) == b, 0.0, np.inf)]
+    best, moves, least = np.inf, 0, min(float(costs.min(initial=0.0)), 0.0)
+    for k in range(1, rules.longest + 1):
+        value.append(np.full(len(bodies.states), np.inf))
+        through = costs + value[-2][bodies.targets]
+        value[-1][rows] = np.minimum.reduceat(through, bodies.indptr[rows]) if len(rows) else np.inf
+        if k >= rules.shortest and value[-1][a] + alone[k] < best:
+            best, moves = float(value[-1][a] + alone[k]), k
+        # What any longer path costs at least: its last k moves, and those before.
+        if value[-1].min() + rules.per_move * k + least * (rules.longest - k) >= best or np.isinf(value[-1].min()):
+            break
+    if not np.isfinite(best):
+        return None
+    path = np.empty((moves + 1, len(start)), dtype=np.int32)
+    path[0], body = start, a
+    for k in range(moves, 0, -1):
+        edges = np.arange(bodies.indptr[body], bodies.indptr[body + 1])
+        body = int(bodies.targets[edges[np.argmin(costs[edges] + value[k - 1][bodies.targets[edges]])]])
+        path[moves - k + 1, :count] = bodies.states[body]
+        for lane in range(count, len(start)):
+            row = held.starts[lane] + path[moves - k, lane]
+            edges = np.arange(held.indptr[row], held.indptr[row + 1])
+            left = to_go[k - 1, held.starts[lane] + held.targets[edges]]
+            path[moves - k + 1, lane] = held.targets[edges[np.argmin(held.costs[edges] + left)]]
+    seconds = {"problem": posed - began, "bound": 0.0, "search": perf_counter() - posed}
+    return Certificate(path, best, best, "optimal", 0, 0, seconds)
+
+
+def _body(bodies: Bodies, states: Ints) -> int:
+    """The body whose states [K] these are."""
+    return int(np.flatnonzero((bodies.states == states).all(axis=1))[0])
+
+
+def _costs(model: Model, bodies: Bodies) -> Floats:
+    """What each move [M] costs: its lanes' moves, and the body that it leads to."""
+    sources, states = bodies.sources, bodies.states.astype(np.int64)
+    span = int(np.diff(model.starts).max())
+    edges = np.repeat(np.arange(len(model.indptr) - 1), np.diff(model.indptr)) * span + model.targets
+    pairs = np.repeat(np.arange(len(model.pair_ptr) - 1), np.diff(model.pair_ptr)) * span + model.pair_states
+    costs, stand = np.zeros(len(sources)), np.zeros(len(states))
+    for lane in range(states.shape[1]):
+        rows, parent = model.starts[lane] + states[:, lane], model.parents[lane]
+        costs += model.costs[np.searchsorted(edges, rows[sources] * span + states[bodies.targets, lane])]
+        stand += model.unary[rows]
+        if parent >= 0:  # a body was seen, and so were its pairs
+            stand += model.pair_costs[
+                np.searchsorted(pairs, (model.pair_starts[lane] + states[:, parent]) * span + states[:, lane])
+            ]
+    return np.asarray(costs + stand[bodies.targets])

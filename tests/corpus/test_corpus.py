@@ -1,0 +1,475 @@
+"""From recordings to a corpus, and corpora on disk."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus import store
+from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.gather import find_flips, gather
+from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.errors import CorpusError, FormatError, MotionMindError
+from motionmind.geometry import rotations as rot
+
+ARM = Skeleton("arm", ("shoulder", "elbow", "wrist"), (-1, 0, 1), np.array([[0.0, 0, 0], [0.3, 0, 0], [0.2, 0, 0]]))
+ELBOW = 1
+
+
+def swing(name: str, frames: int = 30, fps: float = 120.0, jumps: dict[int, float] | None = None) -> Motion:
+    """An arm that swings slowly; from each frame in `jumps` on, the elbow is turned by so many degrees more."""
+    t = np.arange(frames) / fps
+    angles = np.stack([0.3 * np.sin(t), np.cos(t), 0.1 * t], axis=1)
+    for frame, degrees in (jumps or {}).items():
+        angles[frame:, ELBOW] += np.radians(degrees)
+    q = rot.from_axis_angle([0.0, 0.0, 1.0], angles)
+    return Motion(ARM, q, np.stack([t, 1.0 + 0.0 * t, 0.0 * t], axis=1), t, name)
+
+
+def bounds(corpus: Corpus) -> list[tuple[str, int]]:
+    return [(clip.name, clip.stop - clip.start) for clip in corpus.clips]
+
+
+# --- flips ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_flip_is_found_with_its_joint_frame_and_angle() -> None:
+    (fault,) = find_flips(swing("wave", jumps={17: 90.0}))
+    assert (fault.clip, fault.joint, fault.frame) == ("wave", "elbow", 17)
+    assert fault.degrees == pytest.approx(90.0, abs=1.0)
+
+
+def test_a_flip_by_half_a_turn_either_way_is_one_flip() -> None:
+    assert [fault.frame for fault in find_flips(swing("wave", jumps={5: 180.0, 20: -180.0}))] == [5, 20]
+
+
+def test_both_signs_of_a_quaternion_are_no_flip() -> None:
+    motion = swing("wave")
+    signs = np.where(np.arange(30) % 2 == 0, 1.0, -1.0)[:, None, None]
+    assert find_flips(replace(motion, rotations=motion.rotations * signs)) == ()
+
+
+def test_keyframes_that_lie_far_apart_are_spared() -> None:
+    assert len(find_flips(swing("recorded", fps=120.0, jumps={9: 90.0}))) == 1
+    assert find_flips(swing("keyframed", fps=2.0, jumps={9: 90.0})) == ()
+    assert find_flips(swing("one frame", frames=1)) == ()
+
+
+def test_the_angle_of_a_flip_is_a_choice() -> None:
+    motion = swing("wave", jumps={10: 40.0})
+    assert find_flips(motion) == ()
+    assert len(find_flips(motion, degrees=35.0)) == 1
+
+
+# --- gather -----------------------------------------------------------------------------------------------------------
+
+
+def test_split_cuts_at_a_flip_and_learns_no_jump() -> None:
+    corpus = gather("arms", [swing("a", jumps={10: 90.0, 11: -90.0, 20: 90.0}), swing("b")])
+    # The lone frame 10 makes no move; b is whole.
+    assert bounds(corpus) == [("a.1", 10), ("a.3", 9), ("a.4", 10), ("b", 30)]
+    turned = rot.angle(corpus.rotations[corpus.begins], corpus.rotations[corpus.begins + 1])
+    assert np.degrees(turned).max() < 5.0
+    assert [(fault.clip, fault.frame) for fault in corpus.faults] == [("a", 10), ("a", 11), ("a", 20)]
+
+
+def test_keep_takes_a_flip_as_it_is_and_drop_leaves_its_recording_out() -> None:
+    motions = [swing("a", jumps={10: 90.0}), swing("b")]
+    kept, dropped = (gather("arms", motions, flips=flips) for flips in ("keep", "drop"))
+    assert bounds(kept) == [("a", 30), ("b", 30)]
+    assert bounds(dropped) == [("b", 30)]
+    assert kept.faults == dropped.faults
+    assert len(kept.faults) == 1
+
+
+def test_frames_after_skipped_ones_keep_the_recordings_numbers() -> None:
+    corpus = gather("arms", [swing("a", jumps={1: 90.0, 12: 90.0})], skip=2)
+    assert [fault.frame for fault in corpus.faults] == [12]  # the jump among what is skipped is none
+    assert bounds(corpus) == [("a.1", 10), ("a.2", 18)]
+    np.testing.assert_array_equal(corpus.times[0], 2 / 120.0)
+
+
+def test_no_move_leads_from_one_clip_to_the_next() -> None:
+    corpus = gather("arms", [swing("a", 4), swing("one", 1), swing("b", 3)])
+    assert bounds(corpus) == [("a", 4), ("one", 1), ("b", 3)]
+    np.testing.assert_array_equal(corpus.begins, [0, 1, 2, 5, 6])
+    np.testing.assert_allclose(corpus.seconds, 1 / 120.0)
+    assert [corpus.where(posture) for posture in (0, 3, 4, 5, 7)] == [
+        ("a", 0),
+        ("a", 3),
+        ("one", 0),
+        ("b", 0),
+        ("b", 2),
+    ]
+
+
+def test_postures_are_made_even_in_time_after_the_cut() -> None:
+    corpus = gather("arms", [swing("a", 121, jumps={50: 90.0})], rate=20.0)
+    assert bounds(corpus) == [("a.1", 9), ("a.2", 12)]
+    np.testing.assert_allclose(corpus.seconds, 0.05)
+    assert corpus.rate == 20.0
+
+
+def shaking(frames: int, fps: float, seed: int = 0) -> Motion:
+    """An arm that swings and shakes, faster than 5 postures a second tell."""
+    slow, t = swing("a", frames, fps), np.arange(frames) / fps
+    shake = 0.03 * np.sin(40.0 * t[:, None, None] + np.random.default_rng(seed).uniform(0.0, 6.0, (3, 3)))
+    return replace(slow, rotations=rot.mul(slow.rotations, rot.exp(shake)))
+
+
+@pytest.mark.parametrize(("fps", "rate"), [(120.0, 5.0), (60.0, 10.0), (30.0, 6.0)])
+def test_a_corpus_keeps_what_its_postures_leave_out(fps: float, rate: float) -> None:
+    clip = shaking(int(8.0 * fps), fps)
+    corpus = gather("arms", [clip], rate=rate)
+    again = corpus.recording(corpus.clips[0])
+    assert again.fps == pytest.approx(30.0)
+    off = rot.angle(again.rotations, clip.at(again.times).rotations)
+    assert off.max() < 1e-4  # half floats: four digits of some hundredths
+    assert np.abs(corpus.detail[-1]).max() == 0.0
+    assert np.abs(again.root - clip.at(again.times).root).max() < 1e-6  # it goes evenly
+
+
+def test_a_joint_that_jumps_between_two_postures_has_no_detail_there() -> None:
+    clip = shaking(361, 60.0)
+    rotations = clip.rotations.copy()
+    rotations[100:104, ELBOW] = rot.mul(rotations[100:104, ELBOW], rot.from_axis_angle([0.0, 1.0, 0.0], 1.0))
+    corpus, clean = (
+        gather("arms", [one], rate=5.0, flips="keep") for one in (replace(clip, rotations=rotations), clip)
+    )
+    assert not np.any(corpus.detail[8, :, ELBOW])  # from 96 to 108, of 12 frames a posture
+    for changed in (corpus, clean):
+        changed.detail.setflags(write=True)
+        changed.detail[8, :, ELBOW] = 0.0
+    np.testing.assert_array_equal(corpus.detail, clean.detail)
+
+
+def test_nothing_is_kept_of_coarse_recordings_nor_where_every_frame_is_a_posture() -> None:
+    for clip, rate in ((shaking(60, 10.0), 5.0), (shaking(300, 50.0), None), (shaking(300, 50.0), 30.0)):
+        corpus = gather("arms", [clip], rate=rate)
+        assert not np.any(corpus.detail)
+        again = corpus.recording(corpus.clips[0]).at(corpus.times)
+        assert rot.angle(again.rotations, corpus.rotations).max() < 1e-7
+
+
+def test_a_cut_leaves_no_detail_of_the_jump() -> None:
+    jump = replace(swing("a", 241, jumps={101: 90.0}), name="jump")
+    corpus = gather("arms", [jump], rate=5.0)
+    assert len(corpus.clips) == 2
+    assert np.abs(corpus.detail).max() < np.radians(1.0)
+
+
+def test_recordings_of_one_name_are_told_apart() -> None:
+    corpus = gather("arms", [swing("a", 3), swing("a", 4), swing("", 3), swing("a", 5), swing("", 3)])
+    assert [clip.name for clip in corpus.clips] == ["a", "a (2)", "clip", "a (3)", "clip (2)"]
+
+
+def test_lanes_come_back_as_the_rotations_that_they_were_made_of() -> None:
+    rng = np.random.default_rng(0)
+    q = rot.normalise(rng.normal(size=(50, 3, 4)))
+    for facing, lanes in (("free", ("shoulder", "elbow", "wrist", "facing")), ("stage", ARM.names)):
+        corpus = gather("arms", [swing("a")], facing=facing)  # type: ignore[arg-type]
+        assert corpus.lanes == lanes
+        assert corpus.to_lanes(q).shape == (50, len(lanes), 4)
+        assert rot.angle(corpus.from_lanes(corpus.to_lanes(q)), q).max() < 1e-14
+    turned = q.copy()
+    turned[:, 0] = rot.mul(rot.about_vertical(1.0), q[:, 0])
+    free = gather("arms", [swing("a")], facing="free")
+    assert rot.angle(free.to_lanes(turned)[:, :3], free.to_lanes(q)[:, :3]).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("motions", "options", "words"),
+    [
+        ([], {}, "no recordings given"),
+        ([swing("one", 1)], {}, "no recording holds two postures, so there is no move to learn"),
+        ([swing("a", 4)], {"rate": 5.0}, "no recording holds two postures at 5 postures a second"),
+        ([swing("a", 5)], {"skip": 5}, "a has 5 frames; skipping 5 leaves none"),
+        ([swing("a")], {"skip": -1}, "frames to skip must be at least 0, not -1"),
+        ([swing("a", jumps={3: 90.0})], {"flips": "drop"}, "every recording has faults"),
+        ([swing("a", 2, jumps={1: 90.0})], {"flips": "split"}, "every recording has faults"),
+        ([swing("a")], {"flips": "mend"}, "flips must be one of drop, keep, split, not 'mend'"),
+        ([swing("a")], {"flip_degrees": np.nan}, "the angle of a flip"),
+        ([swing("a")], {"flip_degrees": 0.0}, "the angle of a flip"),
+        ([swing("a")], {"facing": "north"}, "facing must be 'free' or 'stage', not 'north'"),
+        ([swing("a")], {"rate": 0.0}, "a rate must be a positive number"),
+        ([swing("a")], {"rate": np.nan}, "a rate must be a positive number"),
+    ],
+)
+def test_what_leaves_nothing_to_learn_is_refused(motions: list[Motion], options: dict[str, Any], words: str) -> None:
+    with pytest.raises(MotionMindError, match=words):
+        gather("arms", motions, **options)
+
+
+def test_a_recording_on_another_skeleton_is_refused_and_the_difference_named() -> None:
+    other = Skeleton("hook", ("shoulder", "elbow", "hook"), (-1, 0, 1), ARM.offsets)
+    with pytest.raises(CorpusError, match="b is on another skeleton than a: hook lacks wrist and adds hook"):
+        gather("arms", [swing("a"), replace(swing("b"), skeleton=other)])
+
+
+def test_a_joint_cannot_have_the_name_of_the_bodys_turn() -> None:
+    odd = Skeleton("odd", ("shoulder", "elbow", "facing"), (-1, 0, 1), ARM.offsets)
+    with pytest.raises(CorpusError, match="a joint cannot be called 'facing'"):
+        gather("arms", [replace(swing("a"), skeleton=odd)])
+
+
+def test_clips_and_arrays_that_do_not_fit_are_refused() -> None:
+    corpus = gather("arms", [swing("a", 4)])
+    for clips in ((), (Clip("a", 0, 3),), (Clip("a", 1, 4),), (Clip("a", 0, 2), Clip("b", 3, 4))):
+        with pytest.raises(CorpusError, match="the clips do not follow one another"):
+            replace(corpus, clips=clips)
+    with pytest.raises(CorpusError, match="rotations, root and times"):
+        replace(corpus, root=corpus.root[:3])
+    with pytest.raises(CorpusError, match="its detail is not that of 4 postures"):
+        replace(corpus, detail=corpus.detail[:3])
+    with pytest.raises(CorpusError, match="no postures"):
+        replace(corpus, clips=(), rotations=corpus.rotations[:0], root=corpus.root[:0], times=corpus.times[:0])
+
+
+# --- on disk ----------------------------------------------------------------------------------------------------------
+
+MANIFEST = {"name": "arms", "title": "Übung", "clips": [{"name": "a", "start": 0}], "rate": None}
+
+
+def arrays(seed: int = 0) -> dict[str, NDArray[Any]]:
+    rng = np.random.default_rng(seed)
+    return {
+        "rotations": rng.normal(size=(7, 3, 4)),
+        "part.states": rng.integers(0, 9, (7, 3)).astype(np.int32),
+        "empty": np.zeros((0, 3)),
+        "strided": rng.normal(size=(8, 4))[::2, 1:],
+    }
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_what_is_saved_is_loaded_exactly(tmp_path: Path) -> None:
+    store.save(tmp_path / "deep" / "arms", MANIFEST, arrays())
+    manifest, found = store.load(tmp_path / "deep" / "arms")
+    assert {key: manifest[key] for key in MANIFEST} == MANIFEST
+    assert found.keys() == arrays().keys()
+    for name, array in arrays().items():
+        assert found[name].dtype == array.dtype
+        np.testing.assert_array_equal(found[name], array)
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["arms"]
+
+
+def test_the_same_things_are_saved_as_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        store.save(tmp_path / name, MANIFEST, arrays())
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
+def test_an_older_one_is_replaced_whole(tmp_path: Path) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays() | {"more": np.zeros(3)})
+    store.save(tmp_path / "arms", MANIFEST, arrays(1))
+    np.testing.assert_array_equal(store.load(tmp_path / "arms")[1]["rotations"], arrays(1)["rotations"])
+    assert not (tmp_path / "arms" / "more.npy").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["arms"]
+
+
+@pytest.mark.parametrize("failing", ["array", "manifest", "move"])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_the_old_one_stays_where_saving_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str, error: BaseException
+) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays())
+    before = contents(tmp_path / "arms")
+    rename = Path.rename
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise error
+
+    def move(path: Path, to: Path) -> None:
+        if to.name == "arms" and contents(path) != before:  # what is old may go, and come back
+            raise error
+        rename(path, to)
+
+    owner, name, instead = {
+        "array": (np, "save", fail),
+        "manifest": (Path, "write_bytes", fail),
+        "move": (Path, "rename", move),
+    }[failing]
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, name, instead)
+        with pytest.raises(CorpusError if isinstance(error, OSError) else KeyboardInterrupt):
+            store.save(tmp_path / "arms", MANIFEST, arrays(1))
+    assert contents(tmp_path / "arms") == before
+    assert [path.name for path in tmp_path.iterdir()] == ["arms"]
+
+
+def test_a_folder_that_is_no_built_corpus_is_never_replaced(tmp_path: Path) -> None:
+    diary = tmp_path / "home" / "diary.txt"
+    diary.parent.mkdir()
+    diary.write_text("dear diary")
+    with pytest.raises(CorpusError, match=r"holds diary.txt, .*; it is not replaced"):
+        store.save(diary.parent, MANIFEST, arrays())
+    with pytest.raises(CorpusError, match="cannot be written"):
+        store.save(diary, MANIFEST, arrays())
+    assert diary.read_text() == "dear diary"
+    assert [path.name for path in tmp_path.iterdir()] == ["home"]
+
+
+def test_a_place_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
+    for place in (tmp_path / ("x" * 300), Path("/proc/nowhere/arms")):
+        with pytest.raises(CorpusError, match="cannot be written"):
+            store.save(place, MANIFEST, arrays())
+
+
+def test_a_corpus_that_is_damaged_is_a_format_error(
+    tmp_path: Path, mutate: Callable[[str, random.Random], bytes]
+) -> None:
+    good = tmp_path / "good"
+    store.save(good, MANIFEST, arrays())
+    rng = random.Random(0)
+    for trial in range(300):
+        folder = tmp_path / f"bad{trial}"
+        shutil.copytree(good, folder)
+        file = rng.choice(sorted(folder.iterdir()))
+        if file.name == store.MANIFEST:
+            file.write_bytes(mutate(file.read_text("utf-8"), rng))
+        else:
+            data = bytearray(file.read_bytes())
+            for _ in range(rng.randint(1, 4)):
+                data[rng.randrange(min(140, len(data)))] = rng.randrange(256)
+            file.write_bytes(data[: rng.choice([len(data), rng.randrange(len(data))])])
+        with contextlib.suppress(FormatError):
+            _, found = store.load(folder)
+            for name, array in arrays().items():
+                assert found.get(name, array).shape == array.shape
+
+
+@pytest.mark.parametrize("name", ["rotations.npy", "part.states.npy"])
+@pytest.mark.parametrize("how", ["gone", "empty", "another", "folder"])
+def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str, how: str) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays())
+    file = tmp_path / "arms" / name
+    file.unlink()
+    if how == "empty":
+        file.write_bytes(b"")
+    elif how == "another":
+        np.save(file, np.zeros((6, 3, 4)))
+    elif how == "folder":
+        file.mkdir()
+    with pytest.raises(FormatError, match=name):
+        store.load(tmp_path / "arms")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"format": "motionmind-corpus", "version": 2}', "version 2; .* version 1 can be read"),
+        ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
+        ("{}", "is None version None"),
+        ("[]", "cannot be read as a corpus's manifest"),
+        ('{"format": ', "cannot be read as a corpus's manifest"),
+        ("", "cannot be read as a corpus's manifest"),
+        ("\udcff", "cannot be read as a corpus's manifest"),
+        ("[" * 100_000, "cannot be read as a corpus's manifest"),
+        ('{"format": "motionmind-built-corpus", "version": 1}', "does not say which arrays there are"),
+        ('{"format": "motionmind-built-corpus", "version": 1, "arrays": [1]}', "does not say which arrays there are"),
+    ],
+)
+def test_a_manifest_that_is_none_is_a_format_error(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "manifest.json").write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(FormatError, match=words):
+        store.load(tmp_path)
+
+
+SOURCE: dict[str, Any] = {
+    "format": store.FORMAT,
+    "version": store.VERSION,
+    "name": "arms",
+    "title": "Arms",
+    "author": "us",
+    "source": "here",
+    "licence": "CC0-1.0",
+    "facing": "stage",
+    "rate": None,
+    "discretization": {"kind": "codebook"},
+    "clips": [{"name": "a", "file": "a.json", "about": ""}],
+}
+
+
+def test_what_a_persons_manifest_lacks_is_named() -> None:
+    path = Path("arms/manifest.json")
+    assert parse_manifest(SOURCE, SourceManifest, path).clips[0].file == "a.json"
+    for key in SOURCE.keys() - {"format", "version"}:
+        short = {name: value for name, value in SOURCE.items() if name != key}
+        with pytest.raises(FormatError, match=f"^arms/manifest.json: there is no key `{key}`"):
+            parse_manifest(short, SourceManifest, path)
+    for key in ("name", "file", "about"):
+        clip = {name: value for name, value in SOURCE["clips"][0].items() if name != key}
+        with pytest.raises(FormatError, match=rf"there is no key `{key}` - at `\$.clips\[0\]`"):
+            parse_manifest(SOURCE | {"clips": [clip]}, SourceManifest, path)
+
+
+@pytest.mark.parametrize(("key", "value"), [("facing", "north"), ("rate", "5"), ("clips", {}), ("discretization", "x")])
+def test_what_is_wrong_in_a_persons_manifest_is_named(key: str, value: object) -> None:
+    with pytest.raises(FormatError, match=rf"at `\$.{key}`"):
+        parse_manifest(SOURCE | {key: value}, SourceManifest, Path("manifest.json"))
+
+
+# --- names and places -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["cmu-05", "mine", "Übung_2", "v1.2", "a" * 64])
+def test_a_name_is_a_place(tmp_path: Path, name: str) -> None:
+    assert store.place_for(name, tmp_path) == tmp_path / "corpora" / name
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "../x", "a/b", "/etc", ".x", "-x", "a b", "a\0b", "a\n", "a" * 300])
+def test_a_name_that_is_none_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(CorpusError, match="cannot be a corpus's name"):
+        store.place_for(name, tmp_path)
+
+
+def test_a_bundled_corpus_keeps_its_name(tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="'ballet' is the name of a bundled corpus"):
+        store.place_for("ballet", tmp_path)
+
+
+def test_corpora_are_found_by_name_and_by_folder(tmp_path: Path) -> None:
+    store.save(tmp_path / "corpora" / "arms", MANIFEST, arrays())
+    assert store.locate("arms", tmp_path) == tmp_path / "corpora" / "arms"
+    assert store.locate(str(tmp_path / "corpora" / "arms")) == tmp_path / "corpora" / "arms"
+    assert list(store.known(tmp_path))[:2] == ["arms", "ballet"]
+    assert store.locate("ballet", tmp_path).parent.name == "corpora"
+
+
+@pytest.mark.parametrize("name", ["", "nobody", "a" * 5000, "a\0b", "../corpora"])
+def test_an_unknown_corpus_is_answered_with_the_known_ones(tmp_path: Path, name: str) -> None:
+    with pytest.raises(CorpusError, match="there are ballet"):
+        store.locate(name, tmp_path)
+
+
+def test_home_is_what_is_asked_for_then_the_environments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MOTIONMIND_HOME", str(tmp_path / "environment"))
+    assert store.home(tmp_path) == tmp_path
+    assert store.home() == tmp_path / "environment"
+    monkeypatch.delenv("MOTIONMIND_HOME")
+    assert store.home().name == "motionmind"
+
+
+def test_a_fingerprint_tells_files_apart(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.write_bytes(b"ab")
+    two.write_bytes(b"c")
+    before = store.fingerprint([one, two])
+    assert store.fingerprint([one, two]) == before
+    two.write_bytes(b"d")
+    assert store.fingerprint([one, two]) != before
+    with pytest.raises(FormatError, match="three"):
+        store.fingerprint([tmp_path / "three"])

@@ -1,0 +1,145 @@
+"""Blender opens what is written: every joint of every body is where it was, in each frame of the clip.
+
+`pip install ".[blender]"` brings Blender as a module, bpy; BLENDER_PYTHON may name another Python that has it. It is a
+whole program, so it runs in a process of its own, once for all files.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bundled_clips import ballet_clip
+
+from motionmind._typing import Floats
+from motionmind.body.human import human23, human44
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.formats import read_motion, write_motion
+from motionmind.formats.npz import smpl_bodies
+from motionmind.geometry import rotations as rot
+from motionmind.notation.compose import motions
+from motionmind.notation.read import read_score
+
+PYTHON = os.environ.get("BLENDER_PYTHON") or (importlib.util.find_spec("bpy") and sys.executable)
+RATE = 24  # frames a second of the scene; BVH's frames are counted, and do not depend on it
+
+BLENDER = """
+import json, sys
+import bpy
+
+def places(armature, frames):
+    matrix, found = armature.matrix_world, []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        bpy.context.view_layer.update()
+        found.append({bone.name: list(matrix @ bone.head) for bone in armature.pose.bones})
+    return found
+
+found = {}
+for file, frames in json.loads(sys.argv[1]):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = RATE
+    if file.endswith(".bvh"):
+        bpy.ops.import_anim.bvh(filepath=file, global_scale=0.01, axis_forward="-Z", axis_up="Y", frame_start=1)
+    else:
+        bpy.ops.import_scene.gltf(filepath=file)
+    (armature,) = [thing for thing in bpy.data.objects if thing.type == "ARMATURE"]
+    bones, matrix = armature.data.bones, armature.matrix_world
+    found[file] = {
+        "name": armature.name,
+        "parents": {bone.name: bone.parent.name if bone.parent else "" for bone in bones},
+        "rest": {bone.name: list(matrix @ bone.head_local) for bone in bones},
+        "places": places(armature, frames),
+        "skinned": [thing.name for thing in bpy.data.objects for one in thing.modifiers if one.type == "ARMATURE"],
+    }
+print("\\n" + json.dumps(found))
+""".replace("RATE", str(RATE))
+
+
+def wandering(skeleton: Skeleton, frames: int, seed: int = 0) -> Motion:
+    """Random postures at random places."""
+    rng = np.random.default_rng(seed)
+    rotations = rot.normalise(rng.normal(size=(frames, len(skeleton), 4)))
+    return Motion(skeleton, rotations, rng.normal(size=(frames, 3)), np.arange(frames) / RATE, name=skeleton.name)
+
+
+def odd() -> Skeleton:
+    """Names with blanks and dots; a joint in its parent's place; leaves without a far end; bones of a millimetre."""
+    names = ("the root", "arm.L", "arm.R", "hand of.L", "hand of.R", "wing")
+    offsets = np.array([[0, 0, 0], [0.1, 0, 0], [-0.1, 0, 0], [0.001, 0, 0], [0, 0, 0], [0, 0, 0]], dtype=float)
+    return Skeleton("odd", names, (-1, 0, 0, 1, 2, 0), offsets)
+
+
+def clips() -> dict[str, Motion]:
+    """Movement of several bodies, 24 frames a second from 0 on."""
+    insects = read_score(Path(__file__).parents[2] / "corpora" / "walk-hexapod" / "insect.score")
+    found = {
+        "human23": wandering(human23(), 12),
+        "human44": wandering(human44(), 12),
+        "SMPL+H": wandering(smpl_bodies()["SMPL+H"], 5),
+        "odd": wandering(odd(), 12),
+        "hexapod": motions(insects, insects.clips[:1])[0].resample(RATE),
+        "posture": wandering(human23(), 1),
+        "ballet": ballet_clip("adagio").resample(RATE),
+    }
+    recording = Path(__file__).parents[2].parent / "shared" / "data" / "cmu-05" / "05_02.bvh"
+    if recording.exists():
+        found["CMU"] = read_motion(recording).resample(RATE)
+    return found
+
+
+CLIPS = clips() if PYTHON else {}
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What Blender makes of each file, by the file's name."""
+    folder = tmp_path_factory.mktemp("blender")
+    jobs = []
+    for name, motion in CLIPS.items():
+        for suffix in ("bvh", "glb"):
+            file = folder / f"{name}.{suffix}"
+            write_motion(file, motion)
+            start = 1 if suffix == "bvh" else 0  # Blender counts the frames of BVH from 1, glTF has seconds from 0
+            jobs.append((str(file), [start + frame for frame in range(len(motion))]))
+    ran = subprocess.run([str(PYTHON), "-c", BLENDER, json.dumps(jobs)], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    return {Path(file).name: shown for file, shown in json.loads(ran.stdout.splitlines()[-1]).items()}
+
+
+def y_up(points: list[list[float]]) -> Floats:
+    """From Blender's world, whose z is up."""
+    return np.array(points) @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+def in_blender(names: tuple[str, ...], suffix: str) -> list[str]:
+    """What Blender calls joints: its importer of BVH joins words."""
+    return [name.replace(" ", "_") if suffix == "bvh" else name for name in names]
+
+
+@pytest.mark.skipif(not PYTHON, reason="Blender's module bpy is not here (pip install bpy, or set BLENDER_PYTHON)")
+@pytest.mark.parametrize("suffix", ["bvh", "glb"])
+@pytest.mark.parametrize("name", CLIPS or ["none"])
+def test_every_joint_is_where_it_was_in_every_frame(name: str, suffix: str, seen: dict[str, Any]) -> None:
+    motion, found = CLIPS[name], seen[f"{name}.{suffix}"]
+    skeleton, names = motion.skeleton, in_blender(motion.skeleton.names, suffix)
+    above = ("" if parent < 0 else names[parent] for parent in skeleton.parents)
+    assert found["parents"] == dict(zip(names, above, strict=True))
+    here = skeleton.positions(motion.rotations, motion.root)
+    there = y_up([[place[joint] for joint in names] for place in found["places"]])
+    assert len(here) == 1 or np.ptp(here, axis=0).max() > 0.01
+    np.testing.assert_allclose(there, here, atol=1e-4)
+    rest = y_up([found["rest"][joint] for joint in names])
+    arms = rest[1:] - rest[list(skeleton.parents[1:])]
+    np.testing.assert_allclose(arms, skeleton.offsets[1:], atol=1e-5)
+    if suffix == "glb":
+        assert found["name"] == skeleton.name
+        assert found["skinned"] == [f"{skeleton.name} body"]

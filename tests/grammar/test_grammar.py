@@ -1,0 +1,480 @@
+"""Laws of what is learned from a corpus, and of the costs that the search reads from it, on small random corpora.
+
+Everything is computed a second time here, by counting in dictionaries and by asking the network's own CPDs.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise, product
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.geometry import rotations as rot
+from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, find_bridges
+from motionmind.grammar.coordination import PSEUDO_COUNT, compile_network, fit_network
+from motionmind.grammar.grammar import Grammar, learn
+from motionmind.grammar.transitions import Transitions, Weights, count_transitions
+from motionmind.search.problem import Model, Rules
+from motionmind.search.solve import solve
+from motionmind.tween.problem import price
+
+TURNS = 8  # steps of the facing's circle
+PARENTS = {2: (-1, 0), 3: (-1, 0, 0), 4: (-1, 0, 1, 1)}
+
+
+@dataclass(frozen=True, eq=False)
+class Corpus:
+    """Clips of states; the last lane is the facing."""
+
+    names: tuple[str, ...]
+    parents: Ints
+    sizes: Ints
+    centres: Floats
+    states: Int32s
+    begins: Ints
+    seconds: Floats
+
+    @property
+    def joints(self) -> int:
+        return len(self.names) - 1
+
+    def learned(self) -> Grammar:
+        return learn(self.names, self.parents, self.centres, self.states, self.sizes, self.begins, self.seconds)
+
+    def moves(self, lane: int) -> list[tuple[int, int]]:
+        return [(int(self.states[p, lane]), int(self.states[p + 1, lane])) for p in self.begins]
+
+    def slice(self, lane: int) -> slice:
+        first = int(self.sizes[:lane].sum())
+        return slice(first, first + int(self.sizes[lane]))
+
+
+@cache
+def corpus(seed: int) -> Corpus:
+    rng = np.random.default_rng(seed)
+    joints = 2 + seed % 3
+    lengths = [1, *rng.integers(2, 12, size=4)]  # a clip of one posture has no move
+    lanes = []
+    for _ in range(joints):
+        walk = rng.integers(0, rng.integers(1, 5), size=sum(lengths))
+        lanes.append(np.unique(walk, return_inverse=True)[1])  # every state of a joint occurs
+    lanes.append(rng.integers(0, TURNS, size=sum(lengths)))
+    ends = np.cumsum(lengths) - 1
+    begins = np.setdiff1d(np.arange(sum(lengths)), ends)
+    sizes = np.array([*(lane.max() + 1 for lane in lanes[:-1]), TURNS])
+    centres = [rot.normalise(rng.normal(size=(size, 4))) for size in sizes[:-1]]
+    centres.append(rot.about_vertical(np.arange(TURNS) * 2.0 * np.pi / TURNS))
+    return Corpus(
+        (*(f"joint{j}" for j in range(joints)), "facing"),
+        np.array([*PARENTS[joints], -1]),
+        sizes,
+        np.concatenate(centres),
+        np.stack(lanes, axis=1).astype(np.int32),
+        begins,
+        rng.uniform(0.1, 0.5, size=len(begins)),
+    )
+
+
+@cache
+def grammar(seed: int) -> Grammar:
+    return corpus(seed).learned()
+
+
+@pytest.fixture(params=range(6))
+def seed(request: pytest.FixtureRequest) -> int:
+    return request.param
+
+
+# --- transitions -----------------------------------------------------------------------------------------------------
+
+
+def test_transitions_are_counted_within_clips_and_never_across(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    for lane in range(body.joints):
+        assert edges(graph, lane) == {move: float(count) for move, count in Counter(body.moves(lane)).items()}
+    across = [p for p in range(len(body.states) - 1) if p not in set(body.begins)]
+    assert len(across) == 4
+    assert graph.counts[: graph.indptr[body.slice(body.joints).start]].sum() == body.joints * len(body.begins)
+
+
+def test_a_turn_counts_alike_wherever_it_starts(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    turned = Counter((after - before) % TURNS for before, after in body.moves(body.joints))
+    expected = {(s, (s + turn) % TURNS): float(n) for s in range(TURNS) for turn, n in turned.items()}
+    assert edges(graph, body.joints) == expected
+
+
+@pytest.mark.parametrize("scheme", ["conditional", "printed"])
+def test_the_weight_of_a_turn_depends_on_the_turn_alone(seed: int, scheme: Weights) -> None:
+    graph, facing = grammar(seed).transitions, corpus(seed).joints
+    by_turn = defaultdict(set)
+    for (before, after), weight in edges(graph, facing, graph.weights(scheme)).items():
+        by_turn[(after - before) % TURNS].add(round(weight, 12))
+    assert all(len(weights) == 1 for weights in by_turn.values())
+
+
+def test_a_transition_is_attested_by_the_first_move_that_makes_it_and_lasts_their_mean(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    for lane in range(len(body.names)):
+        made = defaultdict(list)
+        for (before, after), begin, seconds in zip(body.moves(lane), body.begins, body.seconds, strict=True):
+            key = (after - before) % TURNS if lane == body.joints else (before, after)
+            made[key].append((begin, seconds))
+        for (before, after), k in edges(graph, lane, np.arange(len(graph.targets))).items():
+            key = (after - before) % TURNS if lane == body.joints else (before, after)
+            assert graph.attests[int(k)] == made[key][0][0]
+            assert graph.seconds[int(k)] == pytest.approx(np.mean([seconds for _, seconds in made[key]]))
+
+
+def test_an_edge_is_found_by_its_ends_and_only_where_it_is_attested(seed: int) -> None:
+    graph = grammar(seed).transitions
+    for lane, size in enumerate(graph.sizes()):
+        attested = edges(graph, lane, np.arange(len(graph.targets)))
+        for before, after in product(range(size), repeat=2):
+            assert graph.edge(lane, before, after) == attested.get((before, after), -1)
+
+
+def test_all_edges_of_a_path_are_those_that_are_found_one_by_one(seed: int) -> None:
+    graph = grammar(seed).transitions
+    path = np.random.default_rng(seed).integers(graph.sizes(), size=(40, len(graph.sizes()))).astype(np.int32)
+    expected = [
+        [graph.edge(lane, *pair) for lane, pair in enumerate(zip(*rows, strict=True))] for rows in pairwise(path)
+    ]
+    np.testing.assert_array_equal(graph.edges(path), expected)
+
+
+def test_conditional_weights_are_minus_log_p_and_each_row_sums_to_one(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    weights = graph.weights("conditional")
+    left = np.add.reduceat(np.exp(-weights), graph.indptr[:-1][np.diff(graph.indptr) > 0])
+    np.testing.assert_allclose(left, 1.0, atol=1e-12)
+    for lane in range(body.joints):
+        moves = Counter(body.moves(lane))
+        leaving = Counter(before for before, _ in body.moves(lane))
+        for (before, after), weight in edges(graph, lane, weights).items():
+            assert weight == pytest.approx(-np.log(moves[before, after] / leaving[before]), abs=1e-12)
+
+
+def test_printed_weights_are_what_the_papers_print(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    for lane in range(body.joints):
+        moves, visits = Counter(body.moves(lane)), Counter(body.states[:, lane].tolist())
+        postures, total = len(body.states), len(body.begins)
+        for (i, j), weight in edges(graph, lane, graph.weights("printed")).items():
+            f_i, f_j, f_ij = visits[i] / postures, visits[j] / postures, moves[i, j] / total
+            assert weight == pytest.approx(-np.log(f_i) + np.log(f_j) - np.log(f_ij), abs=1e-12)
+
+
+def test_postures_without_moves_teach_no_transitions() -> None:
+    none = np.zeros(0, np.int64)
+    graph = count_transitions(np.array([[0, 3]], np.int32), np.array([1, TURNS]), none, np.zeros(0), pooled=1)
+    assert len(graph.targets) == len(graph.weights("conditional")) == len(graph.weights("printed")) == 0
+    assert graph.indptr.tolist() == [0] * (TURNS + 2)
+
+
+# --- bridges ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_bridge_is_never_attested_and_never_leads_nowhere(seed: int) -> None:
+    learned = grammar(seed)
+    for lane in range(len(learned.lanes)):
+        bridged = set(bridge_edges(learned.transitions, learned.bridges, lane))
+        assert not bridged & set(edges(learned.transitions, lane))
+        assert all(before != after for before, after in bridged)
+
+
+def test_with_bridges_every_state_reaches_every_other(seed: int) -> None:
+    learned = grammar(seed)
+    for lane, size in enumerate(learned.transitions.sizes()):
+        graph = nx.DiGraph(
+            [*edges(learned.transitions, lane), *bridge_edges(learned.transitions, learned.bridges, lane)]
+        )
+        graph.add_nodes_from(range(size))
+        assert nx.is_strongly_connected(graph)
+
+
+def test_a_bridge_spans_the_angle_between_its_ends(seed: int) -> None:
+    body, learned = corpus(seed), grammar(seed)
+    for lane in range(len(learned.lanes)):
+        centres = body.centres[body.slice(lane)]
+        for (before, after), degrees in bridge_edges(learned.transitions, learned.bridges, lane).items():
+            turned = rot.mul(rot.inv(centres[before]), centres[after])
+            angle = 2.0 * np.arctan2(np.linalg.norm(turned[:3]), abs(turned[3]))
+            assert degrees == pytest.approx(np.degrees(angle), abs=1e-5)
+            row = int(learned.transitions.starts[lane]) + before
+            assert learned.bridges.span(row, after) == degrees
+
+
+def test_unless_attested_bridges_run_both_ways_along_a_shortest_tree_and_else_to_near_neighbours() -> None:
+    for size in (1, 2, 3, 12):
+        centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
+        graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
+        bridges = bridge_edges(graph, find_bridges(centres, graph), 0)
+        angles = np.degrees(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
+        complete = nx.Graph((i, j, {"weight": angles[i, j]}) for i in range(size) for j in range(i))
+        tree = set(nx.minimum_spanning_tree(complete).edges)
+        tree |= {(j, i) for i, j in tree}
+        assert tree <= set(bridges)
+        for before, after in set(bridges) - tree:
+            assert angles[before, after] <= WITHIN
+            assert np.sum(angles[before] < angles[before, after]) <= NEAREST  # itself among them
+
+
+def test_states_that_coincide_are_bridged_too() -> None:
+    centres = np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))
+    graph = count_transitions(np.zeros((1, 1), np.int32), np.array([5]), np.zeros(0, np.int64), np.zeros(0))
+    bridges = bridge_edges(graph, find_bridges(centres, graph), 0)
+    assert nx.is_strongly_connected(nx.DiGraph(list(bridges)))
+    assert all(degrees == pytest.approx(0.0, abs=1e-5) for degrees in bridges.values())
+
+
+# --- coordination ----------------------------------------------------------------------------------------------------
+
+
+def test_the_network_is_the_corpus_counted_with_a_prior_spread_as_the_marginal(seed: int) -> None:
+    body = corpus(seed)
+    for lane, cpd in cpds(body).items():
+        parent = int(body.parents[lane])
+        marginal = Counter(body.states[:, lane].tolist())
+        if parent < 0:
+            expected = [[marginal[c] / len(body.states)] for c in range(body.sizes[lane])]
+        else:
+            pairs = Counter(zip(body.states[:, lane].tolist(), body.states[:, parent].tolist(), strict=True))
+            above = Counter(body.states[:, parent].tolist())
+            expected = [
+                [
+                    (pairs[c, p] + PSEUDO_COUNT * marginal[c] / len(body.states)) / (above[p] + PSEUDO_COUNT)
+                    for p in range(body.sizes[parent])
+                ]
+                for c in range(body.sizes[lane])
+            ]
+        np.testing.assert_allclose(cpd, expected, atol=1e-12)
+
+
+def test_compiled_coordination_equals_the_network_entry_by_entry(seed: int) -> None:
+    body, learned = corpus(seed), grammar(seed)
+    for lane, cpd in cpds(body).items():
+        if body.parents[lane] >= 0:
+            table = learned.coordination.table(lane, learned.transitions.starts)
+            np.testing.assert_allclose(table, -np.log(cpd.T), rtol=0.0, atol=1e-12)
+            np.testing.assert_allclose(np.exp(-table).sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_the_facing_coordinates_with_nothing(seed: int) -> None:
+    net, facing = grammar(seed).coordination, corpus(seed).joints
+    assert net.parents[facing] == -1
+    assert net.pair_starts[facing] == net.pair_starts[facing + 1]
+
+
+def test_a_network_over_other_parents_is_refused() -> None:
+    body = corpus(1)
+    other = np.array([-1, 0, 1])
+    network = fit_network(body.names[:3], other, body.states[:, :3], body.sizes[:3])
+    with pytest.raises(ValueError, match="joint2"):
+        compile_network(network, body.names[:3], np.array([-1, 0, 0]), body.states[:, :3], body.sizes[:3])
+
+
+# --- what the search reads -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bridge_price", [None, 0.3])
+@pytest.mark.parametrize("scheme", ["conditional", "printed"])
+def test_moves_cost_their_weight_and_bridges_their_degrees(
+    seed: int, scheme: Weights, bridge_price: float | None
+) -> None:
+    learned = grammar(seed)
+    model = price(learned, scheme, 1.0, bridge_price)
+    for lane in range(len(learned.lanes)):
+        expected = edges(learned.transitions, lane, learned.transitions.weights(scheme))
+        if bridge_price is not None:
+            bridges = bridge_edges(learned.transitions, learned.bridges, lane)
+            expected |= {ends: bridge_price * degrees for ends, degrees in bridges.items()}
+        assert model_edges(model, lane) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.0])
+def test_standing_somewhere_costs_lambda_times_minus_log_p(seed: int, factor: float) -> None:
+    body = corpus(seed)
+    model = price(grammar(seed), "conditional", factor, None)
+    tables = coupling_tables(body)
+    for posture in product(*map(range, body.sizes[: body.joints])):
+        expected = factor * sum(table[posture[body.parents[j]], posture[j]] for j, table in tables.items())
+        assert model_standing(model, (*posture, 0)) == pytest.approx(expected, abs=1e-9)
+    for j, table in tables.items():
+        alone = model.alone[body.slice(j)]
+        np.testing.assert_allclose(alone, factor * table.min(axis=0), atol=1e-12)
+
+
+def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> None:
+    model = price(grammar(seed), "conditional", 1.0, 1.0)
+    for pointer, listed in ((model.indptr, model.targets), (model.pair_ptr, model.pair_states)):
+        for first, last in pairwise(pointer):
+            assert np.all(np.diff(listed[first:last]) > 0)
+    assert np.all(model.pair_costs <= 0.0)
+
+
+@pytest.mark.parametrize("bridge_price", [None, 0.1])
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("scheme", ["conditional", "printed"])
+def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
+    seed: int, scheme: Weights, factor: float, bridge_price: float | None
+) -> None:
+    body, learned = corpus(seed), grammar(seed)
+    rng = np.random.default_rng(seed)
+    start, goal = (rng.integers(body.sizes) for _ in range(2))
+    optima = brute_force(body, learned.bridges, scheme, factor, bridge_price, start, goal, wait=0.7, moves=4)
+    found = solve(price(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000))
+    least = min(optima[moves] + 0.4 * moves for moves in range(1, 5))
+    if found is None:
+        assert least == np.inf
+    else:
+        assert found.status == "optimal"
+        assert found.cost == pytest.approx(least, abs=2e-6)
+        if bridge_price is None:
+            for before, after in zip(found.path[:-1], found.path[1:], strict=True):
+                for lane, (s, t) in enumerate(zip(before, after, strict=True)):
+                    assert learned.transitions.edge(lane, s, t) >= 0 or s == t == goal[lane]
+
+
+def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
+    code = (
+        "import sys, numpy as np; sys.path.insert(0, sys.argv[1])\n"
+        "from test_grammar import corpus, grammar, price, solve, Rules\n"
+        "for seed in range(3):\n"
+        "    body = corpus(seed)\n"
+        "    for budget in (5, 100_000):\n"
+        "        a, b = body.states[[0, -1]].astype(np.int64)\n"
+        "        found = solve(price(grammar(seed), 'conditional', 1.0, 0.1), a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
+        "        print(repr(found.cost), repr(found.lower_bound), found.path.tobytes().hex(), found.expansions)\n"
+    )
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", code, str(Path(__file__).parent)],
+            env={**os.environ, "PYTHONHASHSEED": hash_seed},
+            stdout=subprocess.PIPE,
+        )
+        for hash_seed in ("1", "2")
+    ]
+    one, other = (process.communicate()[0] for process in processes)
+    assert all(process.returncode == 0 for process in processes)
+    assert one == other
+    assert one.count(b"\n") == 6
+
+
+# --- helpers ---------------------------------------------------------------------------------------------------------
+
+
+def edges(graph: Transitions, lane: int, values: Floats | None = None) -> dict[tuple[int, int], float]:
+    """Attested transitions of a lane with their counts, or other values."""
+    return listed(graph.starts, graph.indptr, graph.targets, graph.counts if values is None else values, lane)
+
+
+def bridge_edges(graph: Transitions, bridges: Bridges, lane: int) -> dict[tuple[int, int], float]:
+    return listed(graph.starts, bridges.indptr, bridges.targets, bridges.degrees, lane)
+
+
+def model_edges(model: Model, lane: int) -> dict[tuple[int, int], float]:
+    return listed(model.starts, model.indptr, model.targets, model.costs, lane)
+
+
+def listed(
+    starts: Ints,
+    indptr: Ints,
+    targets: Int32s,
+    values: Floats,
+    lane: int,
+) -> dict[tuple[int, int], float]:
+    found = {}
+    for row in range(starts[lane], starts[lane + 1]):
+        for k in range(indptr[row], indptr[row + 1]):
+            found[row - int(starts[lane]), int(targets[k])] = float(values[k])
+    return found
+
+
+def model_standing(model: Model, posture: tuple[int, ...]) -> float:
+    """What a model charges for a posture, moves apart."""
+    total = 0.0
+    for lane, parent in enumerate(model.parents):
+        total += model.unary[model.starts[lane] + posture[lane]]
+        if parent >= 0:
+            row = model.pair_starts[lane] + posture[parent]
+            for q in range(model.pair_ptr[row], model.pair_ptr[row + 1]):
+                total += model.pair_costs[q] if model.pair_states[q] == posture[lane] else 0.0
+    return float(total)
+
+
+@cache
+def cpds(body: Corpus) -> dict[int, Floats]:
+    """P(state | state of the parent) of each joint [S, states of the parent], from the network."""
+    joints = body.joints
+    network = fit_network(body.names[:joints], body.parents[:joints], body.states[:, :joints], body.sizes[:joints])
+    assert network.check_model()
+    return {j: network.get_cpds(body.names[j]).get_values() for j in range(joints)}
+
+
+def coupling_tables(body: Corpus) -> dict[int, Floats]:
+    """-log P [states of the parent, S] of each joint that has a parent."""
+    return {j: -np.log(cpd.T) for j, cpd in cpds(body).items() if body.parents[j] >= 0}
+
+
+def brute_force(
+    body: Corpus,
+    bridges: Bridges,
+    scheme: Weights,
+    factor: float,
+    bridge_price: float | None,
+    start: Ints,
+    goal: Ints,
+    wait: float,
+    moves: int,
+) -> list[float]:
+    """Least cost of 0 .. `moves` moves over all joint states, without tau; from counts and CPDs.
+
+    The facing is coupled to nothing, so it is left out of the joint states and added as a chain of its own.
+    """
+    tables = []
+    for lane in range(len(body.names)):
+        pooled = lane == body.joints
+        counts = np.zeros((body.sizes[lane],) * 2)
+        for before, after in body.moves(lane):
+            for turn in range(TURNS) if pooled else [0]:
+                counts[(before + turn) % body.sizes[lane], (after + turn) % body.sizes[lane]] += 1
+        visits = np.full(TURNS, 1.0) if pooled else np.bincount(body.states[:, lane], minlength=body.sizes[lane])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if scheme == "conditional":
+                table = -np.log(counts / counts.sum(axis=1, keepdims=True))
+            else:
+                visited = visits / visits.sum()
+                table = -np.log(visited)[:, None] + np.log(visited)[None, :] - np.log(counts / counts.sum())
+        table[counts == 0] = np.inf
+        if bridge_price is not None:
+            row = body.slice(lane).start
+            for s in range(body.sizes[lane]):
+                for k in range(bridges.indptr[row + s], bridges.indptr[row + s + 1]):
+                    table[s, bridges.targets[k]] = bridge_price * bridges.degrees[k]
+        table[goal[lane], goal[lane]] = min(table[goal[lane], goal[lane]], wait)
+        tables.append(table)
+
+    joint = np.array(list(product(*map(range, body.sizes[:-1]))))
+    move = sum(tables[j][joint[:, j][:, None], joint[:, j][None, :]] for j in range(body.joints))
+    stand = np.zeros(len(joint))
+    for j, table in coupling_tables(body).items():
+        stand += factor * table[joint[:, body.parents[j]], joint[:, j]]
+    value = np.where((joint == start[:-1]).all(axis=1), 0.0, np.inf)
+    facing = np.where(np.arange(TURNS) == start[-1], 0.0, np.inf)
+    optima = []
+    for _ in range(moves + 1):
+        optima.append(float(value[(joint == goal[:-1]).all(axis=1)][0] + facing[goal[-1]]))
+        value = (value[:, None] + move).min(axis=0) + stand
+        facing = (facing[:, None] + tables[-1]).min(axis=0)
+    return optima

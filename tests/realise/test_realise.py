@@ -1,0 +1,556 @@
+"""From a path of states to movement: splines, durations, the root, ways, detail, and the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from motionmind._typing import Floats, Int32s
+from motionmind.body.anatomy_file import body
+from motionmind.body.human import human23
+from motionmind.body.limbs import parts_of
+from motionmind.body.limits import find_loose, within_limits
+from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Corpus, Facing
+from motionmind.corpus.gather import gather
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.grammar.transitions import Transitions, count_transitions
+from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
+from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
+from motionmind.realise.realise import _headings, realise
+from motionmind.realise.root import carry, lowest, stand
+from motionmind.realise.timeline import durations
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, likely, mean_rotations
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+# --- splines ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 9])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+def test_a_natural_spline_is_scipys(count: int, shape: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(count)
+    times = np.cumsum(rng.uniform(0.1, 2.0, count))
+    values = rng.normal(size=(count, *shape))
+    at = np.sort(np.concatenate([times, rng.uniform(times[0], times[-1], 50)]))
+    expected = CubicSpline(times, values, bc_type="natural")(at)
+    np.testing.assert_allclose(natural_spline(times, values, at), expected, atol=1e-12)
+
+
+def test_a_spline_through_one_knot_stays_there() -> None:
+    np.testing.assert_array_equal(natural_spline(np.zeros(1), np.ones((1, 3)), np.arange(4.0)), np.ones((4, 3)))
+    key = rot.about_vertical(0.3)[None]
+    np.testing.assert_array_equal(rotation_spline(np.zeros(1), key, np.arange(4.0)), np.tile(key, (4, 1)))
+
+
+def test_splines_of_many_knots_are_made_in_pieces_that_fit() -> None:
+    times, keys = wander(150, 40.0, seed=1)
+    at = np.linspace(0.0, times[-1], 800)
+    np.testing.assert_allclose(
+        natural_spline(times, times[:, None] ** 2 + keys[:, 0], at),
+        CubicSpline(times, times[:, None] ** 2 + keys[:, 0], bc_type="natural")(at),
+        atol=1e-5,
+    )
+    spans = rot.about_vertical(np.cumsum(np.radians(30.0 + 20.0 * keys[:, 0, 0])))
+    expected = CubicSpline(times, np.unwrap(rot.heading(spans)), bc_type="natural")(at)
+    assert rot.angle(rotation_spline(times, spans, at), rot.about_vertical(expected)).max() < 1e-6
+
+
+def wander(count: int, degrees: float, seed: int, lanes: int = 5) -> tuple[Floats, Floats]:
+    """Times [K] and rotations [K, lanes, 4] that turn by at most so many degrees from one to the next."""
+    rng = np.random.default_rng(seed)
+    keys = [rot.normalise(rng.normal(size=(lanes, 4)))]
+    for _ in range(count - 1):
+        axis = rng.normal(size=(lanes, 3))
+        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        keys.append(rot.mul(keys[-1], rot.from_axis_angle(axis, np.radians(degrees) * rng.uniform(0.2, 1.0, lanes))))
+    return np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.3, count - 1))]), np.array(keys)
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(3, 20.0), (6, 90.0), (12, 170.0), (30, 45.0)])
+def test_a_rotation_spline_meets_its_keys_whatever_their_signs(count: int, degrees: float) -> None:
+    times, keys = wander(count, degrees, seed=count)
+    assert rot.angle(rotation_spline(times, keys, times), keys).max() < 1e-12
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (*keys.shape[:2], 1))
+    at = np.linspace(0.0, times[-1], 100)
+    assert rot.angle(rotation_spline(times, signs * keys, at), rotation_spline(times, keys, at)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(3, 60.0), (7, 40.0), (9, 100.0)])
+def test_a_rotation_spline_has_a_continuous_angular_velocity_and_acceleration(count: int, degrees: float) -> None:
+    times, keys = wander(count, degrees, seed=count + 1)
+    h = 1e-4
+    # Angular velocities at half steps h before and after each inner key, then their differences.
+    steps = np.arange(-3, 4) * h
+    at = (times[1:-1, None] + steps).ravel()
+    curve = rotation_spline(times, keys, at).reshape(count - 2, len(steps), -1, 4)
+    velocity = rot.log(rot.mul_inv(curve[:, 1:], curve[:, :-1])) / h
+    acceleration = np.diff(velocity, axis=1) / h
+    speed, bend = np.abs(velocity).max(), np.abs(acceleration).max()
+    assert np.abs(velocity[:, 3] - velocity[:, 2]).max() < 2.0 * bend * h + 1e-9 * speed
+    across = np.abs(acceleration[:, 3] - acceleration[:, 1]).max()  # one is before the key, one after it
+    assert across < 0.02 * bend
+
+
+def test_keys_about_one_axis_give_the_spline_of_their_angle_through_any_number_of_turns() -> None:
+    rng = np.random.default_rng(3)
+    axis = np.array([0.48, 0.6, 0.64])
+    at = np.linspace(0.0, 1.0, 200)
+    for count, most in ((3, 100.0), (8, 170.0), (20, 120.0), (30, 60.0)):
+        times = np.linspace(0.0, 1.0, count)
+        angles = np.cumsum(np.radians(rng.uniform(-0.2 * most, most, count)))
+        keys = rot.from_axis_angle(axis, angles)
+        expected = rot.from_axis_angle(axis, natural_spline(times, angles, at))
+        assert rot.angle(rotation_spline(times, keys, at), expected).max() < 1e-9
+    # Exactly a turn and two away from where it began.
+    turns = np.radians(120.0) * np.arange(7)
+    expected = rot.about_vertical(np.radians(720.0) * at)
+    found = rotation_spline(np.linspace(0.0, 1.0, 7), rot.about_vertical(turns), at)
+    assert rot.angle(found, expected).max() < 1e-9
+
+
+def test_two_keys_give_slerp() -> None:
+    times, keys = wander(2, 175.0, seed=5)
+    shares = np.linspace(0.0, 1.0, 30)
+    expected = rot.slerp(keys[:1], keys[1:], shares[:, None])
+    assert rot.angle(rotation_spline(times, keys, shares * times[-1]), expected).max() < 1e-12
+
+
+@pytest.mark.parametrize("tilt", [0.0, 5.0, 15.0, 30.0])
+@pytest.mark.parametrize("step", [40.0, 60.0, 90.0, 120.0])
+def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: float) -> None:
+    tilts = rot.exp(np.radians(tilt) * np.random.default_rng(1).uniform(-1.0, 1.0, (16, 3)))
+    keys = rot.mul(rot.about_vertical(np.radians(step) * np.arange(16)), tilts)
+    times = np.arange(16) * 0.2
+    at = np.linspace(0.0, times[-1], 15 * 60 + 1)
+    curve = rotation_spline(times, keys, at)
+    fastest_between_keys = rot.angle(keys[1:], keys[:-1]).max() / 0.2
+    assert rot.angle(curve[1:], curve[:-1]).max() / (at[1] - at[0]) < 1.5 * fastest_between_keys
+
+
+# --- durations and the root -------------------------------------------------------------------------------------------
+
+
+def graph(states: Int32s, seconds: list[float]) -> Transitions:
+    """The transitions of one clip whose postures are in `states` [N, L]."""
+    return count_transitions(
+        states.astype(np.int32), states.max(axis=0) + 1, np.arange(len(states) - 1), np.array(seconds)
+    )
+
+
+def test_moves_take_the_time_that_moving_lanes_took() -> None:
+    clip = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [0, 0, 0]])
+    transitions = graph(clip, [0.1, 0.2, 5.0, 0.4])
+    path = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [1, 1, 0]], dtype=np.int32)
+    usual = np.median(transitions.seconds)
+    # A hold is timed by holds only where nothing moves; a bridge has no time of its own.
+    np.testing.assert_allclose(durations(path, transitions), [0.1, 0.2, np.median([5.0, 5.0, 5.7 / 4.0]), usual])
+
+
+def test_bodies_stand_as_high_as_they_are_told() -> None:
+    rng = np.random.default_rng(0)
+    q, root = rot.normalise(rng.normal(size=(20, 23, 4))), rng.normal(size=(20, 3))
+    heights = rng.uniform(0.0, 0.5, 20)
+    placed = stand(human23(), q, root, heights)
+    np.testing.assert_allclose(lowest(human23(), q, placed), heights, atol=1e-12)
+    np.testing.assert_array_equal(placed[:, [0, 2]], root[:, [0, 2]])
+
+
+def test_a_foot_that_stands_carries_the_body() -> None:
+    """A body that sways over its feet: from the postures alone the root's way is found again."""
+    stander, rest = human23(), np.tile(rot.IDENTITY, (30, 23, 1))
+    sway = rot.from_axis_angle([1.0, 0.0, 0.0], 0.2 * np.sin(np.arange(30) / 5.0))
+    rest[:, [stander.index("left_hip"), stander.index("right_hip")]] = sway[:, None]
+    rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
+    feet = [stander.index("left_toes"), stander.index("right_toes")]
+    seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
+    root = carry(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1])
+    np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
+    assert np.ptp(seen[:, 2]) > 0.1
+
+
+def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
+    """A body that is drawn along, one leg swinging so that its foot stays: only that foot stands."""
+    drawn, t = human23(), np.arange(9) * 0.2
+    q = np.tile(rot.IDENTITY, (9, 23, 1))
+    root = np.stack([0.0 * t, 0.9 + 0.0 * t, 0.6 * t], axis=1)
+    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    np.testing.assert_allclose(stands, 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    hip, toes = drawn.index("left_hip"), drawn.index("left_toes")
+    offset = drawn.positions(q[0], np.zeros(3))[toes]
+    # Turned about x until the tip of its toes, the lowest point of the leg, is where it was.
+    reach = offset + drawn.tips[toes] - drawn.offsets[hip]
+    angle = np.arcsin((reach[2] - root[:, 2] + root[4, 2]) / np.hypot(*reach[1:])) - np.arctan2(reach[2], -reach[1])
+    q[:, hip] = rot.from_axis_angle([1.0, 0.0, 0.0], -angle)
+    stands = learn_carriage(gather("drawn", [Motion(drawn, q, root, t, "drawn")])).stands
+    assert stands[9 + 2 : 9 + 6, 0].min() > 0.95
+    np.testing.assert_allclose(stands[:, 1:], 1.0 / (1.0 + (0.6 / SLIDES) ** 2), atol=1e-9)
+    np.testing.assert_allclose(stands[1:8], 0.5 * (stands[9:16] + stands[10:17]), atol=1e-12)
+
+
+def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
+    motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
+    a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
+    flown = carry(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b)
+    missing = b - drift.sum(axis=0)
+    np.testing.assert_allclose(np.diff(flown, axis=0), drift + missing / 11.0, atol=1e-9)
+    np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
+
+
+# --- ways -------------------------------------------------------------------------------------------------------------
+
+
+def test_each_joint_is_in_one_part_of_each_size() -> None:
+    names = human23().names
+    whole, carrying, carried, *limbs = ([names[j] for j in part] for part in parts_of(human23()))
+    for parts in ([whole], [carrying, carried], limbs):
+        assert sorted(name for part in parts for name in part) == sorted(names)
+    assert limbs[0] == ["pelvis", "lumbar", "thorax"]
+    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in limbs
+    assert carrying == ["pelvis", *limbs[1], *limbs[2]]
+    hand = Skeleton("hand", ("wrist", "thumb", "finger"), (-1, 0, 0), np.zeros((3, 3)))
+    assert [part.tolist() for part in parts_of(hand)] == [[0, 1, 2], [0, 1, 2], [0], [1], [2]]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count, steps = 4, 3
+    begins, ends = np.array([0, 1, 2, 2]), np.array([1, 2, 3, 0])
+    shares = np.array([1.0, 1.0, 0.3, 0.7])
+    kinds = np.array([0, 1, 0, 1], dtype=np.int32)
+    near = rng.uniform(0.1, 1.0, (steps + 1, count))
+    go = np.zeros((count, count))
+    go[begins, ends] = shares
+    alike = (kinds[:, None] == kinds) / 2.0
+    move = go @ (
+        STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * np.full((count, count), 0.25)
+    )
+    expected = np.zeros((steps + 1, count))
+    for walked in product(range(count), repeat=steps + 1):
+        weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
+        expected[np.arange(steps + 1), walked] += weight
+    expected /= expected.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(likely(begins, ends, shares, kinds, near), expected, atol=1e-12)
+
+
+def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
+    rng = np.random.default_rng(0)
+    angles = np.radians([10.0, 30.0])
+    q = rot.about_vertical(angles)[:, None] * rng.choice([-1.0, 1.0], (2, 1, 1))
+    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.tile(rot.IDENTITY, (2, 1, 1)))
+    np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
+
+
+def test_joints_are_brought_to_their_limits_and_no_further() -> None:
+    anatomy = body("human23")
+    q = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (3, 1, 1))
+    bent = anatomy.rotations({"left_knee": np.array([[170.0, 0.0, 0.0]]), "right_hip": np.array([[0.0, 100.0, 0.0]])})
+    q[1] = bent[0]
+    tight = np.zeros(23, dtype=np.bool_)
+    limited = anatomy.degrees(within_limits(human23(), q, q[[0, 2]], tight))[1]
+    assert limited[human23().index("left_knee"), 0] == pytest.approx(150.0)
+    assert limited[human23().index("right_hip"), 1] == pytest.approx(80.0)
+    np.testing.assert_array_equal(within_limits(human23(), q, q[[0, 2]], tight)[[0, 2]], q[[0, 2]])
+    loose = np.arange(23) == human23().index("left_knee")
+    spared = within_limits(human23(), q, q[[0, 2]], loose)
+    np.testing.assert_array_equal(spared[:, loose], q[:, loose])
+    assert anatomy.degrees(spared)[1, human23().index("right_hip"), 1] == pytest.approx(80.0)
+    q[2] = q[1]  # what is given is not changed, nor what goes no further
+    np.testing.assert_array_equal(within_limits(human23(), q, q[1:], tight), q)
+
+
+def test_joints_that_a_corpus_itself_has_beyond_their_limits_are_loose() -> None:
+    anatomy, knee = body("human23"), human23().index("left_knee")
+    straight = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (200, 1, 1))
+    for degrees, count, loose in ((154.0, 200, False), (156.0, 2, False), (156.0, 3, True), (170.0, 200, True)):
+        q = straight.copy()
+        q[:count, knee] = anatomy.rotations({"left_knee": np.array([[degrees, 0.0, 0.0]])})[0, knee]
+        assert find_loose(human23(), q).tolist() == [joint == knee and loose for joint in range(23)]
+
+
+# --- detail -----------------------------------------------------------------------------------------------------------
+
+
+def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
+    """A body at 30 frames a second that also trembles, faster than 5 postures a second tell."""
+    slow = walk(int(seconds * 5.0) + 1, seed=seed)
+    times = np.arange(int(seconds * 30.0) + 1) / 30.0
+    tremble = (
+        0.05 * np.sin(2.0 * np.pi * 6.0 * times)[:, None] * np.random.default_rng(seed).normal(size=(23, 3))[:, None]
+    )
+    rotations = rot.mul(rotation_spline(slow.times, slow.rotations, times), rot.exp(np.swapaxes(tremble, 0, 1)))
+    return Motion(slow.skeleton, rotations, natural_spline(slow.times, slow.root, times), times, "trembling")
+
+
+def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
+    corpus = gather("walks", [walk(5), walk(4, seed=1)], reverse=1.0)
+    moves, poses = corpus.moves, walk(4, seed=2)
+    lanes = corpus.to_lanes(poses.rotations)
+    shown = corpus.to_lanes(corpus.rotations)
+    far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in lanes])
+
+    def cost(sequence: tuple[int, ...]) -> float:
+        near = sum(far[t, moves.begins[m]] + far[t + 1, moves.ends[m]] for t, m in enumerate(sequence))
+        return float(near) + 2.0 * GOES_OVER**2 * sum(not straight(*pair) for pair in pairwise(sequence))
+
+    def straight(m: int, n: int) -> bool:
+        return bool(moves.ends[m] == moves.begins[n] and moves.begins[m] != moves.ends[n])
+
+    found = likest_moves(moves, shown[:, :23], lanes[:, :23])
+    assert cost(tuple(found)) == pytest.approx(min(map(cost, product(range(len(moves.begins)), repeat=3))), abs=1e-9)
+
+
+def test_a_movement_of_the_corpus_has_its_own_detail_again() -> None:
+    clip = recorded()
+    corpus = gather("trembling", [clip], rate=5.0)
+    rows = np.arange(6, 25)
+    lanes = corpus.to_lanes(corpus.rotations)[:, :23]
+    moves = likest_moves(corpus.moves, lanes, lanes[rows])
+    np.testing.assert_array_equal(corpus.begins[moves], rows[:-1])
+    times = np.arange(6 * len(rows) - 5) / 30.0
+    spline = rotation_spline(corpus.times, corpus.rotations, times + corpus.times[6])
+    again = rot.mul(spline, rot.exp(detail_of(corpus, moves)))
+    assert rot.angle(again, clip.rotations[36 : 36 + len(times)]).max() < 2e-4  # as fine as half a float
+
+
+def test_detail_is_backwards_in_moves_that_are() -> None:
+    corpus = gather("trembling", [recorded(2.0)], rate=5.0, reverse=0.0)
+    forward = np.arange(len(corpus) - 1)
+    backward = forward[::-1] + len(forward)
+    np.testing.assert_array_equal(detail_of(corpus, backward), detail_of(corpus, forward)[::-1])
+
+
+def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
+    clip = recorded()
+    known = learned(clip, rate=5.0)
+    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
+    a, b = clip.posture(12), clip.posture(96)
+    rows = list(range(2, 17))
+    found, plain = (realised(one, rows, a, b) for one in (known, smooth))
+    carried = parts_of(human23())[2]  # legs also do what feet need
+    apart = rot.angle(found.rotations, plain.rotations)[:, carried]
+    assert apart[::6].max() < 1e-6
+    assert np.median(apart[3::6]) > 0.01
+
+
+# --- the whole --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Learned:
+    """As much of an engine's grammar as realisation reads; the only state of each lane is what a posture shows."""
+
+    corpus: Corpus
+    states: Int32s
+    transitions: Transitions
+    centres: Floats
+    carriage: Carriage
+
+
+def walk(frames: int = 40, sink: float = 0.0, seed: int = 0) -> Motion:
+    """A body that walks in a curve, each joint on a course of its own, its lowest point on the floor."""
+    rng = np.random.default_rng(seed)
+    body, t = human23(), np.arange(frames) * 0.2
+    phase, size = rng.uniform(0.0, 6.0, (23, 3)), rng.uniform(0.0, 0.35, (23, 3))
+    q = rot.exp(size * np.sin(1.3 * t[:, None, None] + phase))
+    q[:, 0] = rot.mul(rot.about_vertical(0.3 * t), q[:, 0])
+    root = np.stack([np.sin(t), 0.0 * t, np.cos(t)], axis=1)
+    return Motion(body, q, stand(body, q, root, np.full(frames, -sink)), t, "walk")
+
+
+def learned(motion: Motion, facing: Facing = "free", rate: float | None = None) -> Learned:
+    corpus = gather("walks", [motion], facing=facing, rate=rate)
+    states = np.repeat(np.arange(len(corpus), dtype=np.int32)[:, None], 23, axis=1)
+    sizes = [len(corpus)] * 23
+    ring = rot.about_vertical(np.arange(24) * np.pi / 12.0)
+    centres = list(np.swapaxes(corpus.to_lanes(corpus.rotations)[:, :23], 0, 1))
+    if facing == "free":
+        steps = np.round(rot.heading(corpus.rotations[:, 0]) / (np.pi / 12.0)).astype(np.int32) % 24
+        states, sizes, centres = np.concatenate([states, steps[:, None]], axis=1), [*sizes, 24], [*centres, ring]
+    pooled = 23 if facing == "free" else None
+    transitions = count_transitions(states, np.array(sizes), corpus.begins, corpus.seconds, pooled=pooled)
+    return Learned(corpus, states, transitions, np.concatenate(centres), learn_carriage(corpus))
+
+
+def realised(
+    known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0, within: Floats | None = None
+) -> Motion:
+    """The motion along postures `rows` of the corpus."""
+    motion, _ = realise(
+        known.states[rows], a, b, known.corpus, known, known.carriage, fps, within=within  # type: ignore[arg-type]
+    )  # fmt: skip
+    return motion
+
+
+@pytest.fixture(scope="module", params=["free", "stage"])
+def walking(request: pytest.FixtureRequest) -> Learned:
+    return learned(walk(), request.param)
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0, 24.0, 7.0])
+@pytest.mark.parametrize("rows", [[3, 4], [3, 4, 5, 6, 7], [3, 4, 5, 5, 6, 20, 21]])
+def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, rows: list[int], fps: float) -> None:
+    motion = walk()
+    a, b = motion.posture(rows[0]), motion.posture(rows[-1])
+    a = replace(a, rotations=-a.rotations, root=a.root + np.array([7.0, 0.0, 3.0]))
+    found = realised(walking, rows, a, b, fps)
+    np.testing.assert_array_equal(found.rotations[[0, -1]], [a.rotations, b.rotations])
+    np.testing.assert_array_equal(found.root[[0, -1]], [a.root, b.root])
+    np.testing.assert_allclose(np.diff(found.times), 1.0 / fps, rtol=1e-9)
+    assert found.times[0] == 0.0
+    (planned,) = found.insertions
+    assert len(planned.times) == len(rows)
+    assert (planned.times[0], planned.times[-1]) == (0.0, found.times[-1])
+    assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
+
+
+def test_a_path_that_is_followed_is_in_its_states_at_each_move(walking: Learned) -> None:
+    motion, rows = walk(), [5, 6, 7, 20, 21, 30, 8, 9]
+    for within in (1e-6, np.radians(5.0)):
+        found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, np.full(23, within))
+        at = found.at(found.insertions[0].times)
+        lanes = [walking.corpus.to_lanes(q)[:, :23] for q in (at.rotations, motion.rotations[rows])]
+        # Between two frames the spline is not the arc that `at` takes; a frame is 1 / 60 s.
+        assert rot.angle(*lanes).max() < within + 0.02
+    assert rot.angle(*lanes).max() > 0.02
+
+
+def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
+    """The mean way lies near what was done between the same postures, and much nearer than the straight way."""
+    motion = walk()
+    rows = list(range(5, 17))
+    found = realised(walking, rows, motion.posture(5), motion.posture(16), fps=5.0)
+    share = np.linspace(0.0, 1.0, len(rows))[:, None]
+    straight = rot.slerp(motion.rotations[5], motion.rotations[16], share)
+    off, straight_off = (
+        rot.angle(*(walking.corpus.to_lanes(x)[:, :23] for x in (q, motion.rotations[rows]))).mean()
+        for q in (found.rotations, straight)
+    )
+    assert off < 0.5 * straight_off
+
+
+def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned) -> None:
+    motion = walk()
+    for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
+        found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
+        assert lowest(human23(), found.rotations, found.root).min() > -1e-3
+
+
+def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
+    """Both ends are 30 cm higher than the corpus knows bodies to be."""
+    motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
+    a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
+    found = realised(walking, rows, a, b)
+    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), 0.3, atol=0.01)
+
+
+def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
+    sunk = walk(sink=0.11)
+    found = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
+    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), -0.11, atol=1e-9)
+    up = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
+    heights = lowest(human23(), up.rotations, up.root)
+    assert np.all(np.diff(heights) > -1e-9)
+    assert np.diff(heights).max() < 0.01
+
+
+def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
+    jumping = walk(sink=0.4)
+    root = jumping.root.copy()
+    root[10:13, 1] += 0.25
+    known = learned(replace(jumping, root=root))
+    grounded, rows = walk(), list(range(5, 18))
+    found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, np.full(23, 1e-6))
+    heights = lowest(human23(), found.rotations, found.root)
+    assert heights.argmax() in (5, 6, 7)
+    assert 0.1 < heights.max() <= 0.25 + 1e-9
+    assert heights[[0, 1, 2, -3, -2, -1]].max() < 0.03
+
+
+def test_no_frame_jumps(walking: Learned) -> None:
+    motion = walk()
+    rows = [3, 4, 5, 6, 7, 8, 9, 10]
+    found = realised(walking, rows, motion.posture(3), motion.posture(10), fps=60.0)
+    keys = motion.rotations[rows]
+    fastest = rot.angle(keys[1:], keys[:-1]).max(axis=0) / 0.2
+    speed = rot.angle(found.rotations[1:], found.rotations[:-1]).max(axis=0) * 60.0
+    # Legs are quicker than the corpus's where its feet slide and these step.
+    leg = np.isin(np.arange(23), parts_of(human23())[1][1:])
+    assert np.all(speed < np.where(leg, 5.0, 2.0) * fastest + 1e-6)
+    assert np.linalg.norm(np.diff(found.root, axis=0), axis=1).max() * 60.0 < 2.0 * 1.2
+    turned = np.diff(found.rotations * np.sign(np.sum(found.rotations * found.rotations[:1], -1, keepdims=True)), 2, 0)
+    assert np.abs(turned).max() < 0.01
+
+
+def test_the_motion_is_on_the_body_of_a_even_where_b_was_on_shorter_legs() -> None:
+    known, motion = learned(walk()), walk()
+    a, b = motion.posture(3), motion.posture(6)
+    small = Skeleton("small", a.skeleton.names, a.skeleton.parents, 0.7 * a.skeleton.offsets, 0.7 * a.skeleton.tips)
+    root = stand(small, b.rotations[None], b.root[None], np.zeros(1))[0]
+    found = realised(known, [3, 4, 5, 6], a, Posture(small, b.rotations, root))
+    assert found.skeleton is a.skeleton
+    np.testing.assert_array_equal(found.root[-1], root)
+    assert np.abs(np.diff(found.root[:, 1])).max() < 0.1  # lower by 0.35 in the last of three moves
+
+
+def test_no_moves_are_one_frame(walking: Learned) -> None:
+    a = walk().posture(3)
+    found = realised(walking, [3], a, a)
+    assert (len(found), found.name, found.insertions[0].times.tolist()) == (1, "tween", [0.0])
+    np.testing.assert_array_equal(found.rotations[0], a.rotations)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
+    """From north to 170 degrees off, by the short way or all the way round the other."""
+    known = learned(walk())
+    motion = walk()
+    goal = np.radians(170.0)
+    ends = [replace(motion.posture(row), rotations=motion.rotations[row].copy()) for row in (3, 9)]
+    turned = []
+    for end, heading in zip(ends, (0.0, goal), strict=True):
+        q = end.rotations.copy()
+        q[0] = rot.mul(rot.about_vertical(heading - rot.heading(q[0])), q[0])
+        turned.append(replace(end, rotations=q))
+    whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
+    path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
+    path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
+    found, _ = realise(
+        path, *turned, known.corpus, known, known.carriage, 60.0, within=np.full(23, 0.3)  # type: ignore[arg-type]
+    )  # fmt: skip
+    headings = np.unwrap(rot.heading(found.rotations[:, 0]))
+    assert headings[-1] - headings[0] == pytest.approx(goal if way > 0 else goal - 2.0 * np.pi, abs=1e-9)
+    assert np.all(way * np.diff(headings) > -1e-3)
+
+
+@pytest.mark.parametrize("seconds", [np.full(8, 0.2), np.array([0.2, 0.4, 0.1, 0.3, 0.3, 0.2, 0.5, 0.2])])
+def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Floats) -> None:
+    known = learned(walk())
+    keys = np.concatenate([[0.0], np.cumsum(seconds)])
+    for speed in (-200.0, -17.0, 0.0, 5.0, 40.0, 170.0):
+        turn = np.radians(356.0 + speed * keys)
+        path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
+        a, b = rot.about_vertical(turn[[0, -1]])
+        found = _headings(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
+        np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
+
+
+def test_headings_stay_in_their_states() -> None:
+    known, rng = learned(walk()), np.random.default_rng(0)
+    for _ in range(20):
+        path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
+        a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
+        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
+        off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
+        assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
+        assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9
+        assert np.abs(np.diff(found)).max() <= 4.0 * np.pi / 12.0 + 1e-9

@@ -1,0 +1,497 @@
+"""The page that plays a motion, opened from disk in a browser: what is seen, and what its buttons and keys do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bundled_clips import ballet_clip
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+
+from motionmind._typing import Bools, Floats, Indices, Int16s
+from motionmind.body.human import human23, human44
+from motionmind.body.motion import Insertion, Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
+from motionmind.notation.compose import motions
+from motionmind.notation.read import read_score
+from motionmind.render.anatomy import body_of
+from motionmind.render.figure import BRIDGED, COLOURS, INSERTED
+from motionmind.render.page import packed, page, write_page
+
+CORPORA = Path(__file__).parents[2] / "corpora"
+SIZE = {"width": 640, "height": 480}
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_motion(skeleton: Skeleton, frames: int, seed: int = 0) -> Motion:
+    """Joints turned anywhere, at uneven times."""
+    rng = np.random.default_rng(seed)
+    rotations = rot.normalise(rng.normal(size=(frames, len(skeleton), 4)))
+    times = np.cumsum(rng.uniform(0.1, 0.3, frames))
+    return Motion(skeleton, rotations, rng.uniform(-1.0, 1.0, (frames, 3)), times, "random")
+
+
+def still(frames: int, insertions: tuple[Insertion, ...] = (), name: str = "still") -> Motion:
+    """human23 at rest, standing on the floor for `frames` frames, ten a second."""
+    rotations = np.tile(rot.IDENTITY, (frames, 23, 1))
+    root = np.tile([0.0, 0.97, 0.0], (frames, 1))
+    return Motion(human23(), rotations, root, np.arange(frames) / 10.0, name, insertions)
+
+
+def hexapod() -> Motion:
+    score = read_score(CORPORA / "walk-hexapod" / "insect.score")
+    return motions(score, score.clips[:1])[0]
+
+
+def bridged() -> Motion:
+    """Standing: two frames, an insertion of four moves up to frame 8, in the third of which an elbow is bridged."""
+    insertion = Insertion(np.array([0.1, 0.2, 0.4, 0.6, 0.8]), (("left_elbow", 2),))
+    return still(12, (insertion,))
+
+
+@dataclass
+class Opened:
+    """A page in the browser, and what it did that no page should."""
+
+    page: Any
+    said: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+    def get(self, script: str) -> Any:
+        return self.page.evaluate(script)
+
+    def wait(self, script: str) -> None:
+        """Wait until this is so. The page forbids itself what Playwright's own waiting does."""
+        for _ in range(500):
+            if self.get(f"!!({script})"):
+                return
+            self.page.wait_for_timeout(20)
+        raise AssertionError(f"never so: {script}")
+
+    def press(self, key: str) -> None:
+        self.page.keyboard.press(key)
+
+    def click(self, button: str) -> None:
+        self.page.click(f"#{button}")
+
+    def picture(self) -> Int16s:
+        """The canvas's pixels [H, W, 3], when the picture is that of now."""
+        self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        shot = self.page.locator("#canvas").screenshot(style="header, #views { visibility: hidden }")
+        return np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
+
+    @property
+    def time(self) -> float:
+        return float(self.get("motionmind.player.time"))
+
+
+@pytest.fixture
+def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
+    """A function that opens a motion's page; afterwards, that it neither complained nor asked for anything."""
+    opened: list[Opened] = []
+
+    def show(motion: Motion, ready: str = "window.motionmind", script: str = "", **options: Any) -> Opened:
+        path = tmp_path / f"{len(opened)}.html"
+        write_page(path, motion)
+        context = browser.new_context(**({"viewport": SIZE, "reduced_motion": "reduce"} | options))
+        tab = Opened(context.new_page())
+        tab.page.on("console", lambda message: tab.said.append(message.text))
+        tab.page.on("pageerror", lambda error: tab.said.append(str(error)))
+        tab.page.on("request", lambda request: tab.asked.append(request.url))
+        tab.page.add_init_script(script)
+        tab.page.goto(path.as_uri())
+        tab.wait(ready)
+        opened.append(tab)
+        return tab
+
+    yield show
+    for tab in opened:
+        tab.page.context.close()
+        assert [line for line in tab.said if not re.search("GPU stall|WebGL context could not", line)] == []
+        assert [url for url in tab.asked if not url.startswith(("data:", "file:"))] == []
+        assert len([url for url in tab.asked if url.startswith("file:")]) == 1
+
+
+def near(picture: Int16s, colour: tuple[int, int, int], most: float = 0.06) -> Bools:
+    """Pixels [H, W] of a colour, whatever its brightness and haze: whose hue, as shares of the channels, is like it."""
+    pale = picture - picture.min(axis=-1, keepdims=True)
+    wanted = np.array(colour) - min(colour)
+    strong = pale.sum(axis=-1) > 0.45 * wanted.sum()
+    shares = pale / np.maximum(pale.sum(axis=-1, keepdims=True), 1)
+    return np.asarray(strong & (np.abs(shares - wanted / wanted.sum()).max(axis=-1) < most))
+
+
+def middle(mask: Bools) -> Floats:
+    """Mean x, y of what a mask holds."""
+    return np.asarray(np.argwhere(mask)[:, ::-1].mean(axis=0))
+
+
+# --- without a browser ------------------------------------------------------------------------------------------------
+
+
+@given(arrays(np.float64, (5, 4), elements=st.floats(-1.0, 1.0)))
+def test_packed_quaternions_are_the_same_rotations(numbers: Floats) -> None:
+    rotations = rot.normalise(numbers + np.where(np.linalg.norm(numbers, axis=-1) < 0.1, 1.0, 0.0)[:, None])
+    words = packed(rotations)
+    largest = (words >> np.uint64(60)).astype(int)
+    levels = np.stack([(words >> np.uint64(shift)) & np.uint64(0xFFFFF) for shift in (40, 20, 0)], axis=-1)
+    others = (levels.astype(float) / (2**19 - 1) - 1.0) / np.sqrt(2.0)
+    found = np.array(
+        [np.insert(three, at, np.sqrt(1.0 - three @ three)) for three, at in zip(others, largest, strict=True)]
+    )
+    assert rot.angle(found, rotations).max() < 1e-5
+
+
+def test_a_long_piece_is_less_than_four_megabytes() -> None:
+    for skeleton in (human23(), human44()):
+        assert len(page(random_motion(skeleton, 5000)).encode()) < 4_000_000
+
+
+def test_what_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(MotionMindError, match=r"no/page\.html: cannot be written"):
+        write_page(tmp_path / "no" / "page.html", still(2))
+
+
+# --- what is computed -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("skeleton", [human23(), human44(), hexapod().skeleton], ids=lambda skeleton: skeleton.name)
+def test_solids_are_where_python_puts_them(show: Callable[..., Opened], skeleton: Skeleton) -> None:
+    motion = random_motion(skeleton, 4)
+    tab = show(motion)
+    cones, balls = body_of(skeleton).solids(motion.rotations, motion.root)
+    joints = skeleton.positions(motion.rotations, motion.root)
+    for frame in range(len(motion)):
+        found = tab.get(f"motionmind.solids({frame})")
+        ends = np.reshape(found["cones"], (-1, 2, 4))
+        wanted = np.stack([cones.a[frame], cones.b[frame]], axis=1)
+        radii = np.stack([cones.a_radius, cones.b_radius], axis=1)
+        np.testing.assert_allclose(ends, np.concatenate([wanted, radii[..., None]], axis=-1), atol=1e-4)
+        found_balls = np.reshape(found["balls"], (-1, 4, 3))
+        np.testing.assert_allclose(found_balls[:, 0], balls.centre[frame], atol=1e-4)
+        np.testing.assert_allclose(found_balls[:, 1:], np.swapaxes(balls.axes[frame], -1, -2), atol=1e-4)
+        np.testing.assert_allclose(np.reshape(found["joints"], (-1, 3)), joints[frame], atol=1e-4)
+
+
+def test_between_frames_rotations_are_slerped_and_the_root_is_linear(show: Callable[..., Opened]) -> None:
+    motion = random_motion(human23(), 3)
+    tab = show(motion)
+    for share in (0.0, 0.3, 0.9):
+        time = (1.0 - share) * motion.times[1] + share * motion.times[2]
+        rotations, root = tab.get(
+            "(() => { const q = Array(92), p = Array(3); motionmind.body.motion.sample("
+            + repr(float(time))
+            + ", q, p); "
+            "return [q, p] })()"
+        )
+        wanted = rot.slerp(motion.rotations[1], motion.rotations[2], share)
+        assert rot.angle(rot.normalise(np.reshape(rotations, (-1, 4))), wanted).max() < 1e-4
+        np.testing.assert_allclose(root, (1.0 - share) * motion.root[1] + share * motion.root[2], atol=1e-5)
+
+
+def test_what_is_inserted_and_bridged_is_what_the_motion_says(show: Callable[..., Opened]) -> None:
+    motion = bridged()
+    tab = show(motion)
+    inserted = tab.get("[...motionmind.body.motion.times].map(time => motionmind.body.motion.insertedAt(time))")
+    joints = tab.get("[...motionmind.body.motion.times].map(time => motionmind.body.motion.bridgedAt(time))")
+    assert inserted == motion.inserted().tolist()
+    assert joints == [np.flatnonzero(row).tolist() for row in motion.bridged()]
+
+
+# --- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def test_left_is_warm_and_on_the_right_of_the_front_view(show: Callable[..., Opened]) -> None:
+    tab = show(still(2))
+    tab.click("front")
+    picture = tab.picture()
+    warm, cool = near(picture, COLOURS["left"]), near(picture, COLOURS["right"])
+    assert warm.sum() > 500
+    assert cool.sum() > 500
+    assert middle(warm)[0] > SIZE["width"] / 2 + 10
+    assert abs(middle(warm)[0] + middle(cool)[0] - SIZE["width"]) < 4  # a symmetric posture looks symmetric
+    assert abs(warm.sum() - cool.sum()) < 0.1 * warm.sum()
+
+
+def test_cameras_look_from_where_they_say(show: Callable[..., Opened]) -> None:
+    tab = show(still(2))
+    extents = {}
+    for view in ("front", "side", "top", "quarter"):
+        tab.click(view)
+        assert tab.get(f"document.getElementById('{view}').ariaPressed") == "true"
+        picture = tab.picture()
+        body = picture.min(axis=-1) < 200  # darker than floor and paper
+        rows, columns = np.flatnonzero(body.any(axis=1)), np.flatnonzero(body.any(axis=0))
+        assert rows[0] > 0
+        assert columns[0] > 0
+        assert columns[-1] < SIZE["width"] - 1
+        extents[view] = np.ptp(columns) / np.ptp(rows)
+        warm, cool = near(picture, COLOURS["left"]), near(picture, COLOURS["right"])
+        if view == "side":
+            assert cool.sum() > 3 * warm.sum()  # from stage right, where the body's right is
+        else:
+            assert middle(cool)[0] < middle(warm)[0]
+        if view == "top":  # the audience is below, and the kneecaps and toes point there
+            assert middle(near(picture, COLOURS["hair"]))[1] < rows[-1] - 0.5 * np.ptp(rows)
+    assert extents["front"] > 0.9  # a T-pose is about as wide as it is tall
+    assert extents["side"] < 0.4
+    assert extents["top"] > 3.0
+    assert 0.4 < extents["quarter"] < extents["front"]
+
+
+def test_dragging_turns_the_camera_and_reset_brings_it_back(show: Callable[..., Opened]) -> None:
+    tab = show(still(2))
+    before = tab.get("motionmind.stage.camera.position.toArray()")
+    tab.page.mouse.move(300, 200)
+    tab.page.mouse.down()
+    tab.page.mouse.move(380, 230)
+    tab.page.mouse.up()
+    after = tab.get("motionmind.stage.camera.position.toArray()")
+    assert np.linalg.norm(np.subtract(after, before)) > 0.5
+    assert tab.get("document.querySelectorAll('#views [aria-pressed=true]').length") == 0
+    tab.press("r")
+    np.testing.assert_allclose(tab.get("motionmind.stage.camera.position.toArray()"), before, atol=1e-6)
+
+
+def test_inserted_frames_are_violet_and_bridged_joints_emerald(show: Callable[..., Opened]) -> None:
+    tab = show(bridged())
+    tab.click("front")
+    tab.click("ends")  # ghosts off
+    seen = {}
+    for time in (0.0, 0.3, 0.5):
+        tab.get(f"motionmind.player.seek({time})")
+        picture = tab.picture()
+        colours = (INSERTED["middle"], COLOURS["left"], BRIDGED)
+        seen[time] = [int(near(picture, colour).sum()) for colour in colours]
+        words = [tab.page.is_visible("#inserted"), tab.page.is_visible("#bridged")]
+        assert words == [time > 0.0, time == 0.5]
+    (violet, warm, emerald), none, few = zip(seen[0.0], seen[0.3], seen[0.5], strict=True), 20, 500
+    assert violet[0] < none
+    assert violet[1] > few
+    assert warm[0] > few
+    assert warm[1] < none
+    assert emerald[1] < none
+    assert emerald[2] > 1.5 * none
+    assert tab.page.inner_text("#bridged") == "bridged: left_elbow"
+
+
+def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[..., Opened]) -> None:
+    motion = bridged()
+    moving = replace(motion, root=motion.root + np.outer(np.arange(12), [0.25, 0.0, 0.0]))
+    tab = show(moving)
+    tab.click("front")
+    tab.get("motionmind.player.seek(0.4)")
+    pictures = {"both": tab.picture()}
+    tab.press("a")
+    pictures["none"] = tab.picture()
+    tab.press("o")
+    pictures["onion"] = tab.picture()
+    tab.page.select_option("#apart", "1")
+    pictures["narrow"] = tab.picture()
+
+    def changed(name: str) -> Indices:
+        return np.flatnonzero((np.abs(pictures[name] - pictures["none"]).max(axis=-1) > 8).any(axis=0))
+
+    body = np.flatnonzero((pictures["none"].min(axis=-1) < 150).any(axis=0))
+    for name in ("both", "onion", "narrow"):
+        assert changed(name)[0] < body[0]  # ghosts on both sides of the body
+        assert changed(name)[-1] > body[-1]
+    assert np.ptp(changed("narrow")) < np.ptp(changed("onion"))
+    tab.press("o")
+    assert np.array_equal(tab.picture(), pictures["none"])
+
+
+def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., Opened]) -> None:
+    motion = still(3)
+    rising = replace(motion, root=motion.root + np.outer([0.0, 0.1, 1.0], [0.0, 1.0, 0.0]))
+    tab = show(rising)
+    darkness = []
+    for time in (0.0, 0.1, 0.2):
+        tab.get(f"motionmind.player.seek({time}); motionmind.stage.figure.group.visible = false")
+        picture = tab.picture().mean(axis=-1)
+        darkness.append(238.0 - picture.min())
+    assert darkness[0] > darkness[1] + 10 > 10
+    assert darkness[1] > darkness[2] + 10
+
+
+def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> None:
+    tab = show(bridged())
+    shot = tab.page.locator("#timeline canvas").screenshot()
+    picture = np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
+    violet = np.flatnonzero(near(picture, INSERTED["middle"]).any(axis=0)) / picture.shape[1]
+    emerald = np.flatnonzero(near(picture, BRIDGED).any(axis=0)) / picture.shape[1]
+    for found, times in ((violet, (0.1, 0.8)), (emerald, (0.4, 0.6))):
+        np.testing.assert_allclose([found[0], found[-1]], np.array(times) / 1.1, atol=0.01)
+    box = tab.page.locator("#timeline").bounding_box()
+    tab.page.mouse.move(box["x"] + box["width"] * 0.5 / 1.1, box["y"] + 10)
+    assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · bridged: left_elbow"
+
+
+# --- what one can do --------------------------------------------------------------------------------------------------
+
+
+def test_it_plays_by_itself_and_space_pauses(show: Callable[..., Opened]) -> None:
+    tab = show(ballet_clip("adagio"), reduced_motion="no-preference")
+    tab.wait("motionmind.player.time > 0.2")
+    tab.press("Space")
+    paused = tab.time
+    tab.picture()
+    assert tab.time == paused
+    assert tab.get("document.getElementById('play').ariaLabel") == "Play"
+    tab.page.select_option("#speed", "2")
+    assert tab.get("motionmind.player.speed") == 2
+    tab.click("play")
+    tab.wait(f"motionmind.player.time > {paused} + 0.2")
+
+
+def test_who_wants_less_motion_starts_it(show: Callable[..., Opened]) -> None:
+    tab = show(still(20))
+    tab.picture()
+    assert tab.time == 0.0
+    tab.press("Space")
+    tab.wait("motionmind.player.time > 0")
+
+
+def test_keys_step_and_jump(show: Callable[..., Opened]) -> None:
+    tab = show(still(12))
+    for key, frame in (
+        ("ArrowRight", 1),
+        ("ArrowRight", 2),
+        ("ArrowLeft", 1),
+        ("End", 11),
+        ("ArrowRight", 11),
+        ("Home", 0),
+        ("ArrowLeft", 0),
+    ):
+        tab.press(key)
+        assert tab.get("motionmind.player.frame") == frame
+        assert tab.page.inner_text("#frame") == f"frame {frame} of 11"
+    tab.get("motionmind.player.seek(0.25)")
+    tab.press("ArrowLeft")
+    assert tab.time == pytest.approx(0.2)
+    tab.press("2")
+    assert tab.get("motionmind.stage.view") == "side"
+
+
+def test_without_loop_it_ends(show: Callable[..., Opened]) -> None:
+    tab = show(still(4))
+    tab.press("l")
+    tab.press("Space")
+    tab.wait("!motionmind.player.playing")
+    assert tab.time == pytest.approx(0.3)
+    tab.press("l")
+    assert tab.get("(() => { const p = motionmind.player; p.play(); p.advance(0.4); return p.time })()") == (
+        pytest.approx(0.1)
+    )
+
+
+def test_dragging_the_timeline_scrubs(show: Callable[..., Opened]) -> None:
+    tab = show(still(11))
+    box = tab.page.locator("#timeline").bounding_box()
+    y = box["y"] + box["height"] / 2
+    tab.page.mouse.move(box["x"] + 0.2 * box["width"], y)
+    tab.page.mouse.down()
+    assert tab.time == pytest.approx(0.2, abs=0.01)
+    tab.page.mouse.move(box["x"] + 0.7 * box["width"], y - 100)
+    assert tab.time == pytest.approx(0.7, abs=0.01)
+    assert float(tab.get("document.getElementById('timeline').ariaValueNow")) == pytest.approx(0.7, abs=0.01)
+    playhead = tab.page.locator(".playhead").bounding_box()
+    assert playhead["x"] == pytest.approx(box["x"] + 0.7 * box["width"], abs=2)
+    tab.page.mouse.up()
+    tab.page.mouse.move(box["x"], y)
+    assert tab.time == pytest.approx(0.7, abs=0.01)
+
+
+# --- odd ones ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        still(1),
+        still(3, (Insertion(np.array([0.1])),)),
+        hexapod(),
+        Motion(
+            Skeleton("point", ("root",), (-1,), np.zeros((1, 3))), still(2).rotations[:, :1], np.zeros((2, 3)), [0, 1]
+        ),
+        replace(still(2), root=np.tile([0.0, 50.0, 0.0], (2, 1))),
+    ],
+    ids=["one posture", "no moves", "six legs", "a point", "far above the floor"],
+)
+def test_it_shows_odd_motions(show: Callable[..., Opened], motion: Motion) -> None:
+    tab = show(motion)
+    picture = tab.picture()
+    body = picture.min(axis=-1) < 200
+    assert body.sum() > 50
+    assert not body[0].any()
+    assert not body[:, [0, -1]].any()
+    assert tab.page.is_visible("#timeline") == (len(motion) > 1)
+
+
+def test_names_are_only_text(show: Callable[..., Opened]) -> None:
+    name = "</script><script>alert(1)</script> \"quoted\" & 'é' \u2028 $title 舞"
+    skeleton = replace(human23(), names=tuple(f"{joint}<b>&" for joint in human23().names))
+    motion = replace(
+        bridged(), name=name, skeleton=skeleton, insertions=(Insertion(np.array([0.0, 1.1]), (("pelvis<b>&", 0),)),)
+    )
+    tab = show(motion)
+    tab.get("motionmind.player.seek(0.5)")
+    assert tab.get("motionmind.body.motion.name") == name
+    assert tab.get("document.querySelector('h1').textContent") == name
+    assert tab.get("document.getElementById('bridged').innerText") == "bridged: pelvis<b>&"
+    assert tab.get("document.querySelectorAll('b').length") == 0
+
+
+def test_without_webgl_it_says_so(show: Callable[..., Opened]) -> None:
+    tab = show(
+        still(2),
+        ready="!document.getElementById('message').hidden",
+        script="HTMLCanvasElement.prototype.getContext = () => null",
+    )
+    assert "WebGL" in tab.page.inner_text("#message")
+    assert not tab.page.is_visible("#timeline")
+    tab.said.clear()  # three.js says it too
+
+
+def test_it_fits_a_phone(show: Callable[..., Opened]) -> None:
+    tab = show(bridged(), viewport={"width": 360, "height": 640}, device_scale_factor=3, has_touch=True, is_mobile=True)
+    assert tab.get("document.documentElement.scrollWidth") == 360
+    assert tab.get("document.documentElement.scrollHeight") == 640
+    assert tab.get("document.getElementById('canvas').width") == 720  # two pixels to one of CSS are sharp enough
+    tab.page.tap("#top")
+    assert tab.get("motionmind.stage.view") == "top"
+
+
+def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:
+    tab = show(bridged())
+    tab.get("controls = [...document.querySelectorAll('button, select, [role=slider], [role=group]')]")
+    assert tab.get("controls.filter(one => !one.ariaLabel && !one.innerText.trim()).map(one => one.id)") == []
+
+
+def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -> None:
+    motion = bridged()
+    for part, ends in ((motion, 2), (motion.slice(3, 12), 1), (motion.slice(3, 6), 0)):
+        tab = show(part)
+        assert tab.get("motionmind.body.motion.insertions.map(one => motionmind.body.motion.ends(one).length)") == [
+            ends
+        ]
+        assert tab.get("document.getElementById('ends').hidden") == (ends == 0)
+
+
+def test_a_leap_of_one_frame_amid_many_is_seen_whole(show: Callable[..., Opened]) -> None:
+    motion = still(700)
+    root = motion.root.copy()
+    root[433, 1] += 3.0
+    tab = show(replace(motion, root=root))
+    assert tab.get("Math.max(...motionmind.stage.cloud.map(place => place.y))") > 3.5

@@ -1,0 +1,557 @@
+"""Laws of the search, on toy bodies small enough to try every joint state (see toys.py)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from toys import Toy, evaluate, grid_of, noisy_messages, random_toy
+
+from motionmind.search import astar, solve
+from motionmind.search import pair_chains as strips
+from motionmind.search import trws as bound
+from motionmind.search.cfn import cfn
+from motionmind.search.polish import path_cost, polish
+from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.solve import Certificate
+from motionmind.search.trellis import Grid
+
+MOVES = 6
+PROVEN = 2 * solve.PROVEN
+ROUNDING = 1e-9
+ON = np.zeros(1, dtype=bool)  # what would end A* before its time
+KINDS = {
+    "plain": {},
+    "frustrated": {"frustrated": True},
+    "even": {"even": True},
+    "frustrated and even": {"frustrated": True, "even": True},
+    "dear": {"dear": True},
+    "frustrated and dear": {"frustrated": True, "dear": True},
+}
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> dict[str, bool]:
+    return KINDS[request.param]
+
+
+def answer(toy: Toy, rules: Rules) -> Certificate | None:
+    return solve.solve(toy.model(), *toy.ends(), rules)
+
+
+def a_body(**changes: object) -> Toy:
+    """Two coupled lanes of two states, every move attested at 1 nat, all couplings at 0."""
+    toy = Toy(
+        parents=(-1, 0),
+        edges=(np.ones((2, 2)), np.ones((2, 2))),
+        children=(np.zeros(2), np.zeros(2)),
+        above=(np.zeros(0), np.zeros(2)),
+        corrections=(np.zeros((0, 2)), np.zeros((2, 2))),
+        start=(0, 0),
+        goal=(1, 1),
+        wait=1.0,
+        per_move=0.5,
+    )
+    return Toy(**{**vars(toy), **changes})
+
+
+# --- the answer ------------------------------------------------------------------------------------------------------
+
+
+def test_the_cost_at_every_number_of_moves_is_that_of_brute_force(kind: dict[str, bool]) -> None:
+    for seed in range(120):
+        toy = random_toy(seed, **kind)
+        optima = toy.optima(MOVES)
+        for moves in range(MOVES + 1):
+            found = answer(toy, toy.rules(moves, moves))
+            if found is None:
+                assert optima[moves] == np.inf, (seed, moves)
+            else:
+                assert found.status == "optimal", (seed, moves)
+                assert found.cost == pytest.approx(optima[moves], abs=PROVEN), (seed, moves)
+
+
+def test_the_cost_over_all_numbers_of_moves_is_the_least_of_them(kind: dict[str, bool]) -> None:
+    for seed in range(200):
+        toy = random_toy(seed, **kind)
+        least = toy.optima(MOVES)[1:].min()
+        found = answer(toy, toy.rules(1, MOVES))
+        if found is None:
+            assert least == np.inf, seed
+        else:
+            assert found.status == "optimal", seed
+            assert found.cost == pytest.approx(least, abs=PROVEN), seed
+
+
+def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) -> None:
+    for seed in range(100):
+        toy = random_toy(seed, **kind)
+        for node_budget in (1, 20, 100_000):
+            found = answer(toy, toy.rules(1, MOVES, node_budget))
+            if found is not None:
+                assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, node_budget)
+
+
+@pytest.mark.parametrize("pairs", [0, solve.MOST_PAIRS])
+@pytest.mark.parametrize("sweeps", [1, 2])
+def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
+    monkeypatch: pytest.MonkeyPatch, sweeps: int, pairs: int
+) -> None:
+    monkeypatch.setattr(solve, "MOST_PAIRS", pairs)
+    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    monkeypatch.setattr(solve, "SWEEPS_AT_ONCE", sweeps)
+    searched = bounded = 0
+    for seed in range(60):
+        toy = random_toy(seed, frustrated=True)
+        optima = toy.optima(MOVES)
+        for moves in np.flatnonzero(np.isfinite(optima)):
+            for node_budget in (1, 2, 5, 20, 100, 100_000):
+                found = answer(toy, toy.rules(moves, moves, node_budget, sweeps))
+                assert found is not None
+                assert found.lower_bound <= optima[moves] + ROUNDING, (seed, moves, node_budget)
+                assert found.cost >= optima[moves] - ROUNDING, (seed, moves, node_budget)
+                assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, moves, node_budget)
+                assert found.lower_bound <= found.cost
+                assert (found.status == "optimal") == (found.cost - found.lower_bound <= solve.PROVEN)
+                assert found.peak_nodes <= node_budget
+                assert found.expansions <= node_budget
+                searched += found.expansions > 0
+                bounded += found.status == "bounded"
+    assert searched > 0 if pairs else bounded > 0
+
+
+# --- what proves it --------------------------------------------------------------------------------------------------
+
+
+def test_every_pair_of_sweeps_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
+    for seed in range(100):
+        toy = random_toy(seed, **kind)
+        optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
+        if optimum < np.inf:
+            grid = grid_of(toy, MOVES)
+            messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+            proven = [bound.tighten(grid, messages, path, 1, np.inf)[0] for _ in range(8)]
+            assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
+            assert proven[-1] <= optimum + ROUNDING, seed
+
+
+def test_what_lanes_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[str, bool]) -> None:
+    for seed in range(100):
+        toy = random_toy(seed, **kind)
+        start, goal = toy.ends()
+        held = with_waits(toy.model(), goal, toy.wait)
+        alone = costs_to_go(held, goal, MOVES)[:, held.starts[:-1] + start].sum(axis=1)
+        assert np.all(alone + toy.per_move * np.arange(MOVES + 1) <= toy.optima(MOVES) + ROUNDING), seed
+
+
+def test_what_lanes_cost_on_their_own_is_the_optimum_where_nothing_couples_them() -> None:
+    for seed in range(100):
+        toy = random_toy(seed)
+        free = Toy(**{**vars(toy), "parents": (-1,) * len(toy.sizes)})
+        start, goal = free.ends()
+        held = with_waits(free.model(), goal, free.wait)
+        alone = costs_to_go(held, goal, MOVES)[:, held.starts[:-1] + start].sum(axis=1)
+        np.testing.assert_allclose(alone + free.per_move * np.arange(MOVES + 1), free.optima(MOVES), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("noise", [None, 0.5, 5.0])
+def test_f_never_overestimates_along_an_optimal_path_whatever_the_forward_messages_were(noise: float | None) -> None:
+    for seed in range(60):
+        toy = random_toy(seed, frustrated=True)
+        found = answer(toy, toy.rules(MOVES, MOVES))
+        if found is None:
+            continue
+        grid = grid_of(toy, MOVES)
+        messages = bound.no_messages(grid) if noise is None else noisy_messages(grid, seed, noise)
+        if noise is None:
+            bound.tighten(grid, messages, np.zeros((MOVES + 1) * grid.lanes, np.int64), 3, np.inf)
+            f = float(messages.constants.sum())
+        else:
+            f = bound.backward(grid, messages)
+        optimum = found.cost - MOVES * toy.per_move
+        path = positions(grid, found.path)
+        for i in range(grid.lanes, len(path)):
+            edge = edge_between(grid, path[i - grid.lanes], path[i])
+            parent = grid.parents[i % grid.lanes]
+            above = path[i - i % grid.lanes + parent] if parent >= 0 else -1
+            grown = bound.step(grid, messages, i, path[i - grid.lanes], above, edge)
+            assert grown >= -ROUNDING
+            f += grown
+            assert f <= optimum + PROVEN, (seed, i)
+        assert f == pytest.approx(optimum, abs=ROUNDING)
+
+
+def test_two_lanes_are_one_strip_and_its_bound_is_their_optimum(kind: dict[str, bool]) -> None:
+    for seed in range(100):
+        toy = random_toy(seed, most=2, **kind)
+        optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
+        if len(toy.sizes) == 2 and optimum < np.inf:
+            grid = grid_of(toy, MOVES)
+            cut, path = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros((MOVES + 1) * 2, np.int64)
+            assert strips.proven(cut) == pytest.approx(optimum, abs=ROUNDING), seed
+            strips.descend(grid, cut, path)
+            assert path_cost(grid, path) == pytest.approx(optimum, abs=ROUNDING), seed
+
+
+def test_every_sweep_of_strips_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
+    tighter = 0
+    for grid, optimum, seed in bodies(100, kind):
+        messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+        by_messages = bound.tighten(grid, messages, path, 50, np.inf)[0]
+        cut, through = strips.cut(grid, messages), np.zeros(len(grid.dom))
+        proven = [strips.proven(cut), *(strips.sweep(grid, cut, through) for _ in range(8))]
+        assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
+        assert proven[-1] <= optimum + ROUNDING, seed
+        assert proven[-1] == pytest.approx(strips.proven(cut), abs=ROUNDING), seed
+        tighter += proven[-1] > by_messages + 1e-3
+    assert tighter > 3 or not kind.get("frustrated")
+
+
+def test_shares_move_between_strips_but_add_up_to_what_a_path_costs(kind: dict[str, bool]) -> None:
+    for grid, _, seed in bodies(60, kind):
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+        for draw in range(3):
+            path = some_path(grid, seed + draw)
+            assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), (seed, draw)
+            strips.sweep(grid, cut, through)
+
+
+@pytest.mark.parametrize("sweeps", [0, 1, 3])
+def test_by_strips_f_grows_along_every_path_from_the_bound_to_its_cost(sweeps: int) -> None:
+    for grid, _, seed in bodies(60, {"frustrated": True}):
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros(len(grid.dom))
+        for _ in range(sweeps):
+            strips.sweep(grid, cut, through)
+        path = some_path(grid, seed)
+        f, frontier = strips.proven(cut), np.zeros(grid.lanes, np.uint16)
+        for i in range(grid.lanes, len(path)):
+            grown = strips.step(grid, cut, i, frontier, edge_between(grid, path[i - grid.lanes], path[i]))
+            assert grown >= -ROUNDING, (seed, i)
+            f += grown
+            frontier[i % grid.lanes] = path[i] - grid.dom_ptr[i]
+        assert f == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+
+
+def test_what_strips_bound_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+    moves = 4
+    for seed in range(60):
+        toy = random_toy(seed, **kind)
+        if len(toy.sizes) == 1 or not np.isfinite(toy.optima(moves)[moves]):
+            continue
+        grid, joint = grid_of(toy, moves), toy.joint_states()
+        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+        cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
+        for _ in range(3):
+            strips.sweep(grid, cut, through)
+            for i, (first, last) in enumerate(pairwise(grid.dom_ptr)):
+                for p in range(first, last):
+                    here = cheapest[i // grid.lanes, joint[:, i % grid.lanes] == grid.dom[p]].min()
+                    assert through[p] <= here + ROUNDING, (seed, i)
+
+
+@pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
+def test_narrowed_strips_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
+    taken_out = 0
+    for whole, optimum, seed in bodies(100, {"frustrated": True}):
+        grid, cut = whole, strips.cut(whole, bound.no_messages(whole))
+        for _ in range(3):
+            through = np.zeros(len(grid.dom))
+            proven = strips.sweep(grid, cut, through)
+            smaller, cut = strips.narrow(grid, cut, through, optimum + spare)
+            assert strips.proven(cut) >= proven - ROUNDING, seed
+            taken_out += len(grid.dom) - len(smaller.dom)
+            grid = smaller
+        path = some_path(grid, seed)
+        assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        assert cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+    assert taken_out > 0
+
+
+def test_strips_are_left_empty_where_nothing_is_cheap_enough() -> None:
+    for grid, optimum, _ in bodies(20, {"frustrated": True}):
+        cut, through = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom))
+        proven = strips.sweep(grid, cut, through)
+        assert proven <= optimum + ROUNDING
+        smaller, _ = strips.narrow(grid, cut, through, proven - 1.0)
+        assert len(smaller.dom) == 0
+
+
+def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+    moves = 4
+    for seed in range(60):
+        toy = random_toy(seed, **kind)
+        if not np.isfinite(toy.optima(moves)[moves]):
+            continue
+        grid, joint = grid_of(toy, moves), toy.joint_states()
+        messages = bound.no_messages(grid)
+        cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
+        for sweeps in (1, 3):
+            bound.tighten(grid, messages, np.zeros((moves + 1) * grid.lanes, np.int64), sweeps, np.inf)
+            for i, (first, last) in enumerate(pairwise(grid.dom_ptr)):
+                for p in range(first, last):
+                    here = cheapest[i // grid.lanes, joint[:, i % grid.lanes] == grid.dom[p]].min()
+                    assert messages.through[p] <= here + ROUNDING, (seed, i)
+
+
+@pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
+def test_a_narrowed_grid_keeps_every_path_that_is_cheaper(spare: float) -> None:
+    taken_out = 0
+    for seed in range(100):
+        toy = random_toy(seed, frustrated=True)
+        optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
+        if optimum == np.inf:
+            continue
+        grid = grid_of(toy, MOVES)
+        messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+        for _ in range(3):
+            bound.tighten(grid, messages, path, 1, np.inf)
+            smaller, messages = bound.narrow(grid, messages, optimum + spare)
+            taken_out += len(grid.dom) - len(smaller.dom)
+            grid = smaller
+        if grid.lanes == 1:
+            continue
+        cut = strips.cut(grid, messages)
+        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        assert cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+    assert taken_out > 0
+
+
+def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str, bool]) -> None:
+    better = 0
+    for seed in range(100):
+        toy = random_toy(seed, **kind)
+        optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
+        if optimum == np.inf:
+            continue
+        grid = grid_of(toy, MOVES)
+        messages, path = noisy_messages(grid, seed, 5.0), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+        path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
+        before = bound.backward(grid, messages) + bound.descend(grid, messages, path, grid.lanes)
+        assert before == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+        after = polish(grid, path)
+        states = grid.dom[path].reshape(MOVES + 1, grid.lanes)
+        assert after == pytest.approx(toy.cost(states) - MOVES * toy.per_move, abs=ROUNDING), seed
+        assert optimum - ROUNDING <= after <= before + ROUNDING, seed
+        better += after < before - ROUNDING
+    assert better > 0
+
+
+def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    expansions = {"apart": 0, "at once": 0}
+    for seed in range(60):
+        toy = random_toy(seed, most=3, frustrated=True)
+        one, two = answer(toy, toy.rules(MOVES, MOVES)), twice(toy)
+        if one is None or len(toy.sizes) == 1:
+            continue
+        for how, parts in (("apart", solve._parts), ("at once", lambda grid: np.zeros(grid.lanes, np.int64))):
+            with monkeypatch.context() as patch:
+                patch.setattr(solve, "_parts", parts)
+                found = answer(two, two.rules(MOVES, MOVES, sweeps=1))
+            assert found is not None
+            assert found.status == "optimal", seed
+            assert found.cost == pytest.approx(2 * one.cost - MOVES * toy.per_move, abs=PROVEN), seed
+            assert found.cost == pytest.approx(two.cost(found.path), abs=ROUNDING), seed
+            expansions[how] += found.expansions
+    assert 0 < expansions["apart"] < 0.8 * expansions["at once"]
+
+
+def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
+    toy = Toy(
+        parents=(-1, 0, 1, 1),
+        edges=tuple(np.ones((size, size)) for size in (2, 1, 2, 2)),
+        children=tuple(map(np.zeros, (2, 1, 2, 2))),
+        above=tuple(map(np.zeros, (0, 2, 1, 1))),
+        corrections=tuple(map(np.zeros, ((0, 2), (2, 1), (1, 2), (1, 2)))),
+        start=(0, 0, 0, 0),
+        goal=(1, 0, 1, 1),
+        wait=1.0,
+        per_move=0.5,
+    )
+    assert solve._parts(grid_of(toy, 3)).tolist() == [0, 1, 2, 3]
+    assert solve._parts(grid_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
+
+
+# --- edges of the problem --------------------------------------------------------------------------------------------
+
+
+def test_without_any_edge_a_body_can_only_wait_where_it_is() -> None:
+    nowhere = (np.full((2, 2), np.inf),) * 2
+    assert answer(a_body(edges=nowhere), Rules(1.0, 0.5, 1, 5, 100)) is None
+    staying = answer(a_body(edges=nowhere, goal=(0, 0)), Rules(1.0, 0.5, 1, 5, 100))
+    assert staying is not None
+    assert staying.path.tolist() == [[0, 0], [0, 0]]
+    assert staying.cost == pytest.approx(2.5)
+
+
+def test_one_lane_of_one_state_is_a_body() -> None:
+    still = Toy((-1,), (np.zeros((1, 1)),), (np.zeros(1),), (np.zeros(0),), (np.zeros((0, 1)),), (0,), (0,), 1.0, 1.0)
+    found = answer(still, still.rules(3, 5))
+    assert found is not None
+    assert found.path.tolist() == [[0]] * 4
+    assert found.cost == pytest.approx(3.0)
+
+
+def test_no_moves_at_all_lead_from_a_posture_to_itself_and_nowhere_else() -> None:
+    there = answer(a_body(goal=(0, 0)), Rules(1.0, 0.5, 0, 0, 100))
+    assert there is not None
+    assert there.path.tolist() == [[0, 0]]
+    assert there.cost == there.lower_bound == 0.0
+    assert answer(a_body(), Rules(1.0, 0.5, 0, 0, 100)) is None
+
+
+def test_no_path_is_found_where_the_least_number_of_moves_exceeds_the_greatest() -> None:
+    assert answer(a_body(), Rules(1.0, 0.5, 4, 3, 100)) is None
+
+
+def test_a_lane_waits_at_its_goal_for_beta_or_holds_there_if_that_is_cheaper() -> None:
+    dear, cheap = np.array([[9.0, 1.0], [1.0, 9.0]]), np.array([[9.0, 1.0], [1.0, 0.25]])
+    for edges, held in ((dear, 2.0), (cheap, 0.25)):
+        found = answer(a_body(edges=(edges, edges)), Rules(2.0, 0.0, 2, 2, 100))
+        assert found is not None
+        assert found.cost == pytest.approx(2 * (1.0 + held))
+
+
+def test_a_body_without_a_tree_is_as_many_bodies_as_lanes() -> None:
+    for seed in range(50):
+        toy = random_toy(seed)
+        free = Toy(**{**vars(toy), "parents": (-1,) * len(toy.sizes)})
+        found = answer(free, free.rules(MOVES, MOVES))
+        optimum = free.optima(MOVES)[MOVES]
+        assert (found.cost if found else np.inf) == pytest.approx(optimum, abs=PROVEN), seed
+        assert found is None or found.expansions == 0
+
+
+@pytest.mark.parametrize("scale", [1e3, 1e6, 1e10, 1e13])
+def test_costs_so_great_that_rounding_exceeds_every_tolerance_break_nothing(scale: float) -> None:
+    for seed in range(80):
+        toy = random_toy(seed, frustrated=seed % 2 == 0).scaled(scale)
+        least = toy.optima(MOVES)[1:].min()
+        found = answer(toy, toy.rules(1, MOVES))
+        if found is None:
+            assert least == np.inf, seed
+        else:
+            assert found.cost == pytest.approx(least, rel=1e-9), seed
+            assert found.cost == pytest.approx(toy.cost(found.path), rel=1e-9), seed
+            assert found.lower_bound <= least + 1e-9 * abs(least), seed
+
+
+def test_more_states_than_a_node_can_number_are_refused() -> None:
+    states = 70_000
+    every = np.arange(states)
+    model = Model(
+        starts=np.array([0, states]),
+        parents=np.array([-1]),
+        indptr=np.arange(states + 1),
+        targets=((every + 1) % states).astype(np.int32),
+        costs=np.ones(states),
+        unary=np.zeros(states),
+        alone=np.zeros(states),
+        pair_starts=np.zeros(2, np.int64),
+        pair_ptr=np.zeros(1, np.int64),
+        pair_states=np.zeros(0, np.int32),
+        pair_costs=np.zeros(0),
+        allowed=np.ones(states, dtype=bool),
+        place=every.astype(np.int32),
+    )
+    with pytest.raises(ValueError, match="70000"):
+        solve.solve(model, np.array([0]), np.array([2]), Rules(1.0, 1.0, 1, 3, 100))
+
+
+# --- the problem written out -----------------------------------------------------------------------------------------
+
+
+def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> None:
+    for seed in range(60):
+        toy = random_toy(seed)
+        found = answer(toy, toy.rules(1, MOVES))
+        if found is None:
+            continue
+        moves, lanes = len(found.path) - 1, [f"lane{lane}" for lane in range(len(toy.sizes))]
+        text = cfn(toy.model(), *toy.ends(), toy.rules(1, MOVES), moves, lanes)
+        assert evaluate(text, found.path, lanes) == pytest.approx(found.cost, abs=1e-4), seed
+
+
+def test_the_written_problem_forbids_what_the_model_forbids() -> None:
+    toy = a_body(edges=(np.array([[1.0, 1.0], [np.inf, np.inf]]), np.ones((2, 2))))
+    text = cfn(toy.model(), *toy.ends(), toy.rules(3, 3), 3, ["a", "b"])
+    top = float(json.loads(text)["problem"]["mustbe"].removeprefix("<"))
+    legal, illegal = [[0, 0], [0, 0], [0, 0], [1, 1]], [[0, 0], [1, 0], [0, 0], [1, 1]]
+    assert evaluate(text, np.array(legal), ["a", "b"]) < top
+    assert evaluate(text, np.array(illegal), ["a", "b"]) >= top
+
+
+# --- helpers ---------------------------------------------------------------------------------------------------------
+
+
+def twice(toy: Toy) -> Toy:
+    """Two of a body side by side, as one."""
+    below = tuple(parent + len(toy.sizes) if parent >= 0 else -1 for parent in toy.parents)
+    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "corrections", "start", "goal")}
+    return replace(toy, parents=toy.parents + below, **doubled)
+
+
+def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:
+    """Tables of couplings of two states each, for the last two lanes."""
+    return {
+        "above": (*toy.above[:2], np.zeros(2), np.zeros(2)),
+        "corrections": (*toy.corrections[:2], np.zeros((2, 2)), np.zeros((2, 2))),
+    }
+
+
+def bodies(seeds: int, kind: dict[str, bool]) -> Iterator[tuple[Grid, float, int]]:
+    """Grids of MOVES moves of toys with at least two lanes, and their optima without tau."""
+    for seed in range(seeds):
+        toy = random_toy(seed, **kind)
+        optimum = float(toy.optima(MOVES)[MOVES] - MOVES * toy.per_move)
+        if len(toy.sizes) > 1 and optimum < np.inf:
+            yield grid_of(toy, MOVES), optimum, seed
+
+
+def some_path(grid: Grid, seed: int) -> np.ndarray:
+    """A path of positions [n], each edge drawn at random."""
+    rng, path = np.random.default_rng(seed), np.zeros(len(grid.dom_ptr) - 1, np.int64)
+    path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
+    for i in range(grid.lanes, len(path)):
+        before = path[i - grid.lanes]
+        path[i] = rng.choice(grid.row_to[grid.row_ptr[before] : grid.row_ptr[before + 1]])
+    return path
+
+
+def shares(grid: Grid, cut: strips.Strips, path: np.ndarray) -> float:
+    """What the strips cost on a path [n], each by its own shares."""
+    total = 0.0
+    for i, p in enumerate(path):
+        lane = i % grid.lanes
+        if lane == 0:
+            continue
+        a = i - lane + cut.above[lane]
+        size = grid.dom_ptr[i + 1] - grid.dom_ptr[i]
+        total += cut.stand[cut.pair_ptr[i] + (path[a] - grid.dom_ptr[a]) * size + p - grid.dom_ptr[i]]
+        if i + grid.lanes < len(path):
+            total += cut.own[edge_between(grid, p, path[i + grid.lanes])]
+            e = edge_between(grid, path[a], path[a + grid.lanes])
+            total += cut.led[cut.led_ptr[i] + e - grid.row_ptr[grid.dom_ptr[a]]]
+    return float(total)
+
+
+def positions(grid: object, states: np.ndarray) -> np.ndarray:
+    """Positions [n] of a path of states [T + 1, L]."""
+    return np.array(
+        [
+            first + np.flatnonzero(grid.dom[first:last] == state)[0]
+            for (first, last), state in zip(pairwise(grid.dom_ptr), states.ravel(), strict=True)
+        ]
+    )
+
+
+def edge_between(grid: object, before: int, after: int) -> int:
+    row = range(grid.row_ptr[before], grid.row_ptr[before + 1])
+    return next(e for e in row if grid.row_to[e] == after)

@@ -1,0 +1,94 @@
+"""Optima against those of toulbar2, an exact solver of another kind, on the problems as they are written out for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toys import random_toy
+
+from motionmind.discretize import Codebook
+from motionmind.formats import read_motion
+from motionmind.grammar.progression import fit_progression
+from motionmind.retarget.retarget import own_skeleton
+from motionmind.search.cfn import cfn
+from motionmind.search.problem import Rules, with_waits
+from motionmind.search.solve import solve
+from motionmind.tween.engine import Engine
+from motionmind.tween.problem import price
+from motionmind.tween.progression import of_moves
+
+pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
+
+PAIRS = 50
+FEW = 10
+SECONDS = 100  # that toulbar2 may take for one problem
+SAME = 1e-3  # nats; the written costs are rounded to 1e-6 each
+
+
+@pytest.fixture(scope="session")
+def cmu05(shared_data: Path) -> Engine:
+    """What is learned from twenty clips of one dancer, at 5 Hz and 15 degrees; each begins with an added T-pose."""
+    clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
+    if not clips:
+        pytest.skip(f"no clips in {shared_data / 'cmu-05'}")
+    return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
+
+
+def toulbar2(path: Path) -> float:
+    """The optimum that toulbar2 finds and proves, given a hundred seconds; infinite where it finds nothing."""
+    network = pytoulbar2.CFN(verbose=-1)
+    network.Read(str(path))
+    network.CFN.timer(SECONDS)
+    solution = network.Solve()
+    return np.inf if solution is None else solution[1]
+
+
+def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
+    model = price(cmu05.grammar, "conditional", 1.0, 1.0)
+    rules = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
+    rng = np.random.default_rng(7)
+    optimal = 0
+    for pair in range(PAIRS):
+        start, goal = cmu05.states[rng.integers(len(cmu05.states), size=2)].astype(np.int64)
+        ours = solve(model, start, goal, rules)
+        assert ours is not None
+        moves = len(ours.path) - 1
+        (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.lanes))
+        assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
+        assert ours.lower_bound <= ours.cost
+        optimal += ours.status == "optimal"
+    assert optimal >= 0.95 * PAIRS
+
+
+def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
+    """Between postures that lie close in time, for toulbar2 takes minutes for others."""
+    model, moves = price(cmu05.grammar, "conditional", 0.0, 1.0), cmu05.corpus.moves
+    rng = np.random.default_rng(11)
+    for pair in range(FEW):
+        begin = int(rng.integers(len(cmu05.states) - 4))
+        start, goal = cmu05.states[[begin, begin + 4]].astype(np.int64)
+        held = with_waits(model, goal, 1.0)
+        lists, seen = (held.starts, held.indptr, held.targets), (moves.begins, moves.ends, moves.weights)
+        net = fit_progression(cmu05.grammar.coordination.parents, *lists, np.asarray(cmu05.states), *seen)
+        of_these = of_moves(held, net, 1.0)
+        rules = Rules(wait=np.inf, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
+        ours = solve(of_these, start, goal, rules)
+        assert ours is not None
+        assert ours.status == "optimal"
+        text = cfn(of_these, start, goal, rules, len(ours.path) - 1, cmu05.grammar.lanes)
+        (tmp_path / "problem.cfn").write_text(text)
+        assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
+
+
+def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:
+    for seed in range(25):
+        toy = random_toy(seed, frustrated=seed % 2 == 0)
+        lanes = [f"lane{lane}" for lane in range(len(toy.sizes))]
+        for moves in (1, 3, 5):
+            ours = solve(toy.model(), *toy.ends(), toy.rules(moves, moves))
+            if ours is not None:
+                text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, lanes)
+                (tmp_path / "problem.cfn").write_text(text)
+                assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), (seed, moves)

@@ -1,0 +1,554 @@
+"""The engine end to end: on a body of six legs, on human23, and on recorded ballet."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import insect
+
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus import store
+from motionmind.discretize import Codebook
+from motionmind.errors import CorpusError, FormatError, MotionMindError, NoPathError, SkeletonError
+from motionmind.formats import read_motion, read_posture, write_motion
+from motionmind.geometry import rotations as rot
+from motionmind.realise.root import stand
+from motionmind.retarget.retarget import own_skeleton
+from motionmind.tween.engine import Engine
+from motionmind.tween.result import Tween
+
+
+def scurry(name: str, seed: int, frames: int = 40) -> Motion:
+    """A tripod gait along a curve, with a pause in it."""
+    body, rng = insect(), np.random.default_rng(seed)
+    t = np.arange(frames) * 0.1
+    phase = np.cumsum(np.where((np.arange(frames) % 20) < 5, 0.0, 0.9)) + rng.uniform(0.0, 6.0)
+    q = np.tile(rot.IDENTITY, (frames, len(body), 1))
+    for leg in range(6):
+        beat = phase + np.pi * (leg % 2)
+        q[:, 2 + 2 * leg] = rot.about_vertical(0.5 * np.sin(beat))
+        q[:, 3 + 2 * leg] = rot.from_axis_angle([0.0, 0.0, 1.0], 0.4 * np.maximum(np.cos(beat), 0.0))
+    q[:, 1] = rot.from_axis_angle([1.0, 0.0, 0.0], 0.5 * np.sin(0.7 * t))
+    q[:, 0] = rot.about_vertical(rng.uniform(-0.5, 0.5) * t)
+    root = np.stack([0.0 * t, 0.0 * t, 0.01 * phase], axis=1)
+    return Motion(body, q, stand(body, q, root, np.zeros(frames)), t, name)
+
+
+def dance(name: str, seed: int, frames: int = 30) -> Motion:
+    """A person who moves every joint a little, on the floor."""
+    body, rng = human23(), np.random.default_rng(seed)
+    t = np.arange(frames) * 0.2
+    q = rot.exp(0.4 * np.sin(1.1 * t[:, None, None] + np.random.default_rng(0).uniform(0.0, 6.0, (23, 3))))
+    q[:, 0] = rot.mul(rot.about_vertical(rng.uniform(-0.5, 0.5) * t), q[:, 0])
+    root = np.stack([np.sin(t), 0.0 * t, np.cos(t)], axis=1)
+    return Motion(body, rot.normalise(q), stand(body, q, root, np.zeros(frames)), t, name)
+
+
+CLIPS = [scurry("scurry", 0), scurry("hurry", 1)]
+
+
+@pytest.fixture(scope="module")
+def six_legs() -> Engine:
+    return Engine.fit(CLIPS, name="insects", discretization=Codebook(15.0), licence="CC0-1.0")
+
+
+@pytest.fixture(scope="module")
+def person() -> Engine:
+    return Engine.fit([dance("one", 1), dance("two", 2)], name="people", facing="stage", discretization=Codebook(20.0))
+
+
+@pytest.fixture(scope="module")
+def joined(six_legs: Engine) -> Tween:
+    return six_legs.tween(CLIPS[0].posture(3), CLIPS[1].posture(30))
+
+
+def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
+    motion = tween.motion
+    np.testing.assert_array_equal(motion.rotations[[0, -1]], [a.rotations, b.rotations])
+    np.testing.assert_array_equal(motion.root[[0, -1]], [a.root, b.root])
+    np.testing.assert_allclose(np.linalg.norm(motion.rotations, axis=-1), 1.0, atol=1e-9)
+    assert np.isfinite(motion.root).all()
+    (insertion,) = motion.insertions
+    assert len(insertion.times) == tween.moves + 1
+    assert (insertion.times[0], insertion.times[-1]) == (motion.times[0], motion.times[-1])
+    root = motion.skeleton.names[0]
+    assert set(insertion.bridged) == {(root if b.joint == "facing" else b.joint, b.move) for b in tween.bridges}
+    assert tween.path.shape == (tween.moves + 1, len(tween.joints))
+    assert tween.lower_bound <= tween.cost
+    assert (tween.status == "optimal") == (tween.cost - tween.lower_bound <= 1e-6)
+    assert 0.0 <= tween.attested <= 1.0
+
+
+# --- tweens -----------------------------------------------------------------------------------------------------------
+
+
+def test_six_legs_are_joined_from_a_to_b(joined: Tween) -> None:
+    assert_sound(joined, CLIPS[0].posture(3), CLIPS[1].posture(30))
+    assert joined.joints == (*insect().names, "facing")
+    assert joined.moves >= 1
+    assert joined.motion.times[-1] == pytest.approx(0.1 * joined.moves, abs=0.02)
+
+
+@pytest.mark.parametrize("pair", [(0, 20), (5, 11), (29, 2)])
+def test_people_are_joined_from_a_to_b(person: Engine, pair: tuple[int, int]) -> None:
+    a, b = dance("one", 1).posture(pair[0]), dance("two", 2).posture(pair[1])
+    tween = person.tween(a, b)
+    assert_sound(tween, a, b)
+    assert tween.joints == human23().names
+
+
+def test_a_clip_is_found_again_between_two_of_its_postures(six_legs: Engine) -> None:
+    tween = six_legs.tween(CLIPS[0].posture(6), CLIPS[0].posture(10), strict=True, moves=4)
+    assert tween.attested == 1.0
+    assert tween.bridges == ()
+    assert tween.moves == 4
+
+
+def test_a_equal_to_b_is_no_move_at_no_cost(six_legs: Engine) -> None:
+    a = CLIPS[0].posture(7)
+    tween = six_legs.tween(a, Posture(a.skeleton, -a.rotations, a.root))
+    assert (tween.moves, tween.cost, tween.lower_bound, tween.gap, tween.status) == (0, 0.0, 0.0, 0.0, "optimal")
+    assert len(tween.motion) == 1
+    np.testing.assert_array_equal(tween.motion.rotations[0], a.rotations)
+    assert tween.motion.insertions[0].times.tolist() == [0.0]
+    assert (tween.bridges, tween.waits, tween.sources, tween.attested) == ((), (), (), 1.0)
+    assert json.loads(json.dumps(tween.report()))["path"] == tween.path.tolist()
+
+
+def test_the_same_posture_elsewhere_is_a_move(six_legs: Engine) -> None:
+    a = CLIPS[0].posture(7)
+    b = replace(a, root=a.root + np.array([0.1, 0.0, 0.0]))
+    tween = six_legs.tween(a, b)
+    assert tween.moves >= 1
+    assert_sound(tween, a, b)
+
+
+@pytest.mark.parametrize("moves", [2, 5, 9])
+def test_as_many_moves_as_are_asked_for(six_legs: Engine, moves: int) -> None:
+    a, b = CLIPS[0].posture(6), CLIPS[0].posture(7)
+    tween = six_legs.tween(a, b, moves=moves)
+    assert tween.moves == moves
+    assert_sound(tween, a, b)
+    still = six_legs.tween(a, a, moves=moves)
+    assert still.moves == moves
+
+
+def test_no_number_of_moves_is_cheaper_than_the_best(six_legs: Engine, joined: Tween) -> None:
+    a, b = CLIPS[0].posture(3), CLIPS[1].posture(30)
+    for moves in range(max(1, joined.moves - 2), joined.moves + 3):
+        try:
+            assert six_legs.tween(a, b, moves=moves).cost >= joined.lower_bound - 1e-6
+        except NoPathError:
+            assert moves < joined.moves
+
+
+def test_without_a_way_through_the_joint_is_named() -> None:
+    clips = [scurry("scurry", 0), scurry("hurry", 1)]
+    head = clips[1].rotations.copy()
+    head[:, 1] = rot.mul(rot.from_axis_angle([0.0, 0.0, 1.0], 1.5), head[:, 1])  # states that nothing leads to
+    clips[1] = replace(clips[1], rotations=head)
+    engine = Engine.fit(clips, discretization=Codebook(15.0))
+    a, b = clips[0].posture(3), clips[1].posture(30)
+    with pytest.raises(NoPathError, match=r"no path from A to B in at most 60 moves \(without strict(.|\n)*  head: of"):
+        engine.tween(a, b, strict=True)
+    bridged = engine.tween(a, b)
+    assert "head" in {bridge.joint for bridge in bridged.bridges}
+    assert bridged.attested < 1.0
+    with pytest.raises(NoPathError, match=r"in at most 1 move \(allow more moves\)(.|\n)* needs \d+ moves"):
+        engine.tween(a, b, moves=1)
+
+
+@pytest.mark.parametrize(
+    ("option", "values", "words"),
+    [
+        ("moves", (0, -1, 2.5, 10**9), "moves must be a whole number from 1"),
+        ("max_moves", (0, 10**9), "max_moves must be a whole number"),
+        ("node_budget", (0, -5, 10**12), "node_budget must be a whole number"),
+        ("fps", (0.0, -30.0, np.nan, np.inf, 1e9, 1e-9), "fps must be a number of frames a second"),
+        ("weights", ("heavy",), "weights must be 'conditional' or 'printed', not 'heavy'"),
+        ("lambda_", (-1.0, np.nan), "lambda must be a number of nats"),
+        ("beta", (-1.0, np.inf), "beta must be"),
+        ("tau", (-1.0, np.nan), "tau must be"),
+        ("bridge_price", (-1.0, np.nan), "bridge_price must be"),
+    ],
+)
+def test_options_out_of_range_are_named(six_legs: Engine, option: str, values: tuple[Any, ...], words: str) -> None:
+    for value in values:
+        with pytest.raises(MotionMindError, match=words):
+            six_legs.tween(CLIPS[0].posture(3), CLIPS[0].posture(9), **{option: value})
+
+
+def test_another_skeleton_is_refused_and_the_difference_named(six_legs: Engine, person: Engine) -> None:
+    fly, man = CLIPS[0].posture(3), dance("one", 1).posture(3)
+    with pytest.raises(SkeletonError, match="posture B is on another skeleton than corpus 'insects': human23 lacks"):
+        six_legs.tween(fly, man)
+    with pytest.raises(SkeletonError, match="posture A is on another skeleton than corpus 'people': insect lacks"):
+        person.tween(fly, man)
+    with pytest.raises(CorpusError, match="one is on another skeleton than scurry"):
+        Engine.fit([CLIPS[0], dance("one", 1)])
+
+
+def test_more_states_than_can_be_held_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionmind.learned.model.MOST_STATES", 12)
+    with pytest.raises(CorpusError, match=r"'many': \w+ has \d+ states within 0.5 degrees, and a joint can have 12"):
+        Engine.fit(CLIPS, name="many", discretization=Codebook(0.5))
+    Engine.fit(CLIPS, name="few", discretization=Codebook(25.0))
+
+
+def test_a_body_of_one_joint_is_a_body() -> None:
+    pole = Skeleton("pole", ("pole",), (-1,), np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
+    q = rot.from_axis_angle([0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 20))[:, None]
+    swing = Motion(pole, q, np.zeros((20, 3)), np.arange(20) * 0.1, "swing")
+    for facing in ("free", "stage"):
+        engine = Engine.fit([swing], facing=facing, discretization=Codebook(10.0))  # type: ignore[arg-type]
+        assert_sound(engine.tween(swing.posture(0), swing.posture(12)), swing.posture(0), swing.posture(12))
+
+
+# --- what it says -----------------------------------------------------------------------------------------------------
+
+REPORT = [
+    "asked",
+    "status",
+    "cost",
+    "lower_bound",
+    "gap",
+    "moves",
+    "expansions",
+    "peak_nodes",
+    "node_budget",
+    "seconds",
+    "joints",
+    "path",
+    "attested",
+    "bridges",
+    "waits",
+    "shared",
+    "vias",
+    "snap_degrees",
+    "path_degrees",
+    "sources",
+    "detail",
+    "times",
+    "names",
+    "degrees",
+    "likelihood",
+    "costs",
+]
+
+
+def test_a_report_has_the_documented_keys_and_is_json(joined: Tween) -> None:
+    report = json.loads(json.dumps(joined.report(), allow_nan=False))
+    assert list(report) == REPORT
+    assert list(report["seconds"]) == ["load", "problem", "bound", "search", "realise"]
+    assert report["moves"] == len(report["path"]) - 1 == len(report["sources"])
+    assert report["snap_degrees"].keys() == {"A", "B"}
+    assert list(report["snap_degrees"]["A"]) == list(joined.joints) == report["joints"]
+    assert max(report["snap_degrees"]["A"].values()) <= 15.0 + 1e-6
+
+
+def test_sources_attest_what_they_are_said_to(six_legs: Engine, joined: Tween) -> None:
+    starts = {clip.name: clip for clip in six_legs.corpus.clips}
+    attested = 0
+    for move, (before, after) in enumerate(pairwise(joined.path)):
+        for lane, source in enumerate(joined.sources[move]):
+            edge = six_legs.grammar.transitions.edge(lane, before[lane], after[lane])
+            assert (source is None) == (edge < 0)
+            if source is None:
+                continue
+            attested += 1
+            clip = starts[source.clip]
+            assert 0 <= source.posture < clip.stop - clip.start - 1
+            seen = six_legs.states[clip.start + source.posture : clip.start + source.posture + 2, lane].astype(int)
+            if joined.joints[lane] == "facing":  # pooled: by how many steps it turns
+                assert (seen[1] - seen[0] - (int(after[lane]) - int(before[lane]))) % six_legs.space.sizes[lane] == 0
+            else:
+                assert seen.tolist() == [before[lane], after[lane]]
+    assert joined.attested == attested / (joined.moves * len(joined.joints))
+
+
+def test_bridges_and_waits_are_what_is_not_attested(six_legs: Engine, joined: Tween) -> None:
+    goal = joined.path[-1]
+    for wait in joined.waits:
+        lane = joined.joints.index(wait.joint)
+        assert joined.path[wait.move, lane] == joined.path[wait.move + 1, lane] == goal[lane]
+    unattested = {
+        (joined.joints[lane], move)
+        for move, row in enumerate(joined.sources)
+        for lane, source in enumerate(row)
+        if source is None
+    }
+    flagged = {(thing.joint, thing.move) for thing in (*joined.bridges, *joined.waits)}
+    assert unattested <= flagged
+    for bridge in joined.bridges:
+        lane = joined.joints.index(bridge.joint)
+        before, after = six_legs.space.of(lane)[joined.path[bridge.move : bridge.move + 2, lane]]
+        assert bridge.degrees == pytest.approx(np.degrees(rot.angle(before, after)), abs=1e-4)
+
+
+def test_a_joint_graph_is_the_counts(six_legs: Engine) -> None:
+    states = six_legs.states[:, six_legs.space.index("head")]
+    graph = six_legs.joint_graph("head")
+    pairs = [(int(states[i]), int(states[i + 1])) for i in six_legs.corpus.begins]
+    assert {(s, t): data["count"] for s, t, data in graph.edges(data=True)} == {
+        pair: float(pairs.count(pair)) for pair in set(pairs)
+    }
+    for state, data in graph.nodes(data=True):
+        assert data["visits"] == np.sum(states == state)
+        assert rot.angle(np.array(data["orientation"]), six_legs.space.of("head")[state]) < 1e-12
+        leaving = [np.exp(-edge["weight"]) for _, _, edge in graph.out_edges(state, data=True)]
+        assert sum(leaving) == pytest.approx(1.0) or not leaving
+    with pytest.raises(SkeletonError, match="no joint 'wing'"):
+        six_legs.joint_graph("wing")
+    ring = six_legs.joint_graph("facing")
+    assert len({ring.out_degree(state) for state in ring}) == 1
+
+
+def test_what_is_searched_is_the_network_entry_by_entry(six_legs: Engine, person: Engine) -> None:
+    for engine in (six_legs, person):
+        network, skeleton = engine.network(), engine.corpus.skeleton
+        assert network.check_model()
+        assert set(network.nodes) == set(skeleton.names)
+        for lane, (joint, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
+            if parent < 0:
+                assert network.get_parents(joint) == []
+                continue
+            cpd = network.get_cpds(joint)
+            assert cpd.variables == [joint, skeleton.names[parent]]
+            table = engine.grammar.coordination.table(lane, engine.grammar.transitions.starts)
+            np.testing.assert_allclose(np.exp(-table).T, cpd.get_values(), rtol=1e-9)
+
+
+def test_what_the_corpus_holds_is_said(six_legs: Engine) -> None:
+    info = json.loads(json.dumps(six_legs.info(), allow_nan=False))
+    assert (info["name"], info["licence"], info["postures"], info["moves"]) == ("insects", "CC0-1.0", 80, 78)
+    assert info["joints"] == list(insect().names)
+    assert info["states"]["head"] == six_legs.space.sizes[1]
+    check = json.loads(json.dumps(six_legs.check(pairs=50, seed=3), allow_nan=False))
+    assert {key: check[key] for key in info} == info
+    assert 0.0 <= check["joinable"] <= 1.0
+    assert check == six_legs.check(pairs=50, seed=3)
+    for options in ({"pairs": 0}, {"seed": -1}):
+        with pytest.raises(MotionMindError, match="must be"):
+            six_legs.check(**options)
+
+
+# --- on disk ----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_loaded_answers_as_what_was_saved(six_legs: Engine, joined: Tween, tmp_path: Path) -> None:
+    six_legs.save(tmp_path / "corpora" / "insects")
+    loaded = Engine.load("insects", tmp_path)
+    a, b = CLIPS[0].posture(3), CLIPS[1].posture(30)
+    again = loaded.tween(a, b)
+    for name, tween in (("fitted", joined), ("loaded", again)):
+        write_motion(tmp_path / f"{name}.json", tween.motion)
+    assert (tmp_path / "fitted.json").read_bytes() == (tmp_path / "loaded.json").read_bytes()
+    assert again.problem() == joined.problem()
+    assert [again.report()[key] for key in REPORT if key != "seconds"] == [
+        joined.report()[key] for key in REPORT if key != "seconds"
+    ]
+    assert loaded.info() == six_legs.info()
+    assert loaded.check(20) == six_legs.check(20)
+    assert loaded.corpus.skeleton == six_legs.corpus.skeleton
+    assert loaded.load_seconds > 0.0
+    loaded.save(tmp_path / "again")
+    for path in (tmp_path / "corpora" / "insects").iterdir():
+        assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes()
+
+
+def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_legs: Engine, tmp_path: Path) -> None:
+    good = tmp_path / "good"
+    six_legs.save(good)
+    manifest = json.loads((good / "manifest.json").read_text("utf-8"))
+
+    def refused(change: Callable[[dict[str, Any]], object], words: str) -> None:
+        broken = json.loads(json.dumps(manifest))
+        change(broken)
+        (good / "manifest.json").write_text(json.dumps(broken), "utf-8")
+        with pytest.raises(MotionMindError, match=words):
+            Engine.load(str(good))
+
+    for key in manifest.keys() - {"format", "version"}:
+        refused(lambda broken, key=key: broken.pop(key), "arrays" if key == "arrays" else f"no key `{key}`")
+    for name in manifest["arrays"]:
+        refused(lambda broken, name=name: broken["arrays"].pop(name), f"lists no array {name}")
+    refused(lambda broken: broken["clips"].pop(), "clips do not follow one another")
+    refused(lambda broken: broken["skeleton"]["names"].pop(), "joints need as many parents")
+    refused(lambda broken: broken["skeleton"].update(parents=[0] * 14), "must be the root")
+    refused(lambda broken: broken["space"].update(starts=[0, 1]), "state space")
+    refused(lambda broken: broken.update(facing="north"), r"\$.facing")
+    (good / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    Engine.load(str(good))
+    (good / "carriage.travel.npy").unlink()
+    with pytest.raises(FormatError, match=r"carriage\.travel\.npy"):
+        Engine.load(str(good))
+
+
+@pytest.fixture
+def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A corpus as a person writes it; what is learned from it is kept in tmp_path / "cache"."""
+    monkeypatch.setattr(store, "cache", lambda: tmp_path / "cache")
+    folder = tmp_path / "corpora" / "mine"
+    (folder / "clips").mkdir(parents=True)
+    for clip in CLIPS:
+        write_motion(folder / "clips" / f"{clip.name}.json", clip)
+    manifest = {
+        "format": store.FORMAT,
+        "version": store.VERSION,
+        **{"name": "mine", "title": "Insects", "author": "us", "source": "here", "licence": "CC0-1.0"},
+        **{"facing": "free", "rate": None, "discretization": {"kind": "codebook", "tolerance": 15}},
+        "clips": [{"name": f"the {c.name}", "file": f"clips/{c.name}.json", "about": "legs"} for c in CLIPS],
+    }
+    (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    return folder
+
+
+def test_a_written_corpus_is_learned_once_and_again_when_it_changes(written: Path, tmp_path: Path) -> None:
+    first = Engine.load("mine", tmp_path)
+    assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "legs"}
+    (built,) = (tmp_path / "cache").iterdir()
+    before = {path.name: path.stat().st_mtime_ns for path in built.iterdir()}
+    assert Engine.load("mine", tmp_path).info() == first.info()
+    assert {path.name: path.stat().st_mtime_ns for path in built.iterdir()} == before
+    write_motion(written / "clips" / "hurry.json", CLIPS[1].slice(0, 30))
+    assert Engine.load("mine", tmp_path).info()["postures"] == 70
+
+
+def test_a_damaged_cache_is_learned_again(written: Path, tmp_path: Path) -> None:
+    info = Engine.load("mine", tmp_path).info()
+    (built,) = (tmp_path / "cache").iterdir()
+    for damage in (
+        (built / "states.npy").unlink,
+        lambda: (built / "manifest.json").write_text("{"),
+        lambda: shutil.rmtree(built),
+    ):
+        damage()
+        assert Engine.load("mine", tmp_path).info() == info
+        store.load(built)
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(
+    written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "cache", lambda: Path("/proc/nowhere"))
+    assert Engine.load("mine", tmp_path).info()["postures"] == 80
+
+
+def test_what_is_wrong_with_a_written_corpus_is_named(written: Path, tmp_path: Path) -> None:
+    path = written / "manifest.json"
+    manifest = json.loads(path.read_text("utf-8"))
+    for change, words in (
+        ({"discretization": None}, "discretization"),
+        ({"discretization": {"kind": "sieve"}}, "manifest.json: discretization: the kind must be"),
+        ({"discretization": {"kind": "codebook", "tolerance": -1}}, "manifest.json: discretization"),
+        ({"clips": []}, "nor `scores` with a score"),
+        ({"clips": [{"name": "a", "file": "gone.json", "about": ""}]}, "gone.json: cannot be read"),
+        ({"rate": -5}, "a rate must be"),
+    ):
+        path.write_text(json.dumps(manifest | change), "utf-8")
+        with pytest.raises(MotionMindError, match=words):
+            Engine.load("mine", tmp_path)
+    for key in manifest.keys() - {"format", "version"}:
+        path.write_text(json.dumps({name: value for name, value in manifest.items() if name != key}), "utf-8")
+        with pytest.raises(FormatError, match=f"manifest.json: there is no key `{key}`"):
+            Engine.load("mine", tmp_path)
+
+
+# --- the same everywhere ----------------------------------------------------------------------------------------------
+
+SCRIPT = """
+import sys
+from motionmind.tween.engine import Engine
+from motionmind.formats import read_posture, write_motion
+engine = Engine.load(sys.argv[1])
+tween = engine.tween(read_posture(sys.argv[2]), read_posture(sys.argv[3]))
+write_motion(sys.argv[4] + ".bvh", tween.motion)
+write_motion(sys.argv[4] + ".json", tween.motion)
+heavy = {"pgmpy", "pandas", "matplotlib", "torch", "sklearn"} & set(sys.modules)
+assert not heavy, heavy
+"""
+
+
+def test_fresh_processes_write_the_same_bytes_and_import_nothing_heavy(six_legs: Engine, tmp_path: Path) -> None:
+    from motionmind.formats import write_posture
+
+    six_legs.save(tmp_path / "insects")
+    write_posture(tmp_path / "a.json", CLIPS[0].posture(3))
+    write_posture(tmp_path / "b.json", CLIPS[1].posture(30))
+    for seed in ("1", "2"):
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT, *(str(tmp_path / name) for name in ("insects", "a.json", "b.json", seed))],
+            env=os.environ | {"PYTHONHASHSEED": seed},
+            check=True,
+        )
+    for suffix in ("bvh", "json"):
+        assert (tmp_path / f"1.{suffix}").read_bytes() == (tmp_path / f"2.{suffix}").read_bytes()
+
+
+# --- recorded movement ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def recorded(shared_data: Path) -> list[Motion]:
+    """Files on their own joints."""
+    return [read_motion(path) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
+
+
+@pytest.fixture(scope="module")
+def ballet(recorded: list[Motion]) -> Engine:
+    return Engine.fit([own_skeleton(motion) for motion in recorded], name="cmu-05", rate=5.0, skip=1)
+
+
+def test_recorded_postures_are_joined_mostly_by_what_was_recorded(ballet: Engine) -> None:
+    rng, corpus = np.random.default_rng(5), ballet.corpus
+    tweens = []
+    for i, k in rng.integers(0, len(corpus), (10, 2)):
+        a, b = (Posture(corpus.skeleton, corpus.rotations[n], corpus.root[n]) for n in (i, k))
+        tweens.append(ballet.tween(a, b))
+        assert_sound(tweens[-1], a, b)
+    assert np.mean([tween.attested for tween in tweens]) > 0.9
+    assert np.mean([tween.status == "optimal" for tween in tweens]) >= 0.9
+
+
+def test_postures_on_the_files_own_joints_are_taken_to_human23(ballet: Engine, recorded: list[Motion]) -> None:
+    raw = recorded[0]
+    assert raw.skeleton.difference(human23()) is not None
+    tween = ballet.tween(raw.posture(100), raw.posture(160))
+    assert tween.motion.skeleton.names == human23().names
+    assert_sound(tween, own_skeleton(raw.posture(100)), own_skeleton(raw.posture(160)))
+
+
+def test_any_file_is_learned_from_or_refused_by_name(shared_data: Path) -> None:
+    learned, refused = [], []
+    for path in sorted((shared_data / "importer").glob("*.bvh")):
+        try:
+            with warnings.catch_warnings(action="ignore"):
+                motion = own_skeleton(read_motion(path))
+            engine = Engine.fit([motion.slice(0, 60)], rate=5.0, discretization=Codebook(25.0))
+            a, b = motion.posture(0), motion.posture(min(len(motion) - 1, 12))
+            assert_sound(engine.tween(a, b), a, b)
+            learned.append(path.name)
+        except MotionMindError as error:
+            refused.append(f"{path.name}: {error}")
+    assert len(learned) >= 5, refused
+
+
+def test_postures_of_the_bundled_corpus_are_joined() -> None:
+    engine = Engine.load("ballet")
+    folder = Path(__file__).parents[2] / "corpora" / "ballet" / "postures"
+    a, b = read_posture(folder / "arabesque.json"), read_posture(folder / "fifth.json")
+    assert_sound(engine.tween(a, b), a, b)

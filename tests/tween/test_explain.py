@@ -1,0 +1,207 @@
+"""What a tween is made of, taken apart: that it adds up, that it is what was counted, and how it is told."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import Run
+
+from motionmind.body.motion import Posture
+from motionmind.errors import FormatError
+from motionmind.geometry import rotations as rot
+from motionmind.tween.engine import Engine
+from motionmind.tween.narrative import explain, lines, plain, read_report
+from motionmind.tween.result import Tween
+
+ENDS = [Path(__file__).parents[2] / "corpora/ballet/postures" / name for name in ("arabesque.json", "fifth.json")]
+
+
+@pytest.fixture(scope="module")
+def insects() -> Engine:
+    """Six legs, with a lane for the facing, learned backwards too; the head of one clip is never as in the others, so
+    that it must be bridged."""
+    clips = [replace(motion, name=clip.name) for clip, motion in _clips(Engine.load("walk-hexapod"))]
+    turned = clips[1].rotations.copy()
+    turned[:, 1] = rot.mul(rot.from_axis_angle([0.0, 0.0, 1.0], 1.2), turned[:, 1])
+    clips[1] = replace(clips[1], rotations=turned)
+    return Engine.fit(clips, name="insects", reverse=1.0)
+
+
+def _clips(engine: Engine) -> list[Any]:
+    return [(clip, engine.corpus.motion(clip)) for clip in engine.corpus.clips]
+
+
+def between(engine: Engine, a: int, b: int, **options: Any) -> Tween:
+    corpus = engine.corpus
+    ends = [Posture(corpus.skeleton, corpus.rotations[i], corpus.root[i]) for i in (a, b)]
+    return engine.tween(*ends, **options)
+
+
+@pytest.fixture(scope="module")
+def bridged(insects: Engine) -> Tween:
+    tween = between(insects, 5, insects.corpus.clips[1].start + 9)
+    assert tween.bridges
+    return tween
+
+
+def report_of(tween: Tween, folder: Path) -> Path:
+    path = folder / "report.json"
+    path.write_text(json.dumps(tween.report()), "utf-8")
+    return path
+
+
+# --- the account ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"lambda_": 0.3, "beta": 0.25, "tau": 2.0, "bridge_price": 0.5},
+        {"lambda_": 0.0, "tau": 0.0},
+        {"weights": "printed"},
+        {"moves": 9},
+        {"beta": 0.0, "moves": 12},
+    ],
+)
+def test_what_is_charged_adds_up_to_the_cost(insects: Engine, options: dict[str, Any]) -> None:
+    rng = np.random.default_rng(1)
+    for a, b in rng.integers(len(insects.corpus), size=(4, 2)):
+        tween = between(insects, a, b, **options)
+        assert tween.account.total == pytest.approx(tween.cost, abs=1e-6)
+        report = tween.report()
+        costs = report["costs"]
+        told = sum(map(sum, costs["moves"])) + sum(map(sum, costs["coordination"])) + costs["per_move"] * tween.moves
+        assert told == pytest.approx(report["cost"], abs=1e-6)
+        for thing in (*tween.bridges, *tween.waits):
+            charged = tween.account.moves[thing.move, tween.joints.index(thing.joint)]
+            assert charged == pytest.approx(thing.price)
+
+
+def test_likelihoods_are_what_was_counted(insects: Engine, bridged: Tween) -> None:
+    moves, states = insects.corpus.moves, insects.states
+    for t, (before, after) in enumerate(pairwise(bridged.path)):
+        for lane, joint in enumerate(bridged.joints):
+            if joint == "facing":
+                size = insects.space.sizes[lane]
+                turned = (states[moves.ends, lane] - states[moves.begins, lane]) % size
+                left, made = np.ones(len(turned), dtype=bool), turned == (after[lane] - before[lane]) % size
+            else:
+                left = states[moves.begins, lane] == before[lane]
+                made = left & (states[moves.ends, lane] == after[lane])
+            counted = moves.weights[made].sum() / moves.weights[left].sum() if left.any() else 0.0
+            assert bridged.account.likelihood[t, lane] == pytest.approx(counted)
+            assert (bridged.sources[t][lane] is None) == (counted == 0.0)
+
+
+def test_coordination_is_what_the_network_says(insects: Engine, bridged: Tween) -> None:
+    network, skeleton = insects.network(), insects.corpus.skeleton
+    for t, row in enumerate(bridged.path[1:]):
+        for lane, joint in enumerate(bridged.joints):
+            parent = skeleton.parents[lane] if joint != "facing" else -1
+            cost = -np.log(network.get_cpds(joint).get_values()[row[lane], row[parent]]) if parent >= 0 else 0.0
+            assert bridged.account.coordination[t, lane] == pytest.approx(cost, abs=1e-9)
+
+
+def test_a_source_says_when_it_was(insects: Engine, bridged: Tween) -> None:
+    starts = {clip.name: clip.start for clip in insects.corpus.clips}
+    for source in (source for row in bridged.sources for source in row if source):
+        assert source.seconds == insects.corpus.times[starts[source.clip] + source.posture]
+
+
+# --- told -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_explanation_adds_up_move_by_move(bridged: Tween, tmp_path: Path) -> None:
+    told = explain(read_report(report_of(bridged, tmp_path)))
+    assert sum(move.cost for move in told.moves) == pytest.approx(bridged.cost, abs=1e-6)
+    assert told.moved + told.coordinated + told.tolls == pytest.approx(bridged.cost, abs=1e-6)
+    assert [(move.begins, move.ends) for move in told.moves] == list(pairwise(bridged.motion.insertions[0].times))
+    for how, things in (("bridge", bridged.bridges), ("wait", bridged.waits)):
+        found = {(step.joint, move.move - 1) for move in told.moves for step in move.joints if step.how == how}
+        assert found == {(thing.joint, thing.move) for thing in things}
+    for t, move in enumerate(told.moves):
+        assert [step.moved for step in move.joints] == (bridged.path[t] != bridged.path[t + 1]).tolist()
+    assert json.loads(json.dumps(plain(told), allow_nan=False))["moves"][0]["joints"][0]["joint"] == "thorax"
+
+
+def test_people_read_who_moves_how_likely_and_where_it_was_seen(bridged: Tween, tmp_path: Path) -> None:
+    text = "\n".join(lines(explain(read_report(report_of(bridged, tmp_path)))))
+    assert text.count("\nmove ") == bridged.moves
+    for bridge in bridged.bridges:
+        part = text.split("\nmove ")[bridge.move + 1]
+        line = next(line for line in part.splitlines() if line.split()[:1] == [bridge.joint])
+        assert f"{bridge.degrees:.0f} degrees  never seen, {bridge.price:.2f} nats" in line
+        assert line.endswith("bridge")
+    move, lane = next((t, j) for t, row in enumerate(bridged.sources) for j, source in enumerate(row)
+                      if source and bridged.path[t, j] != bridged.path[t + 1, j])  # fmt: skip
+    source = bridged.sources[move][lane]
+    assert source is not None
+    assert f"{source.clip}" in text.split("\nmove ")[move + 1]
+    assert f"posture {source.posture} ({source.seconds:.2f} s)" in text.split("\nmove ")[move + 1]
+
+
+def test_no_move_is_told_too(insects: Engine, tmp_path: Path) -> None:
+    still = between(insects, 3, 3)
+    told = explain(read_report(report_of(still, tmp_path)))
+    assert told.moves == []
+    assert next(lines(told)) == "0 moves in 0.00 s, optimal, gap 0.00%"
+
+
+def test_the_command_names_states_by_their_names(run: Run) -> None:
+    ran = run("tween", *ENDS, "--corpus", "ballet", "--report", "report.json")
+    assert ran.code == 0
+    shown, report = run("explain", "report.json"), json.loads(Path("report.json").read_text("utf-8"))
+    assert (shown.code, shown.err) == (0, "")
+    assert "arabesque" in shown.out
+    assert f"\n{report['cost']:.3f} nats: " in f"\n{shown.out}"
+    told = run("explain", "report.json", "--json").json
+    assert [len(move["joints"]) for move in told["moves"]] == [len(report["joints"])] * report["moves"]
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_no_report_is_refused(bridged: Tween, tmp_path: Path, run: Run) -> None:
+    report = bridged.report()
+    path = tmp_path / "bad.json"
+    for change, words in (
+        ({"costs": None}, r"costs"),
+        ({"path": report["path"][:-1]}, "tables are not of"),
+        ({"degrees": []}, "tables are not of"),
+        ({"times": [0.0]}, "postures and 1 times"),
+        ({"path": [], "names": []}, "tables"),
+    ):
+        path.write_text(json.dumps(report | change), "utf-8")
+        with pytest.raises(FormatError, match=words):
+            read_report(path)
+    del report["likelihood"]
+    for text in (json.dumps(report), "[]", "{", "", "\udcff"):
+        path.write_bytes(text.encode("utf-8", "surrogateescape"))
+        ran = run("explain", path)
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err.startswith(f"error: {path}: is no report of a tween: ")
+        assert ran.err.count("\n") == 1
+    assert run("explain", tmp_path / "gone.json").code == 2
+
+
+def test_damaged_reports_are_told_or_refused(
+    bridged: Tween, tmp_path: Path, mutate: Callable[[str, random.Random], bytes]
+) -> None:
+    text, rng, path = json.dumps(bridged.report()), random.Random(0), tmp_path / "bad.json"
+    refused = 0
+    for _ in range(150):
+        path.write_bytes(mutate(text, rng))
+        try:
+            list(lines(explain(read_report(path))))
+        except FormatError:
+            refused += 1
+    assert refused > 50
