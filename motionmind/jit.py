@@ -62,7 +62,7 @@ def is_compiled(package: str) -> bool:
 
 @cache
 def _folder(source: Path) -> str:
-    """Where compiled code is kept: a folder named after the state of all sources in the folder `source`, and in `geometry`.
+    """Where compiled code is kept: a folder named after the state of all sources in `source` and in `geometry`.
 
     numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
     go on using the old code after that file changed. It is in the user's cache directory, or where that cannot be

@@ -1,7 +1,7 @@
 """Pictures that were looked at and found right: what is drawn today must still look like them.
 
 Each is one posture, without words, whose fonts differ between versions of Pillow. After a change that is meant to be
-seen, `MOTIONMIND_GOLDEN=write pytest tests/render/test_golden.py` draws them anew into tests/render/golden; look at each of them.
+seen, `MOTIONMIND_GOLDEN=write pytest tests/render/test_golden.py` draws them anew into the folder golden; look at each.
 """
 
 from __future__ import annotations
