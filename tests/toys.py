@@ -1,7 +1,7 @@
 """Toy bodies: problems written as dense tables, and their optima by brute force over all joint states.
 
 What is here knows `Model` only as a form to translate into; the optima come from the dense tables and the sum of
-products that the model's definition prints, not from the search's grid.
+products that the model's definition prints, not from the search's trellis.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
-from motionmind.search.trellis import Grid, build_grid
+from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.search.trws import Messages, no_messages
 
 
 @dataclass(frozen=True)
 class Toy:
-    """A body of a few lanes, dense.
+    """A body of a few chains, dense.
 
     Attributes:
-        parents: parent lane [L], or -1.
-        edges: cost of a move of each lane, infinity where there is none, L arrays of [S, S].
-        children, above: the parts of a coupling that separate, of the lane's state and of its parent's.
+        parents: parent chain [L], or -1.
+        edges: cost of a move of each chain, infinity where there is none, L arrays of [S, S].
+        children, above: the parts of a coupling that separate, of the chain's state and of its parent's.
         corrections: what pairs cost beyond that, most often less, L arrays of [states of the parent, S].
         start, goal: states [L].
         wait, per_move: beta and tau.
@@ -45,13 +45,13 @@ class Toy:
     def sizes(self) -> tuple[int, ...]:
         return tuple(len(table) for table in self.edges)
 
-    def coupling(self, lane: int) -> Floats:
-        """Cost of standing together [states of the parent, states of the lane]."""
-        return self.above[lane][:, None] + self.children[lane][None, :] + self.corrections[lane]
+    def coupling(self, chain: int) -> Floats:
+        """Cost of standing together [states of the parent, states of the chain]."""
+        return self.above[chain][:, None] + self.children[chain][None, :] + self.corrections[chain]
 
-    def moves(self, lane: int) -> Floats:
-        """Cost of a lane's moves, waiting at the goal among them [S, S]."""
-        costs, goal = self.edges[lane].copy(), self.goal[lane]
+    def moves(self, chain: int) -> Floats:
+        """Cost of a chain's moves, waiting at the goal among them [S, S]."""
+        costs, goal = self.edges[chain].copy(), self.goal[chain]
         costs[goal, goal] = min(costs[goal, goal], self.wait)
         return costs
 
@@ -62,14 +62,14 @@ class Toy:
         costs = [row[np.isfinite(row)] for table in self.edges for row in table]
         unary, alone = np.zeros(starts[-1]), np.zeros(starts[-1])
         pair_starts, pairs, corrections = [0], [], []
-        for lane, parent in enumerate(self.parents):
-            mine = slice(starts[lane], starts[lane + 1])
+        for chain, parent in enumerate(self.parents):
+            mine = slice(starts[chain], starts[chain + 1])
             if parent >= 0:
-                unary[mine] += self.children[lane]
-                unary[starts[parent] : starts[parent + 1]] += self.above[lane]
-                alone[mine] = self.coupling(lane).min(axis=0)
-                pairs += [np.flatnonzero(row) for row in self.corrections[lane]]
-                corrections += [row[row != 0.0] for row in self.corrections[lane]]
+                unary[mine] += self.children[chain]
+                unary[starts[parent] : starts[parent + 1]] += self.above[chain]
+                alone[mine] = self.coupling(chain).min(axis=0)
+                pairs += [np.flatnonzero(row) for row in self.corrections[chain]]
+                corrections += [row[row != 0.0] for row in self.corrections[chain]]
             pair_starts.append(len(pairs))
         return Model(
             starts,
@@ -99,10 +99,10 @@ class Toy:
             return np.inf
         total = self.per_move * (len(path) - 1)
         for before, after in pairwise(path):
-            for lane, parent in enumerate(self.parents):
-                total += self.moves(lane)[before[lane], after[lane]]
+            for chain, parent in enumerate(self.parents):
+                total += self.moves(chain)[before[chain], after[chain]]
                 if parent >= 0:
-                    total += self.coupling(lane)[after[parent], after[lane]]
+                    total += self.coupling(chain)[after[parent], after[chain]]
         return float(total)
 
     def joint_states(self) -> Ints:
@@ -114,10 +114,10 @@ class Toy:
         joint = self.joint_states()
         stand = np.zeros(len(joint))
         move = np.zeros((len(joint), len(joint)))
-        for lane, parent in enumerate(self.parents):
-            move += self.moves(lane)[joint[:, lane][:, None], joint[:, lane][None, :]]
+        for chain, parent in enumerate(self.parents):
+            move += self.moves(chain)[joint[:, chain][:, None], joint[:, chain][None, :]]
             if parent >= 0:
-                stand += self.coupling(lane)[joint[:, parent], joint[:, lane]]
+                stand += self.coupling(chain)[joint[:, parent], joint[:, chain]]
         return move, stand
 
     def so_far(self, longest: int) -> Floats:
@@ -161,22 +161,22 @@ class Toy:
 def random_toy(
     seed: int, *, most: int = 5, states: int = 4, frustrated: bool = False, even: bool = False, dear: bool = False
 ) -> Toy:
-    """A random body of 1 to `most` lanes: any forest, sparse moves with dead ends, couplings with discounts.
+    """A random body of 1 to `most` chains: any forest, sparse moves with dead ends, couplings with discounts.
 
     Args:
         seed: what it is drawn from.
-        most: lanes at most; at most 256 joint states come of it.
-        states: states a lane at most.
+        most: chains at most; at most 256 joint states come of it.
+        states: states a chain at most.
         frustrated: couplings far stronger than moves, which leaves a gap between bound and optimum.
         even: all costs multiples of a tenth, so that many paths cost the same but for rounding.
         dear: of the pairs that couplings list many cost more than others.
     """
     rng = np.random.default_rng(seed)
-    lanes = int(rng.integers(1, most + 1))
-    sizes = [int(rng.integers(1, states + 1)) for _ in range(lanes)]
+    chains = int(rng.integers(1, most + 1))
+    sizes = [int(rng.integers(1, states + 1)) for _ in range(chains)]
     while np.prod(sizes) > 256:
         sizes[int(np.argmax(sizes))] -= 1
-    parents = tuple(int(rng.integers(-1, lane)) if lane else -1 for lane in range(lanes))
+    parents = tuple(int(rng.integers(-1, chain)) if chain else -1 for chain in range(chains))
 
     def draw(high: float, shape: tuple[int, ...] | int) -> Floats:
         return rng.integers(0, 6, shape) * (high / 5.0) if even else rng.uniform(0.0, high, shape)
@@ -205,34 +205,34 @@ def random_toy(
     )
 
 
-def noisy_messages(grid: Grid, seed: int, noise: float) -> Messages:
+def noisy_messages(trellis: Trellis, seed: int, noise: float) -> Messages:
     """Forward messages at random: with what is then sent back they bound, but poorly, and leave A* much to do."""
     rng = np.random.default_rng(seed)
-    messages = no_messages(grid)
-    messages.down_row[:] = rng.uniform(0.0, noise, len(grid.dom))
-    messages.down_row[: grid.dom_ptr[grid.lanes]] = 0.0
-    for i in range(len(grid.dom_ptr) - 1):
-        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
-            here = slice(grid.dom_ptr[i], grid.dom_ptr[i + 1])
+    messages = no_messages(trellis)
+    messages.down_row[:] = rng.uniform(0.0, noise, len(trellis.dom))
+    messages.down_row[: trellis.dom_ptr[trellis.chains]] = 0.0
+    for i in range(len(trellis.dom_ptr) - 1):
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            here = slice(trellis.dom_ptr[i], trellis.dom_ptr[i + 1])
             messages.down_col[here] = rng.uniform(0.0, noise, here.stop - here.start)
     return messages
 
 
-def grid_of(toy: Toy, moves: int, below: float = np.inf) -> Grid:
-    """The grid of exactly `moves` moves."""
+def trellis_of(toy: Toy, moves: int, below: float = np.inf) -> Trellis:
+    """The trellis of exactly `moves` moves."""
     start, goal = toy.ends()
     held = with_waits(toy.model(), goal, toy.wait)
-    return build_grid(held, start, moves, costs_to_go(held, goal, moves), below)
+    return build_trellis(held, start, moves, costs_to_go(held, goal, moves), below)
 
 
 def _pointer(rows: list[Ints]) -> Ints:
     return np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64)
 
 
-def evaluate(text: str, states: np.ndarray, lanes: list[str]) -> float:
+def evaluate(text: str, states: np.ndarray, chains: list[str]) -> float:
     """Cost of a path of states [T + 1, L] in a cost function network, by the format's own definition."""
     network = json.loads(text)
-    chosen = {f"{name}_{t}": row[lane] for t, row in enumerate(states) for lane, name in enumerate(lanes)}
+    chosen = {f"{name}_{t}": row[chain] for t, row in enumerate(states) for chain, name in enumerate(chains)}
     total = 0.0
     for function in network["functions"].values():
         at = [network["variables"][name].index(f"s{chosen[name]}") for name in function["scope"]]

@@ -51,8 +51,8 @@ def work(data: str | None, corpus: str, kind: str, novelty: float, count: int, s
             changed = np.flatnonzero(before != after)
             made.update(zip(changed.tolist(), before[changed].tolist(), after[changed].tolist(), strict=True))
     graph = habits.transitions
-    lane = np.searchsorted(graph.starts, graph.sources, side="right") - 1
-    there = np.count_nonzero(~habits.is_hold & (lane < habits.joints))
+    chain = np.searchsorted(graph.starts, graph.sources, side="right") - 1
+    there = np.count_nonzero(~habits.is_hold & (chain < habits.joints))
     own = [np.asarray(found.states[clip.start : clip.stop]) for clip in found.corpus.clips]
     return [
         {

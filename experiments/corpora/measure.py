@@ -14,8 +14,8 @@ from time import perf_counter
 import numpy as np
 
 from motionmind import Engine, Motion, Posture, own_skeleton, read_motion
-from motionmind.body.anatomy import Body
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy import Anatomy
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.corpus import store
 from motionmind.geometry import rotations as rot
 
@@ -42,7 +42,7 @@ def main(recordings: list[str]) -> None:
         for name in names:
             print(row(name, first[name], again[name]))
     print(f"\n| degrees, 1st and 99th percentile | {' | '.join(ANGLES)} |\n|---|{'---|' * len(ANGLES)}")
-    anatomy = body("human23")
+    anatomy = anatomy_named("human23")
     for name in names:
         corpus = Engine.load(name).corpus
         if corpus.skeleton.names == anatomy.skeleton.names:
@@ -89,7 +89,7 @@ def recorded(file: Path) -> np.ndarray:
     return motion.slice(1, len(motion)).resample(5.0).rotations
 
 
-def reach(anatomy: Body, rotations: np.ndarray) -> str:
+def reach(anatomy: Anatomy, rotations: np.ndarray) -> str:
     turned = rotations.copy()
     turned[:, 0] = rot.inv_mul(rot.about_vertical(rot.heading(turned[:, 0])), turned[:, 0])
     degrees, cells = anatomy.degrees(turned), []

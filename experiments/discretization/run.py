@@ -83,12 +83,12 @@ def errors(found: Engine, movement: Corpus, seed: int) -> dict[str, float]:
     """
     body = movement.skeleton
     joints = len(body)
-    lanes = movement.to_lanes(movement.rotations)
+    chains = movement.to_chains(movement.rotations)
     centres = found.space.centres
-    states = found.space.assign(lanes)
-    snapped = lanes.copy()
+    states = found.space.assign(chains)
+    snapped = chains.copy()
     snapped[:, :joints] = centres[found.space.starts[:joints] + states[:, :joints]]
-    there = movement.from_lanes(snapped)
+    there = movement.from_chains(snapped)
     some = np.random.default_rng(seed).permutation(len(movement))[:1000]
     ends = [joints + i for i, joint in enumerate(body.names) if joint.endswith(LEAVES)]
     places = [body.positions_and_tips(q[some], np.zeros((len(some), 3)))[:, ends] for q in (movement.rotations, there)]
@@ -97,7 +97,7 @@ def errors(found: Engine, movement: Corpus, seed: int) -> dict[str, float]:
         for q in (movement.rotations, there)
     ]
     return {
-        "degrees": float(np.degrees(rot.angle(lanes[:, :joints], snapped[:, :joints])).mean()),
+        "degrees": float(np.degrees(rot.angle(chains[:, :joints], snapped[:, :joints])).mean()),
         "cm": float(100.0 * np.linalg.norm(places[1] - places[0], axis=-1).mean()),
         "jaggedness": float(jerks[1] / jerks[0]),
     }

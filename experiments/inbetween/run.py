@@ -16,10 +16,10 @@ from motionmind import Engine, Motion, NoPathError, Posture
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 from motionmind.metrics import (
-    Judge,
+    StyleClassifier,
     angular_jerk,
     find_floor,
-    find_judge,
+    fit_style_classifier,
     foot_slide,
     l2p,
     l2q,
@@ -139,10 +139,10 @@ def _engine(data: str | None, name: str, sequence: str) -> Engine:
 
 
 @lru_cache(maxsize=4)
-def judge(data: str | None, name: str, frames: int) -> Judge:
+def judge(data: str | None, name: str, frames: int) -> StyleClassifier:
     """Who tells the corpus from others."""
     names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
-    return find_judge(
+    return fit_style_classifier(
         {
             one: {key: [piece.rotations for piece in pieces] for key, pieces in movement(data, one, frames).items()}
             for one in names or ["karate", "ballet"]

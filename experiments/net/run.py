@@ -12,10 +12,10 @@ from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, RECORDED, movement, recorded, without
 from motionmind import Skeleton
 from motionmind._typing import Bools, Floats
-from motionmind.body.anatomy_file import body as anatomy
+from motionmind.body.anatomy_file import anatomy_named as anatomy
 from motionmind.geometry import rotations as rot
-from motionmind.metrics import Judge, angular_speed, find_feet, find_floor, find_judge, l2q
-from motionmind.render.anatomy import body_of
+from motionmind.metrics import StyleClassifier, angular_speed, find_feet, find_floor, fit_style_classifier, l2q
+from motionmind.render.body_shape import shape_of
 
 SECONDS = 2.0
 FRAMES = round(SECONDS * FPS)
@@ -83,10 +83,10 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
 
 
 @lru_cache(maxsize=1)
-def judge(data: str | None, name: str) -> Judge:
+def judge(data: str | None, name: str) -> StyleClassifier:
     """Who tells the corpus from others."""
     names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
-    return find_judge(
+    return fit_style_classifier(
         {
             one: {seq: [piece.rotations for piece in pieces] for seq, pieces in movement(data, one, FRAMES).items()}
             for one in names or ["karate", "ballet"]
@@ -101,7 +101,7 @@ def judge(data: str | None, name: str) -> Judge:
 def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Bools, Bools]:
     """Whether the legs, or any two other parts that are apart when the body rests, reach into each other by more than
     1 cm: two [T]."""
-    body = body_of(skeleton)
+    body = shape_of(skeleton)
     rest = _deepest(skeleton, np.tile(rot.IDENTITY, (1, len(skeleton), 1)), np.zeros((1, 3)))[0]
     parts = np.array(body.parts[: len(body.cones)])
     apart = (rest < 0.0) & (parts[:, None] != parts[None, :])
@@ -113,7 +113,7 @@ def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Bools
 
 def _deepest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
     """How far each of the body's round cones reaches into each other one [T, N, N], metres; negative where apart."""
-    cones, _ = body_of(skeleton).solids(rotations, root)
+    cones, _ = shape_of(skeleton).solids(rotations, root)
     share = np.linspace(0.0, 1.0, POINTS)
     centres = cones.a[..., None, :] + share[:, None] * (cones.b - cones.a)[..., None, :]
     radii = cones.a_radius[:, None] + share * (cones.b_radius - cones.a_radius)[:, None]

@@ -12,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.material import FPS, RECORDED, movement, recorded
-from motionmind.metrics import find_judge
+from motionmind.metrics import fit_style_classifier
 
 SECONDS = (0.6, 1.2, 2.0, 4.0)
 
@@ -31,7 +31,7 @@ def main() -> None:
         for found in [movement(str(options.data), name, 0)]
     }
     for seconds in SECONDS:
-        for name, shares in find_judge(clips, round(seconds * FPS)).table(options.seed).items():
+        for name, shares in fit_style_classifier(clips, round(seconds * FPS)).table(options.seed).items():
             told = ", ".join(f"{kind} {share:.0%}" for kind, share in shares.items())
             print(f"{seconds:g} s, {name}, {len(clips[name])} sequences: {told}")
 

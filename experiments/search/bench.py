@@ -1,4 +1,4 @@
-"""What the search proves, how fast, and what each bound is worth, on random pairs of postures of one corpus.
+"""What the search proves, how fast, and what each bound is reachable, on random pairs of postures of one corpus.
 
 python experiments/search/bench.py PATH/TO/cmu-05 --pairs 100 --setting 10,5 [--seed 0] [--few 8] [--plot gap.svg]
 
@@ -20,28 +20,27 @@ import pytoulbar2
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.progression import fit_progression
-from motionmind.search import astar, solve
-from motionmind.search import pair_chains as strips
+from motionmind.search import astar, pair_chains, solve
 from motionmind.search import trws as bound
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Grid, build_grid
-from motionmind.tween.problem import price
-from motionmind.tween.progression import of_moves
+from motionmind.search.trellis import Trellis, build_trellis
+from motionmind.tween.problem import build_model
+from motionmind.tween.progression import lift_to_moves
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
 EXPANSIONS = 200_000
 ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
-EFFORTS = (  # sweeps of strips and of messages
+EFFORTS = (  # sweeps of pair chains and of messages
     ("messages", (0, 2)),
     ("messages", (0, 8)),
     ("messages", (0, 160)),
-    ("strips", (1, 160)),
-    ("strips", (2, 160)),
-    ("strips", (4, 160)),
-    ("strips", (100, 160)),
+    ("pair_chains", (1, 160)),
+    ("pair_chains", (2, 160)),
+    ("pair_chains", (4, 160)),
+    ("pair_chains", (100, 160)),
 )
 
 Ends = tuple[Ints, Ints]
@@ -65,7 +64,7 @@ def main() -> None:
         skip=1,
         discretization=make_discretization("codebook", tolerance),
     )
-    model = price(engine.grammar, "conditional", 1.0, 1.0)
+    model = build_model(engine.grammar, "conditional", 1.0, 1.0)
     size = f"{len(engine.states)} postures, largest joint {engine.space.sizes.max()} states"
     print(f"{rate:g} postures a second, {tolerance:g} degrees: {size}")
     warm_up(model, np.asarray(engine.states))
@@ -75,7 +74,7 @@ def main() -> None:
     few = list(zip(pairs[: options.few], found, strict=False))
     compare_bounds(model, few)
     trade(model, [ends for ends, _ in few], options.plot)
-    compare_solvers(model, few, engine.grammar.lanes)
+    compare_solvers(model, few, engine.grammar.chains)
 
 
 def joinable(model: Model, states: Int32s, count: int, seed: int) -> Iterator[Ends]:
@@ -95,13 +94,13 @@ def warm_up(model: Model, states: Int32s) -> None:
         answer = solve.solve(model, start, goal, RULES)
         assert answer is not None
         moves = len(answer.path) - 1
-        grid = pose(model, (start, goal), moves)
-        cut, path = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom_ptr) - 1, np.int64)
-        through = np.zeros(len(grid.dom))
-        strips.sweep(grid, cut, through)
-        strips.descend(grid, cut, path)
-        strips.narrow(grid, cut, through, np.inf)
-        astar.search(grid, cut, strips.proven(cut), np.inf, path, 100, 100, ON)
+        trellis = pose(model, (start, goal), moves)
+        cut, path = pair_chains.cut(trellis, bound.no_messages(trellis)), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
+        through = np.zeros(len(trellis.dom))
+        pair_chains.sweep(trellis, cut, through)
+        pair_chains.descend(trellis, cut, path)
+        pair_chains.prune(trellis, cut, through, np.inf)
+        astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 100, 100, ON)
 
 
 # --- all pairs -------------------------------------------------------------------------------------------------------
@@ -114,7 +113,11 @@ def prove(model: Model, pairs: list[Ends]) -> list[Certificate]:
 
 def prove_moves(engine: Engine, pairs: list[Ends]) -> None:
     """The same coordinated by moves, [C98]'s progressions; what makes moves of states is not timed."""
-    model, net, seen = price(engine.grammar, "conditional", 0.0, 1.0), engine.grammar.coordination, engine.corpus.moves
+    model, net, seen = (
+        build_model(engine.grammar, "conditional", 0.0, 1.0),
+        engine.grammar.coordination,
+        engine.corpus.moves,
+    )
     rules = replace(RULES, wait=np.inf)
 
     def posed() -> Iterator[tuple[Model, Rules, Ends]]:
@@ -122,7 +125,7 @@ def prove_moves(engine: Engine, pairs: list[Ends]) -> None:
             held = with_waits(model, goal, RULES.wait)
             lists, moves = (held.starts, held.indptr, held.targets), (seen.begins, seen.ends, seen.weights)
             together = fit_progression(net.parents, *lists, np.asarray(engine.states), *moves)
-            yield of_moves(held, together, 1.0), rules, (start, goal)
+            yield lift_to_moves(held, together, 1.0), rules, (start, goal)
 
     print("\ncoordinated by moves")
     prove_each(posed())
@@ -160,15 +163,16 @@ def moves_of(answer: Certificate) -> int:
 
 
 def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
-    """A* under each bound on the same grids, in as many moves as were found, nothing known and nothing fixed before."""
+    """A* under each bound on the same trellises, in as many moves as were found, nothing known and nothing fixed
+    before."""
     rows: dict[str, list[tuple[float, int, bool]]] = {}
     for ends, answer in few:
-        grid = pose(model, ends, moves_of(answer))
-        cost = answer.cost - RULES.per_move * grid.moves
-        for name, estimate in estimates(grid):
-            path = np.zeros(len(grid.dom_ptr) - 1, np.int64)
-            root = strips.proven(estimate)
-            best, lower, expanded, _ = astar.search(grid, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS, ON)
+        trellis = pose(model, ends, moves_of(answer))
+        cost = answer.cost - RULES.per_move * trellis.moves
+        for name, estimate in estimates(trellis):
+            path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
+            root = pair_chains.proven(estimate)
+            best, lower, expanded, _ = astar.search(trellis, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS, ON)
             rows.setdefault(name, []).append((max(1.0 - root / cost, 0.0), expanded, lower > best - solve.PROVEN))
     print(f"A* alone, {len(few)} pairs:                   short of the best   expansions, median and most     proven")
     for name, row in rows.items():
@@ -176,90 +180,93 @@ def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
         print(f"{name:45}{np.median(short):14.2%}{np.median(expanded):19.0f}{max(expanded):12}{sum(proved):13}")
 
 
-def estimates(grid: Grid) -> Iterator[tuple[str, strips.Strips]]:
-    """Bounds of the cost to go, each as tables of strips that A* reads."""
-    back = np.zeros(grid.up_ptr[-1])  # the most that a position can save in the coupling to a kid
+def estimates(trellis: Trellis) -> Iterator[tuple[str, pair_chains.PairChains]]:
+    """Bounds of the cost to go, each as tables of pair chains that A* reads."""
+    back = np.zeros(trellis.up_ptr[-1])  # the most that a position can save in the coupling to a kid
     for u in range(len(back)):
-        back[u] = grid.col_cost[grid.col_ptr[u] : grid.col_ptr[u + 1]].min(initial=0.0)
-    yield "each joint alone, in any number of moves", tables(grid, alone(grid, back, ends_at_goal=True), back)
-    yield "each joint alone, in the moves that are left", tables(grid, alone(grid, back, ends_at_goal=False), back)
-    messages = bound.no_messages(grid)
-    bound.tighten(grid, messages, np.zeros(len(grid.dom_ptr) - 1, np.int64), 160, np.inf)
-    yield "messages", tables(grid, messages.up_row, messages.up_col, messages.constants)
-    cut, through = strips.cut(grid, messages), np.zeros(len(grid.dom))
+        back[u] = trellis.col_cost[trellis.col_ptr[u] : trellis.col_ptr[u + 1]].min(initial=0.0)
+    yield "each joint alone, in any number of moves", tables(trellis, alone(trellis, back, ends_at_goal=True), back)
+    yield (
+        "each joint alone, in the moves that are left",
+        tables(trellis, alone(trellis, back, ends_at_goal=False), back),
+    )
+    messages = bound.no_messages(trellis)
+    bound.tighten(trellis, messages, np.zeros(len(trellis.dom_ptr) - 1, np.int64), 160, np.inf)
+    yield "messages", tables(trellis, messages.up_row, messages.up_col, messages.constants)
+    cut, through = pair_chains.cut(trellis, messages), np.zeros(len(trellis.dom))
     for _ in range(10):
-        strips.sweep(grid, cut, through)
-    yield "strips, 10 sweeps", cut
+        pair_chains.sweep(trellis, cut, through)
+    yield "pair_chains, 10 sweeps", cut
 
 
-def alone(grid: Grid, back: Floats, ends_at_goal: bool) -> Floats:
-    """What each position's lane costs from there on its own [P], couplings at the least that they can cost it."""
-    cost, least = grid.unary.copy(), np.full(len(grid.dom), np.inf)
-    for i in range(grid.lanes, len(grid.dom_ptr) - 1):
-        here = slice(grid.dom_ptr[i], grid.dom_ptr[i + 1])
-        if grid.up_ptr[i + 1] == grid.up_ptr[i]:
+def alone(trellis: Trellis, back: Floats, ends_at_goal: bool) -> Floats:
+    """What each position's chain costs from there on its own [P], couplings at the least that they can cost it."""
+    cost, least = trellis.unary.copy(), np.full(len(trellis.dom), np.inf)
+    for i in range(trellis.chains, len(trellis.dom_ptr) - 1):
+        here = slice(trellis.dom_ptr[i], trellis.dom_ptr[i + 1])
+        if trellis.up_ptr[i + 1] == trellis.up_ptr[i]:
             least[here] = 0.0
             continue
-        a = grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
-        for k, u in enumerate(range(grid.up_ptr[i], grid.up_ptr[i + 1])):
+        a = trellis.dom_ptr[i - i % trellis.chains + trellis.parents[i % trellis.chains]]
+        for k, u in enumerate(range(trellis.up_ptr[i], trellis.up_ptr[i + 1])):
             cost[a + k] += back[u]
             paid = np.full(here.stop - here.start, -back[u])
-            pairs = slice(grid.col_ptr[u], grid.col_ptr[u + 1])
-            paid[grid.col_to[pairs] - here.start] += grid.col_cost[pairs]
+            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
+            paid[trellis.col_to[pairs] - here.start] += trellis.col_cost[pairs]
             least[here] = np.minimum(least[here], paid)
-    goal = grid.dom[grid.dom_ptr[-grid.lanes - 1 : -1]]
-    rest = np.zeros(len(grid.dom))
-    for i in range(len(grid.dom_ptr) - 2 - grid.lanes, -1, -1):
-        for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
-            edges = slice(grid.row_ptr[p], grid.row_ptr[p + 1])
-            to = grid.row_to[edges]
-            rest[p] = (grid.row_cost[edges] + cost[to] + least[to] + rest[to]).min()
-            if ends_at_goal and grid.dom[p] == goal[i % grid.lanes]:
+    goal = trellis.dom[trellis.dom_ptr[-trellis.chains - 1 : -1]]
+    rest = np.zeros(len(trellis.dom))
+    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):
+        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+            edges = slice(trellis.row_ptr[p], trellis.row_ptr[p + 1])
+            to = trellis.row_to[edges]
+            rest[p] = (trellis.row_cost[edges] + cost[to] + least[to] + rest[to]).min()
+            if ends_at_goal and trellis.dom[p] == goal[i % trellis.chains]:
                 rest[p] = min(rest[p], 0.0)
     return rest
 
 
-def tables(grid: Grid, rest: Floats, back: Floats, constants: Floats | None = None) -> strips.Strips:
+def tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> pair_chains.PairChains:
     """The estimate `rest` by position [P] plus `back` by coupling row where only the parent has moved, in A*'s form.
 
     `constants` [n] is what it counts besides for each variable to come.
     """
-    taken = np.zeros(len(grid.dom_ptr) - 1) if constants is None else constants
-    stand = grid.unary - np.repeat(taken, np.diff(grid.dom_ptr))
-    s = strips.cut(grid, bound.no_messages(grid))
-    s.own[:], s.led[:] = grid.row_cost, 0.0
+    taken = np.zeros(len(trellis.dom_ptr) - 1) if constants is None else constants
+    stand = trellis.unary - np.repeat(taken, np.diff(trellis.dom_ptr))
+    s = pair_chains.cut(trellis, bound.no_messages(trellis))
+    s.own[:], s.led[:] = trellis.row_cost, 0.0
     for i in range(len(taken)):
-        lane = i % grid.lanes
-        if lane == 0:
+        chain = i % trellis.chains
+        if chain == 0:
             continue
-        a = i - lane + s.above[lane]
-        here, above = (slice(grid.dom_ptr[k], grid.dom_ptr[k + 1]) for k in (i, a))
+        a = i - chain + s.above[chain]
+        here, above = (slice(trellis.dom_ptr[k], trellis.dom_ptr[k + 1]) for k in (i, a))
         paid = np.zeros((above.stop - above.start, here.stop - here.start)) + stand[here]
         to_go = np.zeros(paid.shape) + rest[here]
         pending = np.zeros(len(paid))
-        for k, u in enumerate(range(grid.up_ptr[i], grid.up_ptr[i + 1])):
-            pairs = slice(grid.col_ptr[u], grid.col_ptr[u + 1])
-            paid[k, grid.col_to[pairs] - here.start] += grid.col_cost[pairs]
+        for k, u in enumerate(range(trellis.up_ptr[i], trellis.up_ptr[i + 1])):
+            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
+            paid[k, trellis.col_to[pairs] - here.start] += trellis.col_cost[pairs]
             pending[k] = back[u]
-        if lane == 1:  # whose strip bears all that the first lane costs
-            edges = slice(grid.row_ptr[above.start], grid.row_ptr[above.stop])
-            s.led[s.led_ptr[i] : s.led_ptr[i + 1]] = grid.row_cost[edges]
+        if chain == 1:  # whose pair chain bears all that the first chain costs
+            edges = slice(trellis.row_ptr[above.start], trellis.row_ptr[above.stop])
+            s.led[s.led_ptr[i] : s.led_ptr[i + 1]] = trellis.row_cost[edges]
             paid += stand[above, None]
             to_go += rest[above, None]
             pending += stand[above] + rest[above]
         s.stand[s.pair_ptr[i] : s.pair_ptr[i + 1]] = paid.ravel()
         s.to_go[s.pair_ptr[i] : s.pair_ptr[i + 1]] = to_go.ravel()
-        if i >= grid.lanes:
-            before = slice(grid.dom_ptr[i - grid.lanes], grid.dom_ptr[i - grid.lanes + 1])
+        if i >= trellis.chains:
+            before = slice(trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1])
             s.half[s.half_ptr[i] : s.half_ptr[i + 1]] = (pending[:, None] + rest[before]).ravel()
     s.stand[s.pair_ptr[1]] += taken.sum()  # which f begins with
     return s
 
 
-def pose(model: Model, ends: Ends, moves: int) -> Grid:
+def pose(model: Model, ends: Ends, moves: int) -> Trellis:
     start, goal = ends
     held = with_waits(model, goal, RULES.wait)
-    return build_grid(held, start, moves, costs_to_go(held, goal, moves), np.inf)
+    return build_trellis(held, start, moves, costs_to_go(held, goal, moves), np.inf)
 
 
 # --- gaps against time -----------------------------------------------------------------------------------------------
@@ -269,7 +276,7 @@ def trade(model: Model, few: list[Ends], plot: Path | None) -> None:
     """Gaps and times of the same pairs as less effort is allowed; no A* but in the last row."""
     rows = [(name, *spend(model, few, *effort, node_budget=1)) for name, effort in EFFORTS]
     rows.append(("and A*", *spend(model, few, *EFFORTS[-1][1], node_budget=RULES.node_budget)))
-    print("effort: sweeps of strips, of messages           median ms   gap: median     worst")
+    print("effort: sweeps of pair_chains, of messages           median ms   gap: median     worst")
     for (name, seconds, gaps), effort in zip(rows, [*(effort for _, effort in EFFORTS), ("all", "all")], strict=True):
         print(f"{name:12}{effort[0]!s:>8}{effort[1]!s:>8}", end="")
         print(f"{1e3 * np.median(seconds):29.1f}{np.median(gaps):14.2%}{max(gaps):10.2%}")
@@ -278,12 +285,12 @@ def trade(model: Model, few: list[Ends], plot: Path | None) -> None:
 
 
 def spend(
-    model: Model, few: list[Ends], strip_sweeps: int, sweeps: int, node_budget: int
+    model: Model, few: list[Ends], pair_chain_sweeps: int, sweeps: int, node_budget: int
 ) -> tuple[list[float], list[float]]:
-    """Seconds and gaps with so many sweeps of messages and of strips, and nodes of A*."""
+    """Seconds and gaps with so many sweeps of messages and of pair chains, and nodes of A*."""
     seconds, gaps = [], []
-    most = solve.STRIP_SWEEPS, solve.MOST_PAIRS
-    solve.STRIP_SWEEPS, solve.MOST_PAIRS = strip_sweeps, most[1] if strip_sweeps else 0
+    most = solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS
+    solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS = pair_chain_sweeps, most[1] if pair_chain_sweeps else 0
     rules = Rules(RULES.wait, RULES.per_move, RULES.shortest, RULES.longest, node_budget, sweeps)
     for start, goal in few:
         began = perf_counter()
@@ -291,7 +298,7 @@ def spend(
         seconds.append(perf_counter() - began)
         assert answer is not None
         gaps.append(gap(answer))
-    solve.STRIP_SWEEPS, solve.MOST_PAIRS = most
+    solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS = most
     return seconds, gaps
 
 
@@ -317,7 +324,7 @@ def drawing(rows: list[tuple[str, float, Floats]]) -> str:
     for share in np.linspace(0.0, most, 5):
         x, y = at(10.0**low, share)
         parts.append(f'<path d="M{x} {y}H{width - 20}" stroke="#ddd"/><text x="4" y="{y + 4}">{share:.1%}</text>')
-    for name, colour in (("messages", "#8a8a8a"), ("strips", "#c0392b"), ("and A*", "#2471a3")):
+    for name, colour in (("messages", "#8a8a8a"), ("pair_chains", "#c0392b"), ("and A*", "#2471a3")):
         mine = [(seconds, gaps) for kind, seconds, gaps in rows if kind == name]
         line = " ".join("{},{}".format(*at(seconds, float(np.median(gaps)))) for seconds, gaps in mine)
         parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/>')
@@ -331,7 +338,7 @@ def drawing(rows: list[tuple[str, float, Floats]]) -> str:
 # --- another solver --------------------------------------------------------------------------------------------------
 
 
-def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], lanes: tuple[str, ...]) -> None:
+def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], chains: tuple[str, ...]) -> None:
     """The problem of as many moves as were found, solved here and by toulbar2."""
     ours, theirs, left, agree, disagree = [], [], [], 0, 0
     for (start, goal), answer in few:
@@ -341,7 +348,7 @@ def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], lanes: tu
         again = solve.solve(model, start, goal, rules)
         ours.append(perf_counter() - began)
         assert again is not None
-        seconds, optimum, short = toulbar2(cfn(model, start, goal, rules, moves, lanes))
+        seconds, optimum, short = toulbar2(cfn(model, start, goal, rules, moves, chains))
         theirs.append(seconds)
         if optimum is None:
             left.append(short)

@@ -17,12 +17,11 @@ from time import process_time
 import numpy as np
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
-from motionmind.search import astar
-from motionmind.search import pair_chains as strips
+from motionmind.search import astar, pair_chains
 from motionmind.search import trws as bound
 from motionmind.search.problem import costs_to_go, with_waits
-from motionmind.search.trellis import build_grid
-from motionmind.tween.problem import price
+from motionmind.search.trellis import build_trellis
+from motionmind.tween.problem import build_model
 
 BUDGETS = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 MOVES = 12
@@ -32,15 +31,15 @@ def grown(folder: Path, budget: int) -> tuple[int, int, int]:
     """Nodes held at most, bytes by which the process grew, and nanoseconds of processor time that an expansion took."""
     clips = (own_skeleton(read_motion(file)) for file in sorted(folder.glob("*.bvh")))
     engine = Engine.fit(clips, name="memory", rate=10.0, skip=1, discretization=make_discretization("codebook", 5.0))
-    model = price(engine.grammar, "conditional", 1.0, 1.0)
+    model = build_model(engine.grammar, "conditional", 1.0, 1.0)
     start, goal = engine.states[[100, 900]].astype(np.int64)
     held = with_waits(model, goal, 1.0)
-    grid = build_grid(held, start, MOVES, costs_to_go(held, goal, MOVES), np.inf)
-    cut = strips.cut(grid, bound.no_messages(grid))  # shares as they come, with nothing evened out
+    trellis = build_trellis(held, start, MOVES, costs_to_go(held, goal, MOVES), np.inf)
+    cut = pair_chains.cut(trellis, bound.no_messages(trellis))  # shares as they come, with nothing evened out
 
     def search(nodes: int) -> int:
-        path, on = np.zeros(len(grid.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(grid, cut, strips.proven(cut), np.inf, path, nodes, nodes // 2, on)[3]
+        path, on = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
+        return astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, nodes, nodes // 2, on)[3]
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -2,10 +2,10 @@
 
     python experiments/search/product.py PATH/TO/cmu-05 [--setting 5,15] [--pairs 12] [--seed 0] [--limit 300000]
 
-Bodies of two to five lanes are cut out of the recordings, and learned as bodies of their own. A node of the product is
-a move and the states of all lanes, an edge each way to move all of them at once. It is made as the search comes to it,
+Bodies of two to five chains are cut out of the recordings, and learned as bodies of their own. A node of the product is
+a move and the states of all chains, an edge each way to move all of them at once. It is made as the search comes to it,
 so that only what is expanded takes time and memory; after `limit` edges networkx is stopped. Its heuristic is what each
-lane costs on its own in the moves that are left, summed: it is consistent, and no less than per-joint Dijkstra. The
+chain costs on its own in the moves that are left, summed: it is consistent, and no less than per-joint Dijkstra. The
 same problems are given to toulbar2, for which whole bodies are too much at 10 postures a second and 5 degrees.
 """
 
@@ -24,13 +24,13 @@ from motionmind import Engine, Motion, Skeleton, make_discretization, own_skelet
 from motionmind.search import solve
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
-from motionmind.tween.problem import price
+from motionmind.tween.problem import build_model
 
-JOINTS = ("pelvis", "left_hip", "left_knee", "left_ankle")  # beside them the facing is a lane
+JOINTS = ("pelvis", "left_hip", "left_knee", "left_ankle")  # beside them the facing is a chain
 SAME = 1e-6  # nats
 WRITTEN = 1e-3  # nats; what is written for toulbar2 is rounded to 1e-6 each
 
-Node = tuple[int, tuple[int, ...]]  # moves made, and the state of each lane
+Node = tuple[int, tuple[int, ...]]  # moves made, and the state of each chain
 Ways = dict[Node, dict[str, float]]
 
 
@@ -54,10 +54,10 @@ class Product(dict[Node, Ways]):
         self._model, self._starts, self._limit = held, model.starts.tolist(), limit
         self.expanded = self.made = 0
         self._discounts = {}
-        for lane in range(len(self._parents)):
-            for state, row in enumerate(range(model.pair_starts[lane], model.pair_starts[lane + 1])):
+        for chain in range(len(self._parents)):
+            for state, row in enumerate(range(model.pair_starts[chain], model.pair_starts[chain + 1])):
                 for q in range(model.pair_ptr[row], model.pair_ptr[row + 1]):
-                    self._discounts[lane, state, int(model.pair_states[q])] = float(model.pair_costs[q])
+                    self._discounts[chain, state, int(model.pair_states[q])] = float(model.pair_costs[q])
 
     def __missing__(self, node: Node) -> Ways:
         self.expanded += 1
@@ -65,21 +65,21 @@ class Product(dict[Node, Ways]):
             return {}
         move, states = node
         ways = {}
-        for step in product(*(self._steps(lane, state, move) for lane, state in enumerate(states))):
+        for step in product(*(self._steps(chain, state, move) for chain, state in enumerate(states))):
             then, costs = zip(*step, strict=True)
             total = sum(costs)
-            for lane, parent in enumerate(self._parents):
+            for chain, parent in enumerate(self._parents):
                 if parent >= 0:
-                    total += self._discounts.get((lane, then[parent], then[lane]), 0.0)
+                    total += self._discounts.get((chain, then[parent], then[chain]), 0.0)
             ways[move + 1, then] = {"weight": total}
             self.made += 1
             if self.made > self._limit:
                 raise LimitError
         return ways
 
-    def _steps(self, lane: int, state: int, move: int) -> list[tuple[int, float]]:
-        """Where a lane can go, and at which cost, if the goal can still be reached from there."""
-        m, first, steps = self._model, self._starts[lane], []
+    def _steps(self, chain: int, state: int, move: int) -> list[tuple[int, float]]:
+        """Where a chain can go, and at which cost, if the goal can still be reached from there."""
+        m, first, steps = self._model, self._starts[chain], []
         for e in range(m.indptr[first + state], m.indptr[first + state + 1]):
             row = first + m.targets[e]
             if self._to_go[self.last[0] - move - 1, row] < np.inf:
@@ -127,7 +127,7 @@ class Compared(NamedTuple):
     by_toulbar2: bool | None
 
 
-def compare(model: Model, pairs: list[Ends], limit: int, lanes: tuple[str, ...]) -> Iterator[Compared]:
+def compare(model: Model, pairs: list[Ends], limit: int, chains: tuple[str, ...]) -> Iterator[Compared]:
     """Each pair's problem in the number of moves that is best."""
     for ends in pairs:
         answer = solve.solve(model, *ends, RULES)
@@ -142,7 +142,7 @@ def compare(model: Model, pairs: list[Ends], limit: int, lanes: tuple[str, ...])
         began = perf_counter()
         cost, expanded, made = best(model, ends, moves, limit)
         theirs = perf_counter() - began
-        outside = toulbar2(cfn(model, *ends, rules, moves, lanes))[1]
+        outside = toulbar2(cfn(model, *ends, rules, moves, chains))[1]
         by_networkx = None if cost is None else abs(cost + RULES.per_move * moves - ours.cost) < SAME
         by_toulbar2 = None if outside is None else abs(outside - ours.cost) < WRITTEN
         yield Compared(seconds, theirs, expanded, made, by_networkx, by_toulbar2)
@@ -163,20 +163,20 @@ def main() -> None:
     rate, tolerance = map(float, options.setting.split(","))
     clips = [own_skeleton(read_motion(file)) for file in sorted(options.folder.glob("*.bvh"))]
     print(
-        "| lanes | networkx: same optimum; another; none | toulbar2 | nodes | edges | networkx / here: median, most |"
+        "| chains | networkx: same optimum; another; none | toulbar2 | nodes | edges | networkx / here: median, most |"
     )
     print("|---|---|---|---|---|---|")
     for count in range(1, len(JOINTS) + 1):
         part = [cut_out(clip, JOINTS[:count]) for clip in clips]
         book = make_discretization("codebook", tolerance)
         engine = Engine.fit(part, name="part", rate=rate, skip=1, discretization=book)
-        model, states = price(engine.grammar, "conditional", 1.0, 1.0), np.asarray(engine.states)
-        lanes = engine.grammar.lanes
-        list(compare(model, list(joinable(model, states, 2, options.seed + 1)), 1000, lanes))  # compiled, or loaded
-        rows = list(compare(model, list(joinable(model, states, options.pairs, options.seed)), options.limit, lanes))
+        model, states = build_model(engine.grammar, "conditional", 1.0, 1.0), np.asarray(engine.states)
+        chains = engine.grammar.chains
+        list(compare(model, list(joinable(model, states, 2, options.seed + 1)), 1000, chains))  # compiled, or loaded
+        rows = list(compare(model, list(joinable(model, states, options.pairs, options.seed)), options.limit, chains))
         ratio = np.array([row.theirs / row.ours for row in rows])
         nodes, edges = np.median([(row.expanded, row.made) for row in rows], axis=0)
-        print(f"| {len(lanes)} | {verdicts([row.by_networkx for row in rows])}", end=" | ")
+        print(f"| {len(chains)} | {verdicts([row.by_networkx for row in rows])}", end=" | ")
         print(f"{verdicts([row.by_toulbar2 for row in rows])} | {nodes:,.0f} | {edges:,.0f}", end=" | ")
         print(f"{np.median(ratio):,.1f}, {ratio.max():,.0f} |", flush=True)
 

@@ -84,7 +84,7 @@ class Leg(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Anatomy:
     """A skeleton with its anatomy.
 
     Attributes:

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from motionmind.body.anatomy import SIDES, Body, Joint, Leg
+from motionmind.body.anatomy import SIDES, Anatomy, Joint, Leg
 from motionmind.body.human import BODIES
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, meant
@@ -41,7 +41,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 @cache
-def body(name: str) -> Body:
+def anatomy_named(name: str) -> Anatomy:
     """A body that comes with MotionMind, such as "human23"; FormatError names those there are."""
     return read_body(_bundled(name))
 
@@ -54,7 +54,7 @@ def _bundled(name: object, path: FilePath | None = None) -> Path:
     return _BODIES / f"{name}.toml"
 
 
-def read_body(path: FilePath) -> Body:
+def read_body(path: FilePath) -> Anatomy:
     """A body from a TOML file; FormatError says what is wrong there."""
     try:
         read = msgspec.convert(_with_angles(_read_table(path)), _File)
@@ -65,7 +65,7 @@ def read_body(path: FilePath) -> Body:
             f"is {read.format!r} version {read.version}; {FORMAT!r} version {VERSION} can be read", path=path
         )
     skeleton = _skeleton(read, path)
-    out = Body(
+    out = Anatomy(
         skeleton,
         {layer: tuple(joints) for layer, joints in read.layers.items()},
         read.joints,
@@ -135,7 +135,7 @@ def _skeleton(read: _File, path: FilePath) -> Skeleton:
     return Skeleton(read.name, tuple(names), parents, offsets, np.array([segment.tip for segment in read.skeleton]))
 
 
-def _check(body: Body, path: FilePath) -> None:
+def _check(body: Anatomy, path: FilePath) -> None:
     """Names that mean something, every joint described, and in one layer of joints of its kind."""
     for joint, anatomy in body.joints.items():
         _check_joint(body, joint, anatomy, path)
@@ -163,7 +163,7 @@ def _check(body: Body, path: FilePath) -> None:
             raise FormatError("[leg]: a body that stands needs the mass of its joints' segments", path=path)
 
 
-def _check_joint(body: Body, joint: str, anatomy: Joint, path: FilePath) -> None:
+def _check_joint(body: Anatomy, joint: str, anatomy: Joint, path: FilePath) -> None:
     stems, where = _stems(body.skeleton), f"[joints.{joint}]"
     if joint not in stems:
         raise FormatError(f"{where}: no such joint{meant(joint, stems)}", path=path)

@@ -9,7 +9,7 @@ from motionmind.body.mirror import MIDDLE, sides_of
 from motionmind.body.skeleton import Skeleton
 
 
-def fork_of(skeleton: Skeleton) -> list[int]:
+def stem_of(skeleton: Skeleton) -> list[int]:
     """The joints from the root to the first fork, where a rig's own root or two may lie above the pelvis."""
     out = [0]
     while len(children := skeleton.children(out[-1])) == 1:
@@ -31,9 +31,9 @@ def limbs_of(skeleton: Skeleton) -> list[list[int]]:
 
 def limb_of_points(skeleton: Skeleton) -> Ints:
     """To which of `limbs_of` each joint belongs, then each tip [2 J]; to one more, the trunk, what belongs to none."""
-    limbs = limbs_of(skeleton)
-    out = np.full(len(skeleton), len(limbs), dtype=np.int64)
-    for number, limb in enumerate(limbs):
+    sided_parts = limbs_of(skeleton)
+    out = np.full(len(skeleton), len(sided_parts), dtype=np.int64)
+    for number, limb in enumerate(sided_parts):
         out[limb] = number
     return np.concatenate([out, out])
 
@@ -44,7 +44,7 @@ def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
 
     What carries the body is its root, down to the first fork, and the limbs that hang there: pelvis and legs.
     """
-    chains, above = limbs_of(skeleton), fork_of(skeleton)
+    chains, above = limbs_of(skeleton), stem_of(skeleton)
     every = list(range(len(skeleton)))
     carrying = [*above, *(joint for chain in chains if skeleton.parents[chain[0]] == above[-1] for joint in chain)]
     carried = [joint for joint in every if joint not in carrying]
@@ -56,7 +56,7 @@ def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
 TRUNK = "trunk"
 
 
-def limbs(skeleton: Skeleton) -> dict[str, Ints]:
+def sided_parts(skeleton: Skeleton) -> dict[str, Ints]:
     """The body's parts: the joints of each limb, under the name of its first joint, and of the trunk.
 
     A limb is a branch of joints of the left or the right side, as it hangs from the middle: two arms and two legs on a

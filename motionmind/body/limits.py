@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.anatomy import Body
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy import Anatomy
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import BODIES
 from motionmind.body.skeleton import Skeleton
 
@@ -49,12 +49,12 @@ def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
     return np.asarray(beyond.mean(axis=0) > RARE)
 
 
-def anatomy_of(skeleton: Skeleton) -> Body | None:
+def anatomy_of(skeleton: Skeleton) -> Anatomy | None:
     """What is known of a body that has the joints of human23 or human44, whatever its proportions."""
-    return next((body(name) for name, make in BODIES.items() if make().names == skeleton.names), None)
+    return next((anatomy_named(name) for name, make in BODIES.items() if make().names == skeleton.names), None)
 
 
-def _limits(anatomy: Body) -> tuple[Floats, Floats]:
+def _limits(anatomy: Anatomy) -> tuple[Floats, Floats]:
     """Least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite where none is said."""
     least = np.full((len(anatomy.skeleton), 3), -np.inf)
     most = -least

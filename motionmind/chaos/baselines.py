@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.limbs import limbs
+from motionmind.body.limbs import sided_parts
 from motionmind.body.skeleton import Skeleton
 from motionmind.chaos.reorder import checked, runs
 from motionmind.errors import MotionMindError
@@ -61,9 +61,9 @@ def dabby(sites: Floats, points: Floats) -> Ints:
 def quadrants(skeleton: Skeleton, count: int, rng: Generator) -> Ints:
     """Body parts shuffled separately, after Merce Cunningham: the posture that each joint is taken from [N, J].
 
-    Every part (see `limbs`) goes through the piece in a random order of its own; its joints stay together.
+    Every part (see `sided_parts`) goes through the piece in a random order of its own; its joints stay together.
     """
     indices = np.empty((count, len(skeleton)), dtype=np.int64)
-    for joints in limbs(skeleton).values():
+    for joints in sided_parts(skeleton).values():
         indices[:, joints] = shuffled(count, rng)[:, None]
     return indices

@@ -198,7 +198,7 @@ def convert(
     can be .bvh, .json, .glb (a skinned body, for Blender and the like), .npz (on SMPL's joints), or .txt, which is on
     human23 (or human44, if IN is) and holds orientations alone. What OUT has no place for is said.
     """
-    from motionmind.formats import lost, write_motion
+    from motionmind.formats import lossy_fields, write_motion
     from motionmind.formats.papers import write_papers
     from motionmind.retarget.joint_mapping import is_human44
     from motionmind.retarget.retarget import to_human23
@@ -216,7 +216,7 @@ def convert(
         write_papers(output, motion, form=form)
     else:
         write_motion(output, motion, unit=out_unit or "cm")
-    if missing := lost(motion, output, source=file):
+    if missing := lossy_fields(motion, output, source=file):
         note(f"{output}: no place for {'; '.join(missing)}")
     click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
 

@@ -30,7 +30,7 @@ def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | Non
 def write(path: Path, thing: Motion | Posture) -> None:
     """Movement into a file, as movement or as a picture, as its suffix says; what it has no place for is said."""
     from motionmind.body.motion import Posture
-    from motionmind.formats import lost, write_motion, write_posture
+    from motionmind.formats import lossy_fields, write_motion, write_posture
     from motionmind.render.pictures import write_picture
 
     motion = thing.as_motion() if isinstance(thing, Posture) else thing
@@ -41,7 +41,7 @@ def write(path: Path, thing: Motion | Posture) -> None:
         write_posture(path, thing)
     else:
         write_motion(path, thing)
-    if missing := lost(motion, path):
+    if missing := lossy_fields(motion, path):
         note(f"{path}: no place for {'; '.join(missing)}")
 
 

@@ -54,7 +54,7 @@ def measure(
     path = None
     if report is not None:
         told = read_report(report)
-        if tuple(told.joints) != engine.corpus.lanes:
+        if tuple(told.joints) != engine.corpus.chains:
             raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints are others")
         path = np.array(told.path, dtype=np.int32)
         if np.any(path < 0) or np.any(path >= engine.space.sizes):

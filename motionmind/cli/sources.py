@@ -60,14 +60,14 @@ def _clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motio
         score = read_score(source)
         written = {clip.name: clip for clip in score.clips}
         return motions(score, [written[name] for name in _chosen(source, list(written), wanted)])
-    from motionmind.learned.model import Learned
+    from motionmind.learned.model import LearnedCorpus
 
     name, clip = in_corpus(source, home)
     if clip is not None:
         if wanted:
             raise MotionMindError(f"{source}: names a clip, and so does --clip; give one of them")
         wanted = [clip]
-    corpus = Learned.load(name, home).corpus
+    corpus = LearnedCorpus.load(name, home).corpus
     clips = {clip.label: clip for clip in corpus.clips}
     return [replace(corpus.motion(clips[label]), name=label) for label in _chosen(source, list(clips), wanted)]
 

@@ -20,7 +20,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 
 Facing = Literal["free", "stage"]
 
-FACING = "facing"  # the lane of the body's turn about the vertical
+FACING = "facing"  # the chain of the body's turn about the vertical
 DEAREST = 100.0  # nats a move backwards; a count of exp(-100) is one that no search will ever pay
 
 
@@ -80,7 +80,7 @@ class Moves:
 
 
 @dataclass(frozen=True)
-class Fault:
+class JointFlip:
     """A joint that turns by `degrees` from one frame of a recording to the next, faster than a body can."""
 
     clip: str
@@ -103,7 +103,7 @@ class Corpus:
         detail: what the postures leave out of the recording [N, K, J, 3]: the rotation vectors, radians, by which it
             departs from the spline through its clip's postures at K moments even in time between each and the next.
         facing: "stage" where the root's full orientation is its state, "free" where its turn about the vertical is
-            taken out of it and is a lane of its own.
+            taken out of it and is a chain of its own.
         rate: postures a second, None where they are keyframes with their own times.
         title: a line on what it is.
         author: who made it.
@@ -125,7 +125,7 @@ class Corpus:
     author: str = ""
     source: str = ""
     licence: str = ""
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[JointFlip, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:
@@ -183,30 +183,30 @@ class Corpus:
         return np.array([clip.weight for clip in self.clips])[self._clip_of]
 
     @cached_property
-    def lanes(self) -> tuple[str, ...]:
+    def chains(self) -> tuple[str, ...]:
         """What moves on its own [L]: the joints, then the facing where it is free."""
         return (*self.skeleton.names, FACING) if self.facing == "free" else self.skeleton.names
 
     @cached_property
-    def lane_parents(self) -> Ints:
-        """Parent lane of each lane [L], -1 for the root and the facing."""
+    def chain_parents(self) -> Ints:
+        """Parent chain of each chain [L], -1 for the root and the facing."""
         free = (-1,) if self.facing == "free" else ()
         return np.array((*self.skeleton.parents, *free), dtype=np.int64)
 
-    def to_lanes(self, rotations: Floats) -> Floats:
-        """Orientations of the lanes [..., L, 4] of postures with local rotations [..., J, 4]."""
+    def to_chains(self, rotations: Floats) -> Floats:
+        """Orientations of the chains [..., L, 4] of postures with local rotations [..., J, 4]."""
         if self.facing == "stage":
             return rotations
         turn = rot.about_vertical(rot.heading(rotations[..., 0, :]))
         tilt = rot.inv_mul(turn, rotations[..., 0, :])
         return np.concatenate([tilt[..., None, :], rotations[..., 1:, :], turn[..., None, :]], axis=-2)
 
-    def from_lanes(self, lanes: Floats) -> Floats:
-        """Local rotations [..., J, 4] from orientations of the lanes [..., L, 4]; the inverse of `to_lanes`."""
+    def from_chains(self, chains: Floats) -> Floats:
+        """Local rotations [..., J, 4] from orientations of the chains [..., L, 4]; the inverse of `to_chains`."""
         if self.facing == "stage":
-            return lanes
-        pelvis = rot.mul(lanes[..., -1, :], lanes[..., 0, :])
-        return np.concatenate([pelvis[..., None, :], lanes[..., 1:-1, :]], axis=-2)
+            return chains
+        pelvis = rot.mul(chains[..., -1, :], chains[..., 0, :])
+        return np.concatenate([pelvis[..., None, :], chains[..., 1:-1, :]], axis=-2)
 
     @cached_property
     def _clip_of(self) -> Int32s:
@@ -231,7 +231,7 @@ class Corpus:
         postures, between = self.motion(clip), self.detail.shape[1]
         if between == 0 or len(clip) == 1:
             return postures
-        times = moments(postures.times, between)
+        times = subdivided(postures.times, between)
         detail = np.zeros((len(times), len(self.skeleton), 3))
         detail[np.arange(len(times)) % (between + 1) > 0] = self.detail[clip.start : clip.stop - 1].reshape(
             -1, len(self.skeleton), 3
@@ -242,7 +242,7 @@ class Corpus:
         return Motion(self.skeleton, rotations, root, times, clip.name)
 
 
-def moments(times: Floats, between: int) -> Floats:
+def subdivided(times: Floats, between: int) -> Floats:
     """Times [N] with so many more between each and the next, even in time [(N - 1) (between + 1) + 1]."""
     share = np.arange(between + 1) / (between + 1)
     return np.append((times[:-1, None] + share * np.diff(times)[:, None]).ravel(), times[-1])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, Fault, moments
+from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, JointFlip, subdivided
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
@@ -45,7 +45,7 @@ class Gathering(TypedDict, total=False):
     licence: str
 
 
-def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[Fault, ...]:
+def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[JointFlip, ...]:
     """Joints that turn by more than `degrees` from one frame to the next, and faster than 3,000 degrees a second.
 
     The second condition spares keyframes and slow cameras, whose frames lie far apart, and quick throws and kicks. A
@@ -54,7 +54,7 @@ def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[Fault, ..
     turned = np.degrees(rot.angle(motion.rotations[:-1], motion.rotations[1:]))
     speed = turned / np.diff(motion.times)[:, None]
     return tuple(
-        Fault(motion.name, motion.skeleton.names[joint], int(frame) + 1, float(turned[frame, joint]))
+        JointFlip(motion.name, motion.skeleton.names[joint], int(frame) + 1, float(turned[frame, joint]))
         for frame, joint in np.argwhere((turned > degrees) & (speed > FLIP_SPEED))
     )
 
@@ -84,7 +84,7 @@ def gather(
         motions: the recordings, named; one of a name that is taken is numbered.
         rate: postures a second; None keeps every frame with its own time.
         skip: frames to drop at each recording's start, such as an added T-pose.
-        facing: "free" takes the turn about the vertical out of the root's state, to be a lane of its own; "stage"
+        facing: "free" takes the turn about the vertical out of the root's state, to be a chain of its own; "stage"
             leaves it there, so that what faces the wall is another state than what faces the public.
         flips: what becomes of a recording with faults (`find_flips`): `split` cuts it there, so that no jump is
             learned, `keep` takes it as it is, `drop` leaves it out.
@@ -224,7 +224,7 @@ def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.f
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
     if between > 0 and count > 1 and recording.fps >= _COARSE:
-        times = moments(postures.times, between)
+        times = subdivided(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
         detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
@@ -235,11 +235,11 @@ def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.f
 
 def _recorded(
     motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
-) -> tuple[list[tuple[Motion, Motion]], list[Fault], Skeleton | None]:
+) -> tuple[list[tuple[Motion, Motion]], list[JointFlip], Skeleton | None]:
     """The recordings without what is skipped, cut at faults, with their postures even in time before them; the faults;
     the first one's body."""
     pieces: list[tuple[Motion, Motion]] = []
-    faults: list[Fault] = []
+    faults: list[JointFlip] = []
     names: set[str] = set()
     first: Motion | None = None
     for recording in motions:
@@ -255,7 +255,7 @@ def _recorded(
         motion = replace(recording.slice(skip, len(recording)), name=_free(recording.name or "clip", names))
         names.add(motion.name)
         found = find_flips(motion, flip_degrees)
-        faults += [Fault(f.clip, f.joint, f.frame + skip, f.degrees) for f in found]
+        faults += [JointFlip(f.clip, f.joint, f.frame + skip, f.degrees) for f in found]
         if found and flips == "drop":
             continue
         cuts = sorted({f.frame for f in found}) if flips == "split" else []

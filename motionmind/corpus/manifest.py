@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from motionmind.corpus.corpus import Clip, Facing, Fault
+from motionmind.corpus.corpus import Clip, Facing, JointFlip
 from motionmind.errors import FormatError
 
 _Schema = TypeVar("_Schema", bound=msgspec.Struct)
@@ -71,7 +71,7 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
 
     skeleton: BodyEntry
     clips: tuple[Clip, ...]
-    faults: tuple[Fault, ...]
+    faults: tuple[JointFlip, ...]
     space: SpaceEntry
 
 

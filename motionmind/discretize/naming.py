@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy import Body, Joint
+from motionmind.body.anatomy import Anatomy, Joint
 from motionmind.discretize.library import Library
 from motionmind.discretize.protocol import check_range, per_joint_values
 from motionmind.errors import MotionMindError
@@ -93,7 +93,7 @@ def _leaders(named: _Named, width: float) -> _Named:
     return chosen
 
 
-def _table(body: Body, joint: str, named: _Named) -> dict[str, str]:
+def _table(body: Anatomy, joint: str, named: _Named) -> dict[str, str]:
     """States as a library has them: turns by name, those of one name numbered."""
     times, out = Counter[str](), dict[str, str]()
     for name, turned in named:

@@ -9,7 +9,7 @@
 | `.txt` | the notation of the papers | the notation of the papers |
 | `.glb` | | motion, posture without animation |
 
-What a format has no place for, `lost` says.
+What a format has no place for, `lossy_fields` says.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, write_atomically
-from motionmind.formats.lost import lost
+from motionmind.formats.lossy import lossy_fields
 
-__all__ = ["lost", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
+__all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
 _READ = (".json", ".bvh", ".amc", ".txt", ".npz")
 _WRITTEN = (".json", ".bvh", ".txt", ".glb", ".npz")

@@ -14,7 +14,7 @@ _CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)")
 
 
 @dataclass
-class Joint:
+class BvhJoint:
     """One ROOT or JOINT of the hierarchy as it stands in the file."""
 
     name: str
@@ -81,7 +81,7 @@ class _Words:
         return [to_number(self.take("a number"), self.path, self.line) for _ in range(3)]
 
 
-def read_hierarchy(lines: list[str], path: FilePath) -> list[Joint]:
+def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
     """The joints of the lines from HIERARCHY up to MOTION, parents before their children.
 
     FormatError names file and line of what is no hierarchy. How deep joints nest does not matter: there is no
@@ -90,7 +90,7 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[Joint]:
     words = _Words(lines, path)
     if not words or words.take("HIERARCHY").upper() != "HIERARCHY":
         raise FormatError("no BVH file: it must begin with HIERARCHY", path=path, line=words.line)
-    joints: list[Joint] = []
+    joints: list[BvhJoint] = []
     open_blocks: list[int] = []  # indices into joints; -1 for an End Site
     while words:
         word = words.take("a joint")
@@ -127,7 +127,7 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[Joint]:
     return joints
 
 
-def _open_joint(kind: str, words: _Words, joints: list[Joint], open_blocks: list[int]) -> None:
+def _open_joint(kind: str, words: _Words, joints: list[BvhJoint], open_blocks: list[int]) -> None:
     """Read the name and brace of a ROOT or JOINT and make it the block that is open."""
     if kind == "ROOT" and joints:
         raise words.error("a second ROOT: a file may hold one figure only")
@@ -138,13 +138,13 @@ def _open_joint(kind: str, words: _Words, joints: list[Joint], open_blocks: list
     name = words.take_name(kind)
     if not name:
         raise FormatError(f"a {kind} without a name", path=words.path, line=line)
-    joints.append(Joint(name, parent, line))
+    joints.append(BvhJoint(name, parent, line))
     if len(joints) > MOST_JOINTS:
         raise words.error(f"more than {MOST_JOINTS} joints are no body")
     open_blocks.append(len(joints) - 1)
 
 
-def _take_channels(words: _Words, joint: Joint) -> list[str]:
+def _take_channels(words: _Words, joint: BvhJoint) -> list[str]:
     count = words.take("the number of channels")
     if not re.fullmatch(r"[0-9]{1,3}", count):
         raise words.error(f"{shown(count)} where the number of channels of {shown(joint.name)} was expected")

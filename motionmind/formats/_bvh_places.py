@@ -56,7 +56,7 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class Body:
+class NormalisedRig:
     """A BVH file's movement on a skeleton of constant offsets, in the file's unit, and what was mended to have it so.
 
     Attributes:
@@ -81,7 +81,7 @@ class Body:
             yield f"joints that move against their parents are kept at their mean place: {listed(far)}"
 
 
-def settle(body: Placed) -> Body:
+def normalise(body: Placed) -> NormalisedRig:
     """The movement with constant offsets that is nearest to `body`."""
     notes: list[str] = []
     if _are_added(body):
@@ -97,7 +97,7 @@ def settle(body: Placed) -> Body:
         for joint, place in body.places.items()
         if joint > 0 and body.stray(joint) > _STILL * span
     ]
-    return Body(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
+    return NormalisedRig(replace(body.skeleton, offsets=offsets), body.rotations, body.place(0), notes, strays)
 
 
 def _are_added(body: Placed) -> bool:

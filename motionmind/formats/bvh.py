@@ -21,8 +21,8 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, shown
 from motionmind.files import FilePath, write_atomically
-from motionmind.formats._bvh_hierarchy import Joint, is_comment, read_hierarchy
-from motionmind.formats._bvh_places import Body, Placed, settle
+from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
+from motionmind.formats._bvh_places import NormalisedRig, Placed, normalise
 from motionmind.formats._clock import even_step
 from motionmind.formats.text import LARGEST, read_lines, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
@@ -80,7 +80,7 @@ def bvh_unit(path: FilePath) -> tuple[str, float]:
     return guess_unit(_read_body(path)[0].skeleton)
 
 
-def _read_body(path: FilePath) -> tuple[Body, Floats]:
+def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
     """The whole file, in its own unit, and the frames' times [T] in seconds."""
     lines = read_lines(path)
     start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
@@ -92,7 +92,7 @@ def _read_body(path: FilePath) -> tuple[Body, Floats]:
         raise FormatError("no joint has CHANNELS: nothing could move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
     values = _read_frames(lines, first, channels, declared, path)
-    body = settle(_assemble(joints, values, Path(path).stem))
+    body = normalise(_assemble(joints, values, Path(path).stem))
     if declared != len(values):
         body.notes.append(
             f"the header says {declared} frames, the file holds {len(values)}; all {len(values)} are read"
@@ -158,7 +158,7 @@ def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, 
     raise FormatError(fault, path=path, line=rows[odd][0])
 
 
-def _assemble(joints: list[Joint], values: Floats, name: str) -> Placed:
+def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
     """Rotations and places of the joints from the channels' values [T, C]."""
     frames = len(values)
     rotations = np.tile(rot.IDENTITY, (frames, len(joints), 1))

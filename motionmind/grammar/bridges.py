@@ -34,14 +34,14 @@ class Bridges:
 
 
 def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
-    """Bridges between the states of each lane, whose orientations are `centres` [G, 4].
+    """Bridges between the states of each chain, whose orientations are `centres` [G, 4].
 
     From every state to its three nearest within 45 degrees, and, both ways, along a minimum spanning tree of the
-    lane's states by angle, so that every state can be reached from every other. What is attested is no bridge.
+    chain's states by angle, so that every state can be reached from every other. What is attested is no bridge.
     """
     indptr, targets, degrees = [np.zeros(1, np.int64)], [], []
-    for lane, size in enumerate(transitions.sizes()):
-        first = transitions.starts[lane]
+    for chain, size in enumerate(transitions.sizes()):
+        first = transitions.starts[chain]
         # Rounded, so that which of equally near states comes first does not hang on the last bit.
         angles = np.asarray(np.degrees(_angles(centres[first : first + size])).round(9), dtype=np.float64)
         near = _nearest(angles) | _spanning_tree(angles)

@@ -28,18 +28,18 @@ PSEUDO_COUNT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Coordination:
-    """-log P(state | parent's state) in nats for all lanes, flat; G states, V pair rows, Q pairs seen.
+    """-log P(state | parent's state) in nats for all chains, flat; G states, V pair rows, Q pairs seen.
 
-    A lane has one pair row for each state of its parent, `pair_starts[lane] + parent's state`; lanes without a parent
-    have none. A pair that is not listed costs `child_costs` of the state + `parent_costs` of the pair row.
+    A chain has one pair row for each state of its parent, `pair_starts[chain] + parent's state`; chains without a
+    parent have none. A pair that is not listed costs `child_costs` of the state + `parent_costs` of the pair row.
 
     Attributes:
-        parents: parent lane [L], or -1.
-        pair_starts: first pair row of each lane [L + 1].
+        parents: parent chain [L], or -1.
+        pair_starts: first pair row of each chain [L + 1].
         pair_ptr: pairs of each pair row [V + 1].
-        pair_states: the lane's state in a pair, increasing within a pair row [Q].
+        pair_states: the chain's state in a pair, increasing within a pair row [Q].
         pair_costs: -log P [Q].
-        child_costs: -log(a m(c)) for each state, 0 in lanes without a parent [G].
+        child_costs: -log(a m(c)) for each state, 0 in chains without a parent [G].
         parent_costs: log(N(p) + a) for each pair row [V].
     """
 
@@ -51,19 +51,19 @@ class Coordination:
     child_costs: Floats
     parent_costs: Floats
 
-    def cost(self, lane: int, above: int, state: int, starts: Ints) -> float:
-        """-log P(state | parent's state `above`) of one lane, nats."""
-        row = self.pair_starts[lane] + above
+    def cost(self, chain: int, above: int, state: int, starts: Ints) -> float:
+        """-log P(state | parent's state `above`) of one chain, nats."""
+        row = self.pair_starts[chain] + above
         first, last = self.pair_ptr[row], self.pair_ptr[row + 1]
         at = first + np.searchsorted(self.pair_states[first:last], state)
         if at < last and self.pair_states[at] == state:
             return float(self.pair_costs[at])
-        return float(self.child_costs[starts[lane] + state] + self.parent_costs[row])
+        return float(self.child_costs[starts[chain] + state] + self.parent_costs[row])
 
-    def table(self, lane: int, starts: Ints) -> Floats:
-        """-log P(c | p) of one lane [states of the parent, states of the lane], nats."""
-        rows = slice(self.pair_starts[lane], self.pair_starts[lane + 1])
-        out = self.parent_costs[rows, None] + self.child_costs[starts[lane] : starts[lane + 1]]
+    def table(self, chain: int, starts: Ints) -> Floats:
+        """-log P(c | p) of one chain [states of the parent, states of the chain], nats."""
+        rows = slice(self.pair_starts[chain], self.pair_starts[chain + 1])
+        out = self.parent_costs[rows, None] + self.child_costs[starts[chain] : starts[chain + 1]]
         for p, row in enumerate(range(rows.start, rows.stop)):
             listed = slice(self.pair_ptr[row], self.pair_ptr[row + 1])
             out[p, self.pair_states[listed]] = self.pair_costs[listed]
@@ -113,7 +113,7 @@ def compile_network(
     """The flat form of a network's CPDs, in the order of `names`; `states` [N, J] and their weights [N] are what the
     network was fitted to, and tell which pairs were seen.
 
-    Lanes that are no node of the network are coupled to nothing.
+    Chains that are no node of the network are coupled to nothing.
     """
     weights = np.ones(len(states)) if weights is None else np.asarray(weights)
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)

@@ -12,17 +12,17 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 
 @dataclass(frozen=True, eq=False)
 class Grammar:
-    """How each lane moves, where it may be bridged, and how lanes coordinate.
+    """How each chain moves, where it may be bridged, and how chains coordinate.
 
     Attributes:
-        lanes: names [L]: the skeleton's joints, then "facing" where the body's turn travels as a lane of its own.
-        centres: orientation of each state of each lane [G, 4].
+        chains: names [L]: the skeleton's joints, then "facing" where the body's turn travels as a chain of its own.
+        centres: orientation of each state of each chain [G, 4].
         transitions: the joint graphs.
         bridges: unattested moves between neighbours.
         coordination: the compiled network.
     """
 
-    lanes: tuple[str, ...]
+    chains: tuple[str, ...]
     centres: Floats
     transitions: Transitions
     bridges: Bridges
@@ -30,7 +30,7 @@ class Grammar:
 
 
 def learn(
-    lanes: tuple[str, ...],
+    chains: tuple[str, ...],
     parents: Ints,
     centres: Floats,
     states: Int32s,
@@ -45,28 +45,28 @@ def learn(
     """Learn from a corpus's postures.
 
     Args:
-        lanes: names [L]; one called "facing" is pooled over where it turns from and coordinates with nothing.
-        parents: parent lane [L], or -1.
-        centres: orientation of each state, lane after lane [sum of sizes, 4].
-        states: state of each lane in each posture [N, L]; every state of a joint occurs.
-        sizes: number of states in each lane [L].
+        chains: names [L]; one called "facing" is pooled over where it turns from and coordinates with nothing.
+        parents: parent chain [L], or -1.
+        centres: orientation of each state, chain after chain [sum of sizes, 4].
+        states: state of each chain in each posture [N, L]; every state of a joint occurs.
+        sizes: number of states in each chain [L].
         begins: postures from which a move leads [M].
         seconds: duration of those moves [M].
         ends: the posture that each move leads to [M]; None for the next one.
         weights: what each move counts [M]; None for 1.
         posture_weights: what each posture counts [N]; None for 1.
     """
-    joints = len(lanes) - (lanes[-1] == "facing")
+    joints = len(chains) - (chains[-1] == "facing")
     transitions = count_transitions(
         states,
         sizes,
         begins,
         seconds,
-        joints if joints < len(lanes) else None,
+        joints if joints < len(chains) else None,
         ends=ends,
         weights=weights,
         posture_weights=posture_weights,
     )
-    network = fit_network(lanes[:joints], parents[:joints], states[:, :joints], sizes[:joints], posture_weights)
-    coordination = compile_network(network, lanes, parents, states, sizes, posture_weights)
-    return Grammar(lanes, centres, transitions, find_bridges(centres, transitions), coordination)
+    network = fit_network(chains[:joints], parents[:joints], states[:, :joints], sizes[:joints], posture_weights)
+    coordination = compile_network(network, chains, parents, states, sizes, posture_weights)
+    return Grammar(chains, centres, transitions, find_bridges(centres, transitions), coordination)

@@ -31,14 +31,14 @@ def fit_progression(
     ends: Ints,
     weights: Floats,
 ) -> Coordination:
-    """The same for every move that a lane may make, in the form of a network whose states are moves.
+    """The same for every move that a chain may make, in the form of a network whose states are moves.
 
-    Lane j has S_j + E_j states there: first one for each state of its joint graph, which stands for being there before
+    Chain j has S_j + E_j states there: first one for each state of its joint graph, which stands for being there before
     any move and is coupled to nothing, then its moves in the order of `targets`.
 
     Args:
-        parents: parent lane [L], or -1.
-        starts: first row of each lane [L + 1].
+        parents: parent chain [L], or -1.
+        starts: first row of each chain [L + 1].
         indptr: moves that leave each state [G + 1].
         targets: where they lead, increasing within a row [E]; all moves of the corpus are among them.
         states: of the corpus's postures [N, L].
@@ -47,33 +47,33 @@ def fit_progression(
         weights: what it counts [M].
     """
     sizes, first_moves = np.diff(starts), indptr[starts]
-    shifted = starts + first_moves  # rows of the lanes where states are moves
+    shifted = starts + first_moves  # rows of the chains where states are moves
     sources = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
     keys = sources * (1 + np.max(sizes, initial=0)) + targets
-    made = {}  # by lane, the move that each of the corpus's is
-    for lane in {*range(len(parents))} - {*np.flatnonzero(parents < 0)} | {*parents[parents >= 0]}:
-        rows = starts[lane] + states[begins, lane].astype(np.int64)
-        made[lane] = np.searchsorted(keys, rows * (1 + np.max(sizes)) + states[ends, lane])
+    made = {}  # by chain, the move that each of the corpus's is
+    for chain in {*range(len(parents))} - {*np.flatnonzero(parents < 0)} | {*parents[parents >= 0]}:
+        rows = starts[chain] + states[begins, chain].astype(np.int64)
+        made[chain] = np.searchsorted(keys, rows * (1 + np.max(sizes)) + states[ends, chain])
 
     child_costs, pair_starts = np.zeros(shifted[-1]), [0]
     pair_counts, pair_states, pair_costs = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
-    for lane, parent in enumerate(parents):
+    for chain, parent in enumerate(parents):
         if parent < 0:
             pair_starts.append(pair_starts[-1])
             continue
-        first, last, stood = first_moves[lane], first_moves[lane + 1], sizes[lane]
-        source = sources[first:last] - starts[lane]
-        seen = np.bincount(made[lane] - first, weights, last - first)
+        first, last, stood = first_moves[chain], first_moves[chain + 1], sizes[chain]
+        source = sources[first:last] - starts[chain]
+        seen = np.bincount(made[chain] - first, weights, last - first)
         alone = np.where(seen > 0.0, seen, PSEUDO_COUNT)
         alone /= np.bincount(source, seen, stood)[source] + PSEUDO_COUNT
-        child_costs[shifted[lane] + stood : shifted[lane + 1]] = -np.log(alone)
+        child_costs[shifted[chain] + stood : shifted[chain + 1]] = -np.log(alone)
 
-        # Every move that leaves a state in which the lane was seen beside a move of its parent, and how often it was.
-        above, below = made[parent] - first_moves[parent], made[lane] - first
+        # Every move that leaves a state in which the chain was seen beside a move of its parent, and how often it was.
+        above, below = made[parent] - first_moves[parent], made[chain] - first
         contexts, which = np.unique(above * stood + source[below], return_inverse=True)
         beside = np.bincount(which, weights, len(contexts))
-        begin = indptr[starts[lane] + contexts % stood] - first
-        count = indptr[starts[lane] + contexts % stood + 1] - first - begin
+        begin = indptr[starts[chain] + contexts % stood] - first
+        count = indptr[starts[chain] + contexts % stood + 1] - first - begin
         context = np.repeat(np.arange(len(contexts)), count)
         within = np.arange(len(context)) - np.repeat(np.cumsum(count) - count, count)
         move = begin[context] + within

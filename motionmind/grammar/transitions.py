@@ -1,7 +1,7 @@
 """Joint graphs: which state follows which in a corpus, how often, and who attests it.
 
-A *lane* is a joint, or the body's facing where that travels on its own. States are numbered from 0 in each lane; state
-s of lane j has the row `starts[j] + s` in flat arrays.
+A *chain* is a joint, or the body's facing where that travels on its own. States are numbered from 0 in each chain;
+state s of chain j has the row `starts[j] + s` in flat arrays.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ Weights = Literal["conditional", "printed"]
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """The joint graphs of L lanes, flat: G states in all, E attested transitions in all.
+    """The joint graphs of L chains, flat: G states in all, E attested transitions in all.
 
     Attributes:
-        starts: first row of each lane [L + 1].
+        starts: first row of each chain [L + 1].
         indptr: transitions of each state [G + 1].
         targets: the state that a transition leads to, increasing within a row [E].
         counts: how often it was seen, each time by the weight of who made it [E].
@@ -46,7 +46,7 @@ class Transitions:
         return np.repeat(np.arange(len(self.visits)), np.diff(self.indptr))
 
     def sizes(self) -> Ints:
-        """Number of states in each lane [L]."""
+        """Number of states in each chain [L]."""
         return np.diff(self.starts)
 
     def weights(self, scheme: Weights, novelty: float = 0.0) -> Floats:
@@ -64,21 +64,23 @@ class Transitions:
         if scheme == "conditional":
             leaving = np.bincount(sources, weights=self.counts, minlength=len(self.visits))
             return np.asarray(np.log(leaving[sources]) - np.log(self.counts))
-        lane = np.searchsorted(self.starts, sources, side="right") - 1
-        lane_of_row = np.repeat(np.arange(len(self.starts) - 1), self.sizes())
-        visited = self.visits / np.bincount(lane_of_row, weights=self.visits)[lane_of_row]
-        moved = self.counts / np.bincount(lane, weights=self.counts)[lane]
-        return np.asarray(-np.log(visited[sources]) + np.log(visited[self.starts[lane] + self.targets]) - np.log(moved))
+        chain = np.searchsorted(self.starts, sources, side="right") - 1
+        chain_of_row = np.repeat(np.arange(len(self.starts) - 1), self.sizes())
+        visited = self.visits / np.bincount(chain_of_row, weights=self.visits)[chain_of_row]
+        moved = self.counts / np.bincount(chain, weights=self.counts)[chain]
+        return np.asarray(
+            -np.log(visited[sources]) + np.log(visited[self.starts[chain] + self.targets]) - np.log(moved)
+        )
 
-    def edge(self, lane: int, state: int, target: int) -> int:
-        """Index of the transition from `state` to `target` in a lane; -1 where it is not attested."""
-        row = self.starts[lane] + state
+    def edge(self, chain: int, state: int, target: int) -> int:
+        """Index of the transition from `state` to `target` in a chain; -1 where it is not attested."""
+        row = self.starts[chain] + state
         first, last = self.indptr[row], self.indptr[row + 1]
         at = int(first + np.searchsorted(self.targets[first:last], target))
         return at if at < last and self.targets[at] == target else -1
 
     def edges(self, path: Int32s) -> Ints:
-        """Indices of the transitions of all lanes in each move of a path of states [T + 1, L]: [T, L], as `edge`."""
+        """Indices of the transitions of all chains in each move of a path of states [T + 1, L]: [T, L], as `edge`."""
         width = int(self.sizes().max()) + 1
         keys = self.sources * width + self.targets  # in order, for rows are, and the targets in each
         asked = (self.starts[:-1] + path[:-1]) * width + path[1:]
@@ -97,15 +99,15 @@ def count_transitions(
     weights: Floats | None = None,
     posture_weights: Floats | None = None,
 ) -> Transitions:
-    """Count the transitions of all lanes.
+    """Count the transitions of all chains.
 
     Args:
-        states: state of each lane in each posture [N, L].
-        sizes: number of states in each lane [L].
+        states: state of each chain in each posture [N, L].
+        sizes: number of states in each chain [L].
         begins: postures from which a move leads, none across clips [M]; of those that attest a transition the first in
             this order is kept.
         seconds: duration of those moves [M].
-        pooled: a lane whose states are equal steps of a circle: what is counted is by how many steps it turns, pooled
+        pooled: a chain whose states are equal steps of a circle: what is counted is by how many steps it turns, pooled
             over where it turns from, and holds from every state alike.
         ends: the posture that each move leads to [M]; None for the next one.
         weights: what each move counts [M]; None for 1.
@@ -114,24 +116,24 @@ def count_transitions(
     ends = begins + 1 if ends is None else ends
     weights = np.ones(len(begins)) if weights is None else weights
     posture_weights = np.ones(len(states)) if posture_weights is None else posture_weights
-    lanes, size = states.shape[1], np.asarray(sizes, dtype=np.int64)
+    chains, size = states.shape[1], np.asarray(sizes, dtype=np.int64)
     sources, targets, counts, attests, arrives, durations, visits = [], [], [], [], [], [], []
-    for lane in range(lanes):
-        src, dst = states[begins, lane].astype(np.int64), states[ends, lane].astype(np.int64)
-        if lane == pooled:
-            src, dst = np.zeros_like(src), (dst - src) % size[lane]
-        keys, first, which = np.unique(src * size[lane] + dst, return_index=True, return_inverse=True)
+    for chain in range(chains):
+        src, dst = states[begins, chain].astype(np.int64), states[ends, chain].astype(np.int64)
+        if chain == pooled:
+            src, dst = np.zeros_like(src), (dst - src) % size[chain]
+        keys, first, which = np.unique(src * size[chain] + dst, return_index=True, return_inverse=True)
         count = np.bincount(which, weights=weights, minlength=len(keys))
         mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / count
-        source, target, visited = keys // size[lane], keys % size[lane], states[:, lane]
-        if lane == pooled:
-            turned = (np.arange(size[lane])[:, None] + target[None, :]) % size[lane]
+        source, target, visited = keys // size[chain], keys % size[chain], states[:, chain]
+        if chain == pooled:
+            turned = (np.arange(size[chain])[:, None] + target[None, :]) % size[chain]
             order = np.argsort(turned, axis=1)
-            source, target = np.repeat(np.arange(size[lane]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
+            source, target = np.repeat(np.arange(size[chain]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
             first, count, mean = first[order].ravel(), count[order].ravel(), mean[order].ravel()
-            visits.append(np.full(size[lane], posture_weights.sum() / size[lane]))
+            visits.append(np.full(size[chain], posture_weights.sum() / size[chain]))
         else:
-            visits.append(np.bincount(visited, weights=posture_weights, minlength=size[lane]))
+            visits.append(np.bincount(visited, weights=posture_weights, minlength=size[chain]))
         sources.append(source)
         targets.append(target)
         counts.append(count)
@@ -139,7 +141,7 @@ def count_transitions(
         arrives.append(ends[first])
         durations.append(mean)
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
-    rows = np.concatenate([starts[lane] + source for lane, source in enumerate(sources)])
+    rows = np.concatenate([starts[chain] + source for chain, source in enumerate(sources)])
     leaving = np.bincount(rows, minlength=starts[-1])
     return Transitions(
         starts,

@@ -26,7 +26,7 @@ class Carriage:
     There are N moments: the postures, then the middle of each of the M moves. A step is half a move, two in each.
 
     Attributes:
-        orientations: of the lanes [N, L, 4].
+        orientations: of the chains [N, L, 4].
         weights: what each moment counts [N].
         begins: moments from which the steps lead [2 M].
         ends: the moment that each leads to [2 M].
@@ -64,8 +64,8 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     heading = rot.heading(corpus.rotations[:, 0])
     turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
     moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
-    lanes = corpus.to_lanes(corpus.rotations)
-    orientations = np.concatenate([lanes, rot.normalise(rot.slerp(lanes[begins], lanes[ends], 0.5))])
+    chains = corpus.to_chains(corpus.rotations)
+    orientations = np.concatenate([chains, rot.normalise(rot.slerp(chains[begins], chains[ends], 0.5))])
     middles = len(corpus) + np.arange(len(begins))
     return Carriage(
         orientations,
@@ -73,7 +73,7 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         np.concatenate([begins, middles]),
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
-        kinds_of(corpus.skeleton, orientations),
+        clusters_of(corpus.skeleton, orientations),
         0.5 * turned,
         0.5 * moved,
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
@@ -107,21 +107,21 @@ def _stands(corpus: Corpus) -> Floats:
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are of one kind
 
 
-def kinds_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
-    """Which kind each part of a body is of in lanes' orientations [N, L, 4]: [N, P], parts as in `parts_of`, kinds from
-    0.
+def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
+    """Which kind each part of a body is of in chains' orientations [N, L, 4]: [N, P], parts as in `parts_of`, kinds
+    from 0.
 
     In the order of the postures one founds a kind unless a founder lies within ALIKE; then each joins the nearest.
     """
     parts = parts_of(skeleton)
     out = np.empty((len(orientations), len(parts)), dtype=np.int32)
     for part, joints in enumerate(parts):
-        out[:, part] = _kinds(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
+        out[:, part] = _clusters(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
     return out
 
 
 @jit
-def _kinds(orientations: Floats, within: float) -> Ints:
+def _clusters(orientations: Floats, within: float) -> Ints:
     founders = np.empty(len(orientations), np.int64)
     out = np.empty(len(orientations), np.int64)
     count = 0

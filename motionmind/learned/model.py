@@ -33,17 +33,17 @@ from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-MOST_STATES = 10_000  # of a joint: its pairs take some 6 GB while they are learned
+MOST_STATES_LEARNED = 10_000  # of a joint: its pairs take some 6 GB while they are learned
 _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
+class LearnedCorpus:
     """What was learned from a corpus.
 
     Attributes:
         corpus: the movement that was learned from.
-        space: the states of each lane.
+        space: the states of each chain.
         states: of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
         carriage: how the corpus's bodies hold themselves, travel and stand.
@@ -93,7 +93,7 @@ class Learned:
     @classmethod
     def learn(cls, corpus: Corpus, discretization: Discretization) -> Self:
         """Learn from a corpus."""
-        orientations = corpus.to_lanes(corpus.rotations)
+        orientations = corpus.to_chains(corpus.rotations)
         joints = corpus.skeleton.names
         space = discretization.fit(joints, orientations[:, : len(joints)])
         space, states = _seen(space, space.assign(orientations[:, : len(joints)]))
@@ -103,8 +103,8 @@ class Learned:
             states = np.concatenate([states, facing[:, None]], axis=1)
         moves = corpus.moves
         grammar = learn(
-            corpus.lanes,
-            corpus.lane_parents,
+            corpus.chains,
+            corpus.chain_parents,
             space.centres,
             states,
             space.sizes,
@@ -198,7 +198,7 @@ class Learned:
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
         space = StateSpace(
-            corpus.lanes,
+            corpus.chains,
             arrays["centres"],
             np.array(states.starts),
             states.kind,
@@ -206,7 +206,7 @@ class Learned:
             states.labels,
         )
         grammar = Grammar(
-            corpus.lanes,
+            corpus.chains,
             arrays["centres"],
             _part(Transitions, "transitions", arrays),
             _part(Bridges, "bridges", arrays),
@@ -247,15 +247,16 @@ def _seen(space: StateSpace, states: States) -> tuple[StateSpace, States]:
 def _check_size(corpus: Corpus, space: StateSpace) -> None:
     """CorpusError where learning, which compares all pairs of a joint's states, would take too much memory."""
     largest = int(np.argmax(space.sizes))
-    if space.sizes[largest] > MOST_STATES:
+    if space.sizes[largest] > MOST_STATES_LEARNED:
         raise CorpusError(
             f"corpus {corpus.name!r}: {space.names[largest]} has {space.sizes[largest]} states within "
-            f"{space.tolerances[largest]:g} degrees, and a joint can have {MOST_STATES}; give it a coarser tolerance"
+            f"{space.tolerances[largest]:g} degrees, and a joint can have {MOST_STATES_LEARNED}; "
+            "give it a coarser tolerance"
         )
 
 
 def _with_facing(space: StateSpace, turns: Floats) -> tuple[StateSpace, States]:
-    """The state space with a lane for the facing, whose states are equal steps of a circle as wide as the root's
+    """The state space with a chain for the facing, whose states are equal steps of a circle as wide as the root's
     tolerance, and the states [N] of the corpus's turns [N, 4] in it."""
     count = max(8, round(360.0 / float(space.tolerances[0])))
     ring = rot.canonical(rot.about_vertical(np.arange(count) * 2.0 * np.pi / count))

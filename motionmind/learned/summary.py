@@ -13,8 +13,8 @@ from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 
 
-def info(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
-    """What a corpus is and how large, as plain values for JSON; states and edges for each lane."""
+def summarise(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
+    """What a corpus is and how large, as plain values for JSON; states and edges for each chain."""
     graph = grammar.transitions
     return {
         "name": corpus.name,
@@ -30,8 +30,8 @@ def info(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "joints": list(corpus.skeleton.names),
         "facing": corpus.facing,
         "rate": corpus.rate,
-        "states": _by_lane(grammar, graph.sizes()),
-        "edges": _by_lane(grammar, np.diff(graph.indptr[graph.starts])),
+        "states": _by_chain(grammar, graph.sizes()),
+        "edges": _by_chain(grammar, np.diff(graph.indptr[graph.starts])),
     }
 
 
@@ -61,10 +61,10 @@ def origins(corpus: Corpus) -> list[dict[str, Any]]:
     ]
 
 
-def check(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
-    """`info`, and how well the corpus hangs together, as plain values for JSON.
+def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
+    """`summarise`, and how well the corpus hangs together, as plain values for JSON.
 
-    `joinable` is the share of random pairs of the corpus's postures such that every lane has attested moves that lead
+    `joinable` is the share of random pairs of the corpus's postures such that every chain has attested moves that lead
     from one state to the other, however many; `out_degree` the mean number of states that a state leads to.
     """
     if pairs < 1:
@@ -74,11 +74,11 @@ def check(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, s
     graph = grammar.transitions
     degree = np.diff(graph.indptr[graph.starts]) / graph.sizes()
     return {
-        **info(corpus, grammar),
+        **summarise(corpus, grammar),
         "joinable": joinable(grammar, states, pairs, seed),
         "pairs": pairs,
         "seed": seed,
-        "out_degree": _by_lane(grammar, np.round(degree, 3)),
+        "out_degree": _by_chain(grammar, np.round(degree, 3)),
         "faults": [
             {"clip": f.clip, "joint": f.joint, "frame": f.frame, "degrees": round(f.degrees, 1)} for f in corpus.faults
         ],
@@ -93,20 +93,20 @@ def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
     graph = grammar.transitions
     drawn = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
     joined = np.ones(pairs, dtype=bool)
-    for lane, size in enumerate(graph.sizes()):
-        first = graph.starts[lane]
+    for chain, size in enumerate(graph.sizes()):
+        first = graph.starts[chain]
         rows = slice(graph.indptr[first], graph.indptr[first + size])
-        lane_graph = csr_array(
+        chain_graph = csr_array(
             (np.ones(rows.stop - rows.start), graph.targets[rows], graph.indptr[first : first + size + 1] - rows.start),
             shape=(size, size),
         )
-        a, b = states[drawn[:, 0], lane], states[drawn[:, 1], lane]
+        a, b = states[drawn[:, 0], chain], states[drawn[:, 1], chain]
         for state in np.unique(a):
             reached = np.zeros(size, dtype=bool)
-            reached[breadth_first_order(lane_graph, state, return_predecessors=False)] = True
+            reached[breadth_first_order(chain_graph, state, return_predecessors=False)] = True
             joined[a == state] &= reached[b[a == state]]
     return float(joined.mean())
 
 
-def _by_lane(grammar: Grammar, values: NDArray[Any]) -> dict[str, Any]:
-    return dict(zip(grammar.lanes, values.tolist(), strict=True))
+def _by_chain(grammar: Grammar, values: NDArray[Any]) -> dict[str, Any]:
+    return dict(zip(grammar.chains, values.tolist(), strict=True))

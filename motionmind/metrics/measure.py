@@ -15,7 +15,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry.splines import natural_spline, rotation_spline
-from motionmind.learned.model import Learned
+from motionmind.learned.model import LearnedCorpus
 from motionmind.metrics.paths import Habits, arrival_spread, find_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
@@ -72,7 +72,7 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
 }
 
 
-def measure(motion: Motion, learned: Learned, path: States | None = None) -> dict[str, Figure]:
+def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) -> dict[str, Figure]:
     """All measures of a movement beside a corpus.
 
     How it moves is seen at 30 frames a second, keyframes joined by splines, as tweens join them. What it says in states
@@ -95,8 +95,8 @@ def measure(motion: Motion, learned: Learned, path: States | None = None) -> dic
     sampled = at_rate(motion)
     if path is None:
         path = _path(motion, learned, step)
-    elif path.ndim != 2 or path.shape[1] != len(corpus.lanes):
-        raise MotionMindError(f"a path through {corpus.name} has {len(corpus.lanes)} lanes, not {path.shape[1:]}")
+    elif path.ndim != 2 or path.shape[1] != len(corpus.chains):
+        raise MotionMindError(f"a path through {corpus.name} has {len(corpus.chains)} chains, not {path.shape[1:]}")
     if len(sampled) < _SHORTEST or len(path) < 2:
         raise MotionMindError(
             f"{motion.name or 'the movement'} is too short to be measured: it takes {_SHORTEST} frames at {RATE:g} a "
@@ -140,7 +140,7 @@ def _on(skeleton: Skeleton, motion: Motion) -> Motion:
     return motion
 
 
-def _path(motion: Motion, learned: Learned, step: float) -> States:
+def _path(motion: Motion, learned: LearnedCorpus, step: float) -> States:
     """The states [T + 1, L] that a movement passes: of its keyframes, or every `step` seconds where it has many frames,
     or move by move where the engine made it."""
     whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
@@ -149,7 +149,7 @@ def _path(motion: Motion, learned: Learned, step: float) -> States:
         postures = motion.at(whole[0].times)
     elif motion.fps * step >= _KEYED:
         postures = motion.resample(1.0 / step)
-    return learned.space.assign(learned.corpus.to_lanes(postures.rotations))
+    return learned.space.assign(learned.corpus.to_chains(postures.rotations))
 
 
 def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
@@ -204,7 +204,9 @@ def _usual_motion(clips: Sequence[Motion], seen: Sequence[Floats], frames: int) 
         yield _motion_figures(clips[number].slice(start, start + frames), styles[number])
 
 
-def _usual_paths(learned: Learned, postures: int, habits: Habits, phrases: Phrasebook) -> Iterator[dict[str, float]]:
+def _usual_paths(
+    learned: LearnedCorpus, postures: int, habits: Habits, phrases: Phrasebook
+) -> Iterator[dict[str, float]]:
     """What a corpus's clips say, in pieces of as many postures."""
     states, clips = np.asarray(learned.states), learned.corpus.clips
     for number, start in _pieces([len(clip) for clip in clips], postures, 2):

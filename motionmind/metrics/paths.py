@@ -1,6 +1,6 @@
 """What a path of states is like beside the corpus: how long, how likely, how much of a cliche.
 
-A path has the states of L lanes in T + 1 postures, int [T + 1, L]. What is said of joints leaves the facing out.
+A path has the states of L chains in T + 1 postures, int [T + 1, L]. What is said of joints leaves the facing out.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from motionmind.grammar.transitions import Transitions
 
 
 def arrivals(path: States) -> Ints:
-    """The number of moves after which each lane is where it stays to the end [L]; 0 for one that never leaves it."""
+    """The number of moves after which each chain is where it stays to the end [L]; 0 for one that never leaves it."""
     return np.asarray(len(path) - np.cumprod(path[::-1] == path[-1], axis=0).sum(axis=0), dtype=np.int64)
 
 
 def arrival_spread(path: States) -> float:
-    """Standard deviation, in moves, of when the lanes that move arrive for good; 0 where fewer than two move.
+    """Standard deviation, in moves, of when the chains that move arrive for good; 0 where fewer than two move.
 
     What [MM] balances lengths for: that all parts of the body arrive together.
     """
@@ -34,7 +34,7 @@ class Habits:
     """What is usual in a corpus, for each of E transitions between G states; holds are no moves here.
 
     Attributes:
-        joints: the number of joints, which are the first lanes.
+        joints: the number of joints, which are the first chains.
         transitions: the joint graphs.
         is_hold: whether a transition stays in its state [E].
         choice: whether at least two different moves lead out of a state [G].
@@ -85,7 +85,7 @@ class Habits:
         before, after = path[:-1, : self.joints], path[1:, : self.joints]
         edges = np.array(
             [
-                [graph.edge(lane, *pair) for lane, pair in enumerate(zip(*rows, strict=True))]
+                [graph.edge(chain, *pair) for chain, pair in enumerate(zip(*rows, strict=True))]
                 for rows in zip(before.tolist(), after.tolist(), strict=True)
             ],
             dtype=np.int64,
@@ -97,20 +97,20 @@ def find_habits(grammar: Grammar) -> Habits:
     """What is usual in the corpus that a grammar was learned from."""
     graph = grammar.transitions
     sources = graph.sources
-    lane = np.searchsorted(graph.starts, sources, side="right") - 1
-    is_hold = sources - graph.starts[lane] == graph.targets
+    chain = np.searchsorted(graph.starts, sources, side="right") - 1
+    is_hold = sources - graph.starts[chain] == graph.targets
     move = ~is_hold
     most, least = np.full(len(graph.visits), -np.inf), np.full(len(graph.visits), np.inf)
     np.maximum.at(most, sources[move], graph.counts[move])
     np.minimum.at(least, sources[move], graph.counts[move])
     percentile = np.full(len(sources), 50.0)
-    for number in range(len(grammar.lanes)):
-        mine = move & (lane == number)
+    for number in range(len(grammar.chains)):
+        mine = move & (chain == number)
         seen, which = np.unique(graph.counts[mine], return_inverse=True)
         share = np.bincount(which, weights=graph.counts[mine], minlength=len(seen))
         percentile[mine] = (100.0 * (np.cumsum(share) - 0.5 * share) / max(share.sum(), 1e-300))[which]
     return Habits(
-        len(grammar.lanes) - (grammar.lanes[-1] == FACING),
+        len(grammar.chains) - (grammar.chains[-1] == FACING),
         graph,
         is_hold,
         np.bincount(sources[move], minlength=len(graph.visits)) > 1,

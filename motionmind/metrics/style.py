@@ -76,7 +76,7 @@ def learn_styles(rows: Mapping[str, Floats]) -> Styles:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class StyleClassifier:
     """Who says, of movement of so many frames, whether it would be taken for a corpus's.
 
     Attributes:
@@ -125,7 +125,7 @@ class Judge:
         return out
 
 
-def find_judge(corpora: Mapping[str, Sequences], frames: int) -> Judge:
+def fit_style_classifier(corpora: Mapping[str, Sequences], frames: int) -> StyleClassifier:
     """A judge of movement of so many frames, at 30 a second.
 
     Raises:
@@ -145,7 +145,7 @@ def find_judge(corpora: Mapping[str, Sequences], frames: int) -> Judge:
         for corpus, sequences in rows.items()
         for name in sequences
     }
-    judge = Judge(corpora, frames, without, dict.fromkeys(corpora, np.inf))
+    judge = StyleClassifier(corpora, frames, without, dict.fromkeys(corpora, np.inf))
     limits = {}
     for corpus in corpora:
         own = [
@@ -156,7 +156,7 @@ def find_judge(corpora: Mapping[str, Sequences], frames: int) -> Judge:
         if not own:
             raise MotionMindError(f"style: {corpus} has no clip of {frames} frames at {RATE:g} a second")
         limits[corpus] = float(np.quantile(own, _OWN))
-    return Judge(corpora, frames, without, limits)
+    return StyleClassifier(corpora, frames, without, limits)
 
 
 def _all(corpus: str, sequences: Mapping[str, Floats], left_out: str | None) -> Floats:

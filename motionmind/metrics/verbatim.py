@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Int32s, Ints, States
-from motionmind.body.limbs import limbs
+from motionmind.body.limbs import sided_parts
 from motionmind.corpus.corpus import Corpus
 
 LONGEST = 5  # states that n-grams have at most
@@ -68,7 +68,7 @@ class Phrasebook:
 def find_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
     """What a corpus, with its postures' states [N, L], says word by word."""
     joints = list(range(len(corpus.skeleton)))
-    parts = [part.tolist() for part in limbs(corpus.skeleton).values()]
+    parts = [part.tolist() for part in sided_parts(corpus.skeleton).values()]
     groups = {"joint": [[joint] for joint in joints], "limb": parts, "body": [joints]}
     grams: list[dict[bytes, int]] = [{} for _ in range(LONGEST)]
     places: dict[bytes, list[int]] = {}

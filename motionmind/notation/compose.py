@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
-from motionmind.body.anatomy import SIDES, Body
+from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import FormatError, listed, meant
 from motionmind.files import FilePath
@@ -99,7 +99,7 @@ class _Posed:
         return _Posed(*(getattr(self, name)[start:stop] for name in self.__dataclass_fields__))
 
 
-def _pose(body: Body, rows: list[Row]) -> _Posed:
+def _pose(body: Anatomy, rows: list[Row]) -> _Posed:
     """Postures as rows describe them, each on the floor or above it as it should be."""
     settings = _settings(body, rows)
     degrees = _degrees(body, settings, len(rows))
@@ -142,7 +142,7 @@ def _pose(body: Body, rows: list[Row]) -> _Posed:
     )
 
 
-def _settings(body: Body, rows: list[Row]) -> dict[tuple[str, str], list[Setting]]:
+def _settings(body: Anatomy, rows: list[Row]) -> dict[tuple[str, str], list[Setting]]:
     """What each limb does in each row, by layer and side; a trunk has no side."""
     out = {}
     for index, (layer, joints) in enumerate(body.layers.items()):
@@ -151,7 +151,7 @@ def _settings(body: Body, rows: list[Row]) -> dict[tuple[str, str], list[Setting
     return out
 
 
-def _degrees(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Floats]:
+def _degrees(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Floats]:
     """Angles [T, 3] of each joint, by its name."""
     out = {name: np.zeros((count, 3)) for name in body.skeleton.names}
     for (_, side), limbs in settings.items():
@@ -163,7 +163,7 @@ def _degrees(body: Body, settings: dict[tuple[str, str], list[Setting]], count: 
     return out
 
 
-def _feet(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> Feet:
+def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> Feet:
     """What the rows say of legs on the floor, in metres and radians."""
     assert body.leg is not None
     layer = next(layer for layer, joints in body.layers.items() if body.leg.hip in joints)
@@ -198,7 +198,7 @@ def _either(legs: list[list[Setting]], key: str, count: int) -> Floats:
     return np.array([sum(values) / max(len(values), 1) for values in said])
 
 
-def _planted(body: Body, settings: dict[tuple[str, str], list[Setting]], count: int) -> tuple[Ints, Bools]:
+def _planted(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> tuple[Ints, Bools]:
     """The last joint of each limb [F], and whether it is planted [T, F]."""
     limbs = [(layer, side) for layer, side in settings if side]
     ends = np.array([body.named(body.layers[layer][-1], side) for layer, side in limbs], dtype=np.int64)
@@ -206,7 +206,7 @@ def _planted(body: Body, settings: dict[tuple[str, str], list[Setting]], count: 
     return ends, planted.reshape(count, len(limbs))
 
 
-def _lifted(body: Body, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
+def _lifted(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
     """How far to lift each posture [T], metres: its lowest point on the floor, or as high as its row says.
 
     Where a leg stands the height is right already, and nothing may be under the floor.
@@ -236,7 +236,7 @@ def _check_reach(rows: list[Row], feet: Feet, short: Floats) -> None:
         raise rows[t].where.error(f"the {SIDES[side]} foot is {far} further from the hip than the leg is long")
 
 
-def _check_limits(body: Body, rows: list[Row], degrees: dict[str, Floats]) -> None:
+def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) -> None:
     """Refuse what no body can do: FormatError names line, joint, angle and limit."""
     for name in body.skeleton.names:
         _, joint = body.anatomy(name)
@@ -258,7 +258,7 @@ def _check_limits(body: Body, rows: list[Row], degrees: dict[str, Floats]) -> No
                 )
 
 
-def _travel(body: Body, name: str, rows: list[Row], posed: _Posed) -> Motion:
+def _travel(body: Anatomy, name: str, rows: list[Row], posed: _Posed) -> Motion:
     """The movement of rows: turned to where they face, and moved so that feet which bear weight stay where they are."""
     turn = rot.about_vertical(np.radians([row.face for row in rows]))
     rotations = posed.rotations.copy()

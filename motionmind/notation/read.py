@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from unicodedata import normalize
 
-from motionmind.body.anatomy import SIDES, Body
-from motionmind.body.anatomy_file import HEADINGS, body, read_body
+from motionmind.body.anatomy import SIDES, Anatomy
+from motionmind.body.anatomy_file import HEADINGS, anatomy_named, read_body
 from motionmind.errors import FormatError, listed, meant
 from motionmind.files import FilePath
 from motionmind.formats.text import read_lines
@@ -112,16 +112,16 @@ def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
         yield head, inner
 
 
-def _body(path: Path, heads: list[Line], included: list[Score]) -> Body:
+def _body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
     """The body that a score names, one that comes with MotionMind or a file beside the score; else its includes'."""
     for head in heads:
         rest = head.text.removeprefix("body").strip()
         if _word(head) == "body":
             try:
-                return read_body(path.parent / rest) if rest.endswith(".toml") else body(rest)
+                return read_body(path.parent / rest) if rest.endswith(".toml") else anatomy_named(rest)
             except FormatError as error:
                 raise head.where.error(str(error)) from None
-    return included[0].body if included else body("human23")
+    return included[0].body if included else anatomy_named("human23")
 
 
 def _heading(score: Score, head: Line, inner: list[Line]) -> None:

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from motionmind.body.anatomy import SIDES, Body
+from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.errors import FormatError, meant
 
 Setting = Mapping[object, float]
@@ -101,7 +101,7 @@ class Score:
     """
 
     path: str
-    body: Body
+    body: Anatomy
     title: str = ""
     tempo: float = 60.0
     positions: dict[str, dict[str, Position]] = field(default_factory=dict)

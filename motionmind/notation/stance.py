@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.anatomy import SIDES, Body, Leg
+from motionmind.body.anatomy import SIDES, Anatomy, Leg
 from motionmind.geometry import rotations as rot
 
 ON_BALL = 24.0  # degrees that the heel is lifted from which on the ball alone carries
@@ -68,7 +68,7 @@ class Stance:
 class _Bones:
     """The segments of the left leg of a body, metres."""
 
-    def __init__(self, body: Body, leg: Leg) -> None:
+    def __init__(self, body: Anatomy, leg: Leg) -> None:
         skeleton = body.skeleton
         chains = [body.leg_joints(leg, side) for side in SIDES]
         self.indices = np.array(chains)
@@ -80,7 +80,7 @@ class _Bones:
         self.heel = np.array(leg.heel)
 
 
-def place(body: Body, leg: Leg, rotations: Floats, feet: Feet) -> Stance:
+def place(body: Anatomy, leg: Leg, rotations: Floats, feet: Feet) -> Stance:
     """Postures [T, J, 4] in the frame that the body faces in, their legs as `feet` says.
 
     The hips are as high as the legs that stand allow with their knees bent as little as they may be, and moved over the

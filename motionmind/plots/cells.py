@@ -39,9 +39,9 @@ from motionmind.plots.symbols import (
     site,
     tint,
 )
-from motionmind.render.anatomy import body_of
+from motionmind.render.body_shape import shape_of
 from motionmind.render.camera import SMOOTH, VIEWS
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import colour, draw, halved, seen
 from motionmind.render.ground import PAPER
 from motionmind.render.trace import outlines, smooth
@@ -230,13 +230,13 @@ class Field:
 
 def _figure(posture: Posture) -> Pixels:
     """A posture as a small picture [FINE h, FINE w, 4], three quarters from the front, with nothing behind it."""
-    body = body_of(posture.skeleton)
+    body = shape_of(posture.skeleton)
     cones, balls = seen(*body.solids(posture.rotations, posture.root), VIEWS["quarter"], posture.root)
     low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
     (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
     scale, rim = SMOOTH * FINE * _FIGURE / body.height, 2 * SMOOTH * FINE
     width, height = (SMOOTH * ceil((length * scale + 2 * rim) / SMOOTH) for length in (right - left, top - bottom))
-    canvas = Canvas(left - rim / scale, top + rim / scale, width, height, scale)
+    canvas = DepthBuffer(left - rim / scale, top + rim / scale, width, height, scale)
     draw(canvas, cones, balls)
     paper = np.full((height, width, 3), PAPER, dtype=np.uint8)
     picture = colour(canvas, body, paper, line=3)

@@ -75,7 +75,7 @@ class Arrow:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class GraphLayout:
     """All that is in a picture of a joint graph."""
 
     width: int
@@ -107,7 +107,7 @@ def write_graph(path: FilePath, graph: nx.DiGraph) -> None:
     write_atomically(path, data.getvalue())
 
 
-def draw(graph: nx.DiGraph) -> Drawing:
+def draw(graph: nx.DiGraph) -> GraphLayout:
     """Lay a joint graph out. States that no transition joins to another are left out, and counted in the heading."""
     shown = [state for state in graph if any(other != state for other in (*graph.succ[state], *graph.pred[state]))]
     visits = np.array([graph.nodes[state]["visits"] for state in shown])
@@ -130,10 +130,10 @@ def draw(graph: nx.DiGraph) -> Drawing:
     right = max([x + r for x, _, r in ends] + [at[0] + _long(n) for n, at in zip(names, words_at, strict=True) if at]
                 + [LETTER * _TITLE * len(heading), _long(legend) + _MARGIN], default=0.0)  # fmt: skip
     bottom = max([y + r for _, y, r in ends], default=_MARGIN + _HEAD)
-    return Drawing(ceil(right + _MARGIN), ceil(bottom + _MARGIN), heading, legend, circles, arrows)
+    return GraphLayout(ceil(right + _MARGIN), ceil(bottom + _MARGIN), heading, legend, circles, arrows)
 
 
-def svg(drawing: Drawing) -> str:
+def svg(drawing: GraphLayout) -> str:
     """The picture as SVG; what is known of a state or a transition shows under the pointer."""
     text = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {drawing.width} {drawing.height}"'
@@ -169,7 +169,7 @@ def svg(drawing: Drawing) -> str:
     return "\n".join([*text, "</g>", "</svg>"]) + "\n"
 
 
-def png(drawing: Drawing) -> bytes:
+def png(drawing: GraphLayout) -> bytes:
     """The picture as PNG."""
     from PIL import Image, ImageDraw
 

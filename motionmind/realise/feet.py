@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.limbs import fork_of, limbs_of
+from motionmind.body.limbs import limbs_of, stem_of
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
@@ -35,7 +35,7 @@ HINGE = 0.1  # sine of a knee's bend below which its axis is rather the one that
 STAY = 0.3  # what it weighs, beside a leg that keeps its length, that the root stays on its way
 
 
-def plant(
+def plant_feet(
     skeleton: Skeleton,
     rotations: Floats,
     root: Floats,
@@ -162,7 +162,7 @@ def _along(legs: Floats, off: Floats) -> Floats:
 def _legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
     """Which limbs are legs; the joints of each from the root down, and which of them is its knee: the one between its
     two long bones."""
-    numbers, out, above = [], [], fork_of(skeleton)[-1]
+    numbers, out, above = [], [], stem_of(skeleton)[-1]
     for number, limb in enumerate(limbs_of(skeleton)):
         bones = np.linalg.norm([*skeleton.offsets[limb[1:]], skeleton.tips[limb[-1]]], axis=-1)
         pairs = np.minimum(bones[:-1], bones[1:])

@@ -13,16 +13,16 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Corpus, moments
+from motionmind.corpus.corpus import Corpus, subdivided
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.detail import detail_of, likest_moves
-from motionmind.realise.feet import plant
-from motionmind.realise.root import carry, lowest, stand
+from motionmind.realise.feet import plant_feet
+from motionmind.realise.root import lowest, root_trajectory, stand
 from motionmind.realise.timeline import durations
-from motionmind.realise.walks import CLOSELY, NEAR, likely, mean_rotations, nearness
+from motionmind.realise.walks import ENDS_WITHIN, FOLLOWS_WITHIN, mean_rotations, nearness, posterior_marginals
 
 RUN = 1.0  # seconds for which a body that turns goes on turning
 
@@ -53,7 +53,7 @@ def realise(
     lower under ends that are, or higher under ends that the corpus knows no such height of.
 
     Args:
-        path: states of the lanes.
+        path: states of the chains.
         a: first posture.
         b: last posture.
         corpus: the movement that was learned from.
@@ -74,17 +74,17 @@ def realise(
         return still, detailed
     keys, times, count = _clock(path, grammar, fps, length)
 
-    # The facing's states are steps of a circle, which the corpus need not show: its lane has no ways but turns.
+    # The facing's states are steps of a circle, which the corpus need not show: its chain has no ways but turns.
     joints = len(a.skeleton)
     postures = {0: a, **through, len(path) - 1: b}
-    stops = {move: corpus.to_lanes(posture.rotations) for move, posture in postures.items()}
+    stops = {move: corpus.to_chains(posture.rotations) for move, posture in postures.items()}
     centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
-    halves = moments(keys, 1)
+    halves = subdivided(keys, 1)
     if within is None and not through and count != len(path) - 1:
         # A path may take more moves than there is time for; the corpus's ways are not to be hurried.
         halves = np.linspace(0.0, keys[-1], 2 * count + 1)
         stops = {0: stops[0], count: stops[len(path) - 1]}
-    poses, stance = _mean_way(a.skeleton, carriage, stops, halves, None if within is None else centres)
+    poses, stance = _mean_walk(a.skeleton, carriage, stops, halves, None if within is None else centres)
     if within is not None:
         inner = np.array([move for move in range(len(path)) if move not in stops], dtype=np.intp)
         poses[2 * inner] = _brought(poses[2 * inner], centres[inner], within)
@@ -93,7 +93,7 @@ def realise(
     steps = stance[:-1, -len(carriage.turn) :] + stance[1:, -len(carriage.turn) :]
     steps /= steps.sum(axis=1, keepdims=True)
     if corpus.facing == "free":
-        facing = {move: lanes[-1] for move, lanes in stops.items()}
+        facing = {move: chains[-1] for move, chains in stops.items()}
         if within is None:
             headings = _turning(steps @ carriage.turn, steps @ carriage.turn**2, halves, facing)
         else:
@@ -102,16 +102,16 @@ def realise(
         rotations = np.concatenate([rotations, turn[:, None]], axis=1)
     else:
         headings = rot.heading(poses[:, 0])
-    rotations = corpus.from_lanes(rotations)
+    rotations = corpus.from_chains(rotations)
     between = corpus.detail.shape[1]
     if between:
         detailed = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], poses[::2])
-        detail = natural_spline(moments(halves[::2], between), detail_of(corpus, detailed), times)
+        detail = natural_spline(subdivided(halves[::2], between), detail_of(corpus, detailed), times)
         rotations = rot.mul(rotations, rot.exp(detail))
     given = np.stack([posture.rotations for posture in postures.values()])
     if within is not None:
         states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-        given = np.concatenate([given, corpus.from_lanes(states)])
+        given = np.concatenate([given, corpus.from_chains(states)])
     rotations = within_limits(a.skeleton, rot.normalise(rotations), given, carriage.loose)
     rotations[0], rotations[-1] = a.rotations, b.rotations
 
@@ -187,17 +187,19 @@ def _on_feet(
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
     middles = 0.5 * (times[1:] + times[:-1])
     held = np.stack([np.interp(middles, halves, limb) for limb in stands.T], axis=1)
-    root = carry(skeleton, rotations, clear, held, np.diff(natural_spline(halves, places, times), axis=0), *ends)
+    root = root_trajectory(
+        skeleton, rotations, clear, held, np.diff(natural_spline(halves, places, times), axis=0), *ends
+    )
     if planted:
         fps = 1.0 / (times[1] - times[0])
-        rotations, root = plant(skeleton, rotations, root, heights, clear, held, loose, fps, fps * halves[given])
+        rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, fps * halves[given])
     else:
         root = stand(skeleton, rotations, root, heights)
     root[0], root[-1] = ends
     return rotations, root
 
 
-def _mean_way(
+def _mean_walk(
     skeleton: Skeleton, carriage: Carriage, stops: Mapping[int, Floats], halves: Floats, path: Floats | None
 ) -> tuple[Floats, Floats]:
     """Mean orientations [2 T + 1, J, 4] of the ways from each of `stops` to the next, near `path` [T + 1, J, 4] if
@@ -225,11 +227,11 @@ def _mean_way(
             shown = np.ascontiguousarray(carriage.orientations[:, part])
             near = np.ones((len(share), known))
             if path is not None and end > start + 1:
-                near[2:-2:2] = [nearness(shown, posture, CLOSELY) for posture in path[start + 1 : end, part]]
-            near[0], near[-1] = (nearness(shown, posture, NEAR) for posture in ends[:, part])
+                near[2:-2:2] = [nearness(shown, posture, FOLLOWS_WITHIN) for posture in path[start + 1 : end, part]]
+            near[0], near[-1] = (nearness(shown, posture, ENDS_WITHIN) for posture in ends[:, part])
             near[0] *= carriage.weights
             kinds = np.ascontiguousarray(carriage.kinds[:, number])
-            ways[number] = likely(carriage.begins, carriage.ends, carriage.shares, kinds, near)
+            ways[number] = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, kinds, near)
             for numbers, some in together.items():
                 if numbers[-1] != number:
                     continue
@@ -244,8 +246,8 @@ def _mean_way(
             if number not in shared:
                 del ways[number]  # those of a large corpus are large
         stance[here] = 0.5 * (ways[0] + ways[1])
-    for move, lanes in stops.items():
-        poses[2 * move] = lanes[:joints]
+    for move, chains in stops.items():
+        poses[2 * move] = chains[:joints]
     return poses, stance
 
 

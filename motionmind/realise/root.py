@@ -16,7 +16,7 @@ SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
 BEARS = 4  # power of how much limbs stand by which they bear the body: of two feet the one that stands the surer
 
 
-def carry(
+def root_trajectory(
     skeleton: Skeleton, rotations: Floats, clearance: Floats, stands: Floats, drift: Floats, a: Floats, b: Floats
 ) -> Floats:
     """Positions [N, 3] of the root from `a` [3] to `b` [3], level; heights are as `stand` makes them.

@@ -14,9 +14,9 @@ def usual(transitions: Transitions) -> float:
 
 
 def durations(path: Int32s, transitions: Transitions) -> Floats:
-    """Seconds of each move [T] of a path of states [T + 1, L]: the median over lanes of what the corpus took for it.
+    """Seconds of each move [T] of a path of states [T + 1, L]: the median over chains of what the corpus took for it.
 
-    Lanes that hold or wait do not vote while others move, for a hold can last any time; bridges have no time of their
+    Chains that hold or wait do not vote while others move, for a hold can last any time; bridges have no time of their
     own. A move that nobody can time takes the median duration of all moves of the corpus.
     """
     out = np.full(len(path) - 1, usual(transitions))

@@ -21,8 +21,8 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry.distances import squared
 from motionmind.jit import jit
 
-NEAR = 0.11  # the same, standard deviation: how near a walk's ends are to the postures that are given
-CLOSELY = 0.13  # the same: how closely a walk follows a path that it is to follow
+ENDS_WITHIN = 0.11  # the same, standard deviation: how near a walk's ends are to the postures that are given
+FOLLOWS_WITHIN = 0.13  # the same: how closely a walk follows a path that it is to follow
 STRAIGHT_ON = 0.7  # share of steps after which a walk goes straight on as its clip does
 ANYWHERE = 0.003  # share after which it goes on from any posture, so that some walk joins any two
 
@@ -40,7 +40,7 @@ def nearness(orientations: Floats, posture: Floats, width: float) -> Floats:
 
 
 @jit
-def likely(begins: Ints, ends: Ints, shares: Floats, kinds: Int32s, near: Floats) -> Floats:
+def posterior_marginals(begins: Ints, ends: Ints, shares: Floats, kinds: Int32s, near: Floats) -> Floats:
     """How likely a walk is in each posture at each move [T + 1, N]; rows sum to 1.
 
     Args:

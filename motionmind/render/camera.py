@@ -10,7 +10,7 @@ from math import ceil, cos, floor, radians, sin
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import ABOVE, View, seen
 from motionmind.render.solids import Cones, Ellipsoids
 
@@ -79,7 +79,7 @@ class Camera:
         towards = np.array(self.view.towards)
         return seen(cones, balls, self.view, self.origin + towards * (towards @ (middle - self.origin)))
 
-    def canvas(self, cones: Cones, balls: Ellipsoids, around: int) -> tuple[Corner, Canvas]:
+    def canvas(self, cones: Cones, balls: Ellipsoids, around: int) -> tuple[Corner, DepthBuffer]:
         """An empty canvas for solids in the view's axes, `around` pixels larger, and its corner in the picture."""
         low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
         (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
@@ -87,7 +87,7 @@ class Camera:
         after_x, after_y = (ceil(edge * self.scale) + around for edge in (right - self.left, self.top - bottom))
         width, height = SMOOTH * (after_x - x), SMOOTH * (after_y - y)
         place = self.left + x / self.scale, self.top - y / self.scale
-        return (x, y), Canvas(*place, width, height, SMOOTH * self.scale)
+        return (x, y), DepthBuffer(*place, width, height, SMOOTH * self.scale)
 
 
 def aim(view: View, origin: Floats, boxes: Floats, points: Floats, least: float, size: int, strip: int) -> Camera:

@@ -8,7 +8,7 @@ from motionmind._typing import Int16s, Singles
 from motionmind.render.solids import EMPTY, Cones, Ellipsoids
 
 
-class Canvas:
+class DepthBuffer:
     """A depth buffer: for each pixel which solid is nearest, how near, and how bright.
 
     Solids are in the viewer's axes, x to the right, y up, z towards the viewer; parallel projection.

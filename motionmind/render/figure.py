@@ -10,8 +10,8 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Pixels
 from motionmind.body.mirror import LEFT, MIDDLE, RIGHT
 from motionmind.geometry import rotations as rot
-from motionmind.render.anatomy import FACE, HAIR, MARK, Body
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.body_shape import FACE, HAIR, MARK, BodyShape
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.solids import Cones, Ellipsoids
 
 COLOURS = {
@@ -73,7 +73,7 @@ def seen(cones: Cones, balls: Ellipsoids, view: View, origin: Floats) -> tuple[C
     )
 
 
-def draw(canvas: Canvas, cones: Cones, balls: Ellipsoids, only: frozenset[int] | None = None) -> None:
+def draw(canvas: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[int] | None = None) -> None:
     """Draw one posture's solids ([N, 3], in the viewer's axes) on a canvas, those numbered in `only` if it is given.
 
     The solids' numbers are those of `Body.parts`.
@@ -88,17 +88,17 @@ def draw(canvas: Canvas, cones: Cones, balls: Ellipsoids, only: frozenset[int] |
     canvas.draw(cones, balls, numbers)
 
 
-def plain(body: Body) -> Floats:
+def plain(body: BodyShape) -> Floats:
     """RGB [N, 3] of a body's solids, from 0 to 255: left is warm, right is cool, the trunk is neutral."""
     return np.array([COLOURS[paint] for paint in body.paints], dtype=np.float64)
 
 
-def inserted(body: Body) -> Floats:
+def inserted(body: BodyShape) -> Floats:
     """RGB [N, 3] of a body's solids where the engine made the movement: violet, left still warmer than right."""
     return np.array([INSERTED[paint] for paint in body.paints], dtype=np.float64)
 
 
-def bridge_balls(body: Body, joints: Floats, which: Bools) -> Ellipsoids:
+def bridge_balls(body: BodyShape, joints: Floats, which: Bools) -> Ellipsoids:
     """Balls around the bridged ones, `which` [J], of a body's joints, which are at `joints` [..., J, 3], metres.
 
     They are larger than the body is there. Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they
@@ -109,7 +109,7 @@ def bridge_balls(body: Body, joints: Floats, which: Bools) -> Ellipsoids:
 
 
 @lru_cache(maxsize=8)
-def _girths(body: Body) -> Floats:
+def _girths(body: BodyShape) -> Floats:
     """Radii [J] in metres of balls that stand out from the solids that the joints are in."""
     skeleton, rest = body.skeleton, np.tile(rot.IDENTITY, (len(body.skeleton), 1))
     cones, balls = body.solids(rest, np.zeros(3))
@@ -125,12 +125,14 @@ def _girths(body: Body) -> Floats:
     return np.asarray(np.maximum(_STANDS_OUT * radii, _LEAST_BALL * body.size))
 
 
-def haze(body: Body) -> tuple[float, float, float]:
+def haze(body: BodyShape) -> tuple[float, float, float]:
     """The depths where haze begins and where it is full, metres in the viewer's axes, and how much white that is."""
     return _DEEP * body.size, -_DEEP * body.size, _HAZE
 
 
-def colour(canvas: Canvas, body: Body, background: Pixels, line: int = 2, paints: Floats | None = None) -> Pixels:
+def colour(
+    canvas: DepthBuffer, body: BodyShape, background: Pixels, line: int = 2, paints: Floats | None = None
+) -> Pixels:
     """The picture [H, W, 3] of what is on a canvas, before a background of the same shape.
 
     The solids have the RGB `paints` [N, 3], `plain(body)` by default; any whose number is beyond those of the body are

@@ -21,7 +21,7 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
-from motionmind.render.stage import HOLD, SLOWEST, Stage, frame_rate, moments
+from motionmind.render.stage import HOLD, SLOWEST, Stage, frame_rate, frame_times
 
 _GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second, at most: by default; and the most that browsers show in time
 _MP4_RATE, _MP4_MOST = 60.0, 120.0
@@ -60,7 +60,7 @@ def write_film(
     rate = min(frame_rate(motion), usual) if fps is None else fps
     if not SLOWEST <= rate <= most:
         raise MotionMindError(f"{path}: a {suffix} has from {SLOWEST:g} to {most:g} frames a second, not {rate:g}")
-    stage = Stage(motion, moments(motion, rate), view=view, size=size, first=first)
+    stage = Stage(motion, frame_times(motion, rate), view=view, size=size, first=first)
     write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
 
 

@@ -11,7 +11,7 @@ from PIL import Image, ImageChops, ImageFilter
 from motionmind._typing import Floats, Pixels, Singles
 from motionmind.body.human import human23
 from motionmind.render.camera import Camera, Corner
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import View, draw, seen
 from motionmind.render.solids import Cones, Ellipsoids
 
@@ -82,7 +82,7 @@ class Ground:
         cones, balls = seen(cones, balls, _UNDER, camera.origin)
         low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
         (left, near), (right, far) = low.min(axis=0) - 3.0 * soft, high.max(axis=0) + 3.0 * soft
-        canvas = Canvas(left, far, ceil((right - left) * fine), ceil((far - near) * fine), fine)
+        canvas = DepthBuffer(left, far, ceil((right - left) * fine), ceil((far - near) * fine), fine)
         draw(canvas, cones, balls)
         touching, over = (self._layer(canvas, fine, *layer) for layer in _LAYERS)
 
@@ -97,7 +97,7 @@ class Ground:
         )
         return Shadow((x, y), np.asarray(laid, dtype=np.float32) / 255.0)
 
-    def _layer(self, canvas: Canvas, fine: float, dark: float, fall: float, soft: float) -> Image.Image:
+    def _layer(self, canvas: DepthBuffer, fine: float, dark: float, fall: float, soft: float) -> Image.Image:
         """One of `_LAYERS`, 255 for black, of what a canvas shows from under the floor, `fine` samples to a metre."""
         cast = dark * np.exp(np.minimum(canvas.depth, 0.0) / np.float32(fall * self._height))  # depth is -height
         image = Image.fromarray(np.round(255.0 * cast).astype(np.uint8))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.files import FilePath, write_atomically
-from motionmind.render.anatomy import Body, body_of
+from motionmind.render.body_shape import BodyShape, shape_of
 from motionmind.render.figure import BRIDGED, COLOURS, INK, INSERTED, bridge_balls
 
 _PLAYER = Path(__file__).parent / "player"
@@ -79,7 +79,7 @@ def _modules(start: str) -> str:
 def _data(motion: Motion, first: int) -> dict[str, Any]:
     """What the player reads; player/README.md says what is what."""
     skeleton = motion.skeleton
-    body = body_of(skeleton)
+    body = shape_of(skeleton)
     return {
         "name": motion.name,
         "first": first,
@@ -109,7 +109,7 @@ def _farthest(motion: Motion) -> list[int]:
     return sorted(found)
 
 
-def _body_data(body: Body) -> dict[str, Any]:
+def _body_data(body: BodyShape) -> dict[str, Any]:
     joints = len(body.skeleton)
     marks = bridge_balls(body, np.zeros((joints, 3)), np.ones(joints, dtype=bool))
     return {

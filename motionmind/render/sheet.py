@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 from motionmind._typing import Floats, Pixels
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
-from motionmind.render.anatomy import Body, body_of
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.body_shape import BodyShape, shape_of
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import (
     ABOVE,
     BRIDGED,
@@ -163,7 +163,7 @@ class _Sheet:
 
     def __init__(self, motion: Motion, frames: list[int], side: View, first: int = 0) -> None:
         self.motion, self.frames, self.first = motion, frames, first
-        self.body: Body = body_of(motion.skeleton)
+        self.body: BodyShape = shape_of(motion.skeleton)
         root = motion.root[frames]
         self.cones, self.balls = self.body.solids(motion.rotations[frames], root)
         self.joints = motion.skeleton.positions(motion.rotations[frames], root)
@@ -186,7 +186,7 @@ class _Sheet:
         )
         halves[1] = max(halves[1], 0.5 * _NARROW / scale)
         self.windows = [_window(view, half, low, high, scale) for view, half in zip((FRONT, side), halves, strict=True)]
-        self.easels: dict[_Window, tuple[Canvas, Pixels]] = {}
+        self.easels: dict[_Window, tuple[DepthBuffer, Pixels]] = {}
         self.plan = _window(ABOVE, halves[0], near, far, scale) if far > near else None
 
     def picture(self, columns: int | None) -> Image.Image:
@@ -249,10 +249,10 @@ class _Sheet:
         pen.line((x, y - arm, x, y + arm), _PLUMB, _SMOOTH)
         return _smooth(image)
 
-    def _colour(self, canvas: Canvas, at: int, background: Pixels) -> Pixels:
+    def _colour(self, canvas: DepthBuffer, at: int, background: Pixels) -> Pixels:
         return colour(canvas, self.body, background, paints=self.paints[int(self.inserted[at])])
 
-    def _easel(self, window: _Window) -> tuple[Canvas, Pixels]:
+    def _easel(self, window: _Window) -> tuple[DepthBuffer, Pixels]:
         """A canvas with nothing on it, the same one for all postures, and what is behind it."""
         if window not in self.easels:
             self.easels[window] = _canvas(window), _background(window)
@@ -325,9 +325,9 @@ class _Sheet:
         return float(np.min(ys)), float(np.max(ys))
 
 
-def _canvas(window: _Window) -> Canvas:
+def _canvas(window: _Window) -> DepthBuffer:
     rows, columns = _SMOOTH * window.height, _SMOOTH * window.width
-    return Canvas(-window.half, window.top, columns, rows, _SMOOTH * window.scale)
+    return DepthBuffer(-window.half, window.top, columns, rows, _SMOOTH * window.scale)
 
 
 def _background(window: _Window) -> Pixels:

@@ -17,9 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 from motionmind._typing import Floats, Pixels, Singles
 from motionmind.body.motion import Insertion, Motion
 from motionmind.errors import MotionMindError
-from motionmind.render.anatomy import body_of
+from motionmind.render.body_shape import shape_of
 from motionmind.render.camera import SMOOTH, VIEWS, Camera, Corner, aim
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import (
     BRIDGED,
     INSERTED,
@@ -49,7 +49,7 @@ _BLOCK = 64  # frames whose solids are placed at once
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class FigurePlate:
     """A body as it stands on the stage, before it is a picture.
 
     Attributes:
@@ -60,7 +60,7 @@ class Drawing:
     """
 
     corner: Corner
-    canvas: Canvas
+    canvas: DepthBuffer
     paints: Floats
 
     @property
@@ -77,7 +77,7 @@ class _Scene:
     insertion: Insertion | None
     backdrop: Pixels
     bare: Singles
-    ghosts: list[Drawing]
+    ghosts: list[FigurePlate]
 
 
 def frame_rate(motion: Motion) -> float:
@@ -85,7 +85,7 @@ def frame_rate(motion: Motion) -> float:
     return motion.fps if motion.fps >= _LEAST_RATE else _RATE
 
 
-def moments(motion: Motion, rate: float) -> Floats:
+def frame_times(motion: Motion, rate: float) -> Floats:
     """When to draw a motion, seconds: evenly from its first posture to its last, both of them among the moments.
 
     They are no closer than at `rate` a second; where the last posture is not on that beat, they lie a little wider.
@@ -117,7 +117,7 @@ class Stage:
 
         Args:
             motion: the movement.
-            times: when to draw it [T], seconds, increasing; `moments` finds them.
+            times: when to draw it [T], seconds, increasing; `frame_times` finds them.
             view: from where: one of `VIEWS`.
             size: height of the picture in pixels; it is less high where the movement is flat.
             first: number of the motion's first frame in what it is a part of.
@@ -131,7 +131,7 @@ class Stage:
             raise MotionMindError(f"a picture is from {SMALLEST} to {LARGEST} whole pixels high, not {size}")
         self._given, self._first = motion, first
         self.motion = motion if times is None else motion.at(times)
-        self.body = body_of(motion.skeleton)
+        self.body = shape_of(motion.skeleton)
         self._paints = plain(self.body), inserted(self.body)
         self._made, self._bridged = self.motion.inserted(), self.motion.bridged()
         self._ends = {id(one): ends for one in motion.insertions if (ends := _ends(motion, one)) is not None}
@@ -167,7 +167,7 @@ class Stage:
         """Paper, floor, and the ghosts of the insertion that goes on at a moment [H, W, 3]; not to be written to."""
         return self._scene(number).backdrop
 
-    def drawing(self, number: int) -> Drawing:
+    def drawing(self, number: int) -> FigurePlate:
         """The body at a moment, in the colours of what the engine made where it made it."""
         made = bool(self._made[number])
         return self._draw(*self._solids(number), self.motion.root[number], self._paints[made])
@@ -176,7 +176,7 @@ class Stage:
         """The body's shadow on the floor at a moment; None where there is no floor."""
         return self.ground.shadow(*self._solids(number)) if self.ground else None
 
-    def ghosts(self, number: int) -> list[Drawing]:
+    def ghosts(self, number: int) -> list[FigurePlate]:
         """The postures between which the engine made the movement that goes on at a moment: A and B, or none."""
         return self._scene(number).ghosts
 
@@ -253,13 +253,13 @@ class Stage:
             balls = balls.joined(bridge_balls(self.body, joints, self._bridged[number]))
         return cones, balls
 
-    def _draw(self, cones: Cones, balls: Ellipsoids, root: Floats, paints: Floats) -> Drawing:
+    def _draw(self, cones: Cones, balls: Ellipsoids, root: Floats, paints: Floats) -> FigurePlate:
         cones, balls = self.camera.solids(cones, balls, root)
         corner, canvas = self.camera.canvas(cones, balls, self.line // SMOOTH + 1)  # room for the line round the body
         draw(canvas, cones, balls)
-        return Drawing(corner, canvas, paints)
+        return FigurePlate(corner, canvas, paints)
 
-    def _paint(self, picture: Pixels, drawing: Drawing, share: float = 1.0) -> None:
+    def _paint(self, picture: Pixels, drawing: FigurePlate, share: float = 1.0) -> None:
         """Put a drawing, or a share of its colours, into a picture."""
         behind = picture[drawing.box]
         samples = behind.repeat(SMOOTH, axis=0).repeat(SMOOTH, axis=1)

@@ -22,7 +22,7 @@ from motionmind.render.camera import SMOOTH, Corner
 from motionmind.render.figure import BRIDGED, INK, STEP, haze
 from motionmind.render.ground import GRID, GROUND, PAPER, SHADOW, Ground
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import GHOST, HOLD, SLOWEST, TRACK, VIOLET, WORDS, Drawing, Stage, moments
+from motionmind.render.stage import GHOST, HOLD, SLOWEST, TRACK, VIOLET, WORDS, FigurePlate, Stage, frame_times
 from motionmind.render.trace import Lines, outlines, path, ridges, smooth
 
 _RATE, _MOST = 12.0, 60.0  # frames a second: by default, as drawn animation has them; and those that screens have
@@ -64,7 +64,7 @@ def svg(motion: Motion, *, fps: float | None = None, view: str = "quarter", size
     """
     if fps is not None and not SLOWEST <= fps <= _MOST:
         raise MotionMindError(f"an SVG has from {SLOWEST:g} to {_MOST:g} frames a second, not {fps:g}")
-    stage = Stage(motion, moments(motion, fps or _RATE), view=view, size=size, first=first)
+    stage = Stage(motion, frame_times(motion, fps or _RATE), view=view, size=size, first=first)
     artist = _Artist(stage)
     width, height = stage.camera.width, stage.camera.height
     text = [
@@ -183,7 +183,7 @@ class _Artist:
         one = self.stage.insertion(number)
         return None if one is None else self.stage.motion.insertions.index(one)
 
-    def _body(self, drawing: Drawing) -> str:
+    def _body(self, drawing: FigurePlate) -> str:
         """A body: its colours, the shades on them, and lines where a part stands before another."""
         solid, depth, shade = drawing.canvas.solid, drawing.canvas.depth, drawing.canvas.shade
         kinds, filled = self.kind_of[solid], solid != EMPTY

@@ -1,7 +1,7 @@
-"""Memory-bounded A* over the variables of a grid, one at a time (operator decomposition).
+"""Memory-bounded A* over the variables of a trellis, one at a time (operator decomposition).
 
-A node fixes the variables up to one; its *frontier* is the last position chosen in each lane, which is all that the
-rest depends on, so nodes with the same variable and frontier are the same node. f grows by `strips.step`.
+A node fixes the variables up to one; its *frontier* is the last position chosen in each chain, which is all that the
+rest depends on, so nodes with the same variable and frontier are the same node. f grows by `pair_chains.step`.
 
 When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
 backed up into it; it is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.pair_chains import Strips, step
-from motionmind.search.trellis import Grid
+from motionmind.search.pair_chains import PairChains, step
+from motionmind.search.trellis import Trellis
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
@@ -35,7 +35,7 @@ class _Nodes(NamedTuple):
     """Up to N nodes and what finds them. `tally` holds the counters above."""
 
     var: Int32s  # the last variable that is fixed [N]
-    frontier: NDArray[np.uint16]  # last choice in each lane, as an index into its domain [N, L]
+    frontier: NDArray[np.uint16]  # last choice in each chain, as an index into its domain [N, L]
     f: Floats  # cost so far + bound on the cost to go [N]
     key: Floats  # what orders the open list: f, or the greater f backed up from forgotten children [N]
     parent: Int32s  # [N]
@@ -50,8 +50,8 @@ class _Nodes(NamedTuple):
 
 @jit
 def search(
-    grid: Grid,
-    s: Strips,
+    trellis: Trellis,
+    s: PairChains,
     bound: float,
     cost: float,
     path: Ints,
@@ -65,7 +65,7 @@ def search(
     `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `s` proves from the start.
     It stops when `ended` [1] is set, from another thread.
     """
-    nodes = _root(grid, bound, budget)
+    nodes = _root(trellis, bound, budget)
     lower = cost
     while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
@@ -76,7 +76,7 @@ def search(
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(grid, s, nodes, node, cost, path)
+        cost, complete = _expand(trellis, s, nodes, node, cost, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -85,26 +85,26 @@ def search(
 
 
 @jit
-def _expand(grid: Grid, s: Strips, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
+def _expand(trellis: Trellis, s: PairChains, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`; the cost then known, and whether all found room."""
-    lanes = grid.lanes
+    chains = trellis.chains
     i = nodes.var[node] + 1
-    lane = i % lanes
-    before = grid.dom_ptr[i - lanes] + nodes.frontier[node, lane]
+    chain = i % chains
+    before = trellis.dom_ptr[i - chains] + nodes.frontier[node, chain]
     floor = nodes.key[node]  # forgetting may back a greater key up into the node before its last child has come
-    for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
-        x = grid.row_to[e]
-        f = nodes.f[node] + step(grid, s, i, nodes.frontier[node], e)
+    for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+        x = trellis.row_to[e]
+        f = nodes.f[node] + step(trellis, s, i, nodes.frontier[node], e)
         key = max(f, floor)
         if key >= cost - SAME:
             continue
-        choice = x - grid.dom_ptr[i]
-        if i == len(grid.dom_ptr) - 2:
+        choice = x - trellis.dom_ptr[i]
+        if i == len(trellis.dom_ptr) - 2:
             cost = f
-            _trace(grid, nodes, node, path)
+            _trace(trellis, nodes, node, path)
             path[i] = x
             continue
-        twin = _find(nodes, node, i, choice, lane)
+        twin = _find(nodes, node, i, choice, chain)
         if twin >= 0:
             # Not by the last bit: of two prefixes that cost the same each could come to stand in for the other's child.
             if nodes.f[twin] <= f + SAME:
@@ -117,19 +117,19 @@ def _expand(grid: Grid, s: Strips, nodes: _Nodes, node: int, cost: float, path: 
         if nodes.tally[_FREE] == 0 and not _forget(nodes, node):
             nodes.key[node] = floor
             return cost, False
-        _add(nodes, node, i, choice, lane, f, key)
+        _add(nodes, node, i, choice, chain, f, key)
     return cost, True
 
 
 @jit
-def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
-    """Room for `budget` nodes, and the one that fixes every lane at its start, open."""
+def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
+    """Room for `budget` nodes, and the one that fixes every chain at its start, open."""
     buckets = 1
     while buckets < budget:
         buckets *= 2
     nodes = _Nodes(
         np.empty(budget, np.int32),
-        np.zeros((budget, grid.lanes), np.uint16),
+        np.zeros((budget, trellis.chains), np.uint16),
         np.empty(budget),
         np.empty(budget),
         np.full(budget, -1, np.int32),
@@ -143,27 +143,27 @@ def _root(grid: Grid, bound: float, budget: int) -> _Nodes:
     )
     nodes.tally[_FREE] = budget - 1
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
-    nodes.var[0], nodes.f[0], nodes.key[0] = grid.lanes - 1, bound, bound
+    nodes.var[0], nodes.f[0], nodes.key[0] = trellis.chains - 1, bound, bound
     _open(nodes, 0)
     return nodes
 
 
-def nodes_in(memory: int, lanes: int) -> int:
+def nodes_in(memory: int, chains: int) -> int:
     """How many nodes `memory` bytes hold at least, with what finds them and what forgetting takes for a while.
 
-    A node has 44 bytes and 2 a lane, less than 8 in the buckets, whose number is a power of two, and 1 that says
+    A node has 44 bytes and 2 a chain, less than 8 in the buckets, whose number is a power of two, and 1 that says
     whether it is kept while others are forgotten.
     """
-    return memory // (44 + 2 * lanes + 8 + 1)
+    return memory // (44 + 2 * chains + 8 + 1)
 
 
 @jit
-def _trace(grid: Grid, nodes: _Nodes, node: int, path: Ints) -> None:
+def _trace(trellis: Trellis, nodes: _Nodes, node: int, path: Ints) -> None:
     """Write the positions that a node and its ancestors chose, the start that the root stands for among them."""
-    path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
+    path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
     while node > 0:
         i = nodes.var[node]
-        path[i] = grid.dom_ptr[i] + nodes.frontier[node, i % grid.lanes]
+        path[i] = trellis.dom_ptr[i] + nodes.frontier[node, i % trellis.chains]
         node = nodes.parent[node]
 
 
@@ -247,25 +247,25 @@ def _forsake(nodes: _Nodes, leaf: int) -> None:
 
 
 @jit
-def _hash(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
-    """Bucket of the frontier of `node` with `choice` in `lane`: FNV-1a over its entries."""
+def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
+    """Bucket of the frontier of `node` with `choice` in `chain`: FNV-1a over its entries."""
     h = np.uint64(14695981039346656037) ^ np.uint64(var)
     for k in range(nodes.frontier.shape[1]):
-        h = (h ^ np.uint64(choice if k == lane else nodes.frontier[node, k])) * np.uint64(1099511628211)
+        h = (h ^ np.uint64(choice if k == chain else nodes.frontier[node, k])) * np.uint64(1099511628211)
     h ^= h >> np.uint64(32)
     return int(h & np.uint64(len(nodes.bucket) - 1))
 
 
 @jit
-def _find(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
-    """The node in memory that fixes `var` with the frontier of `node` and `choice` in `lane`; -1 if none does."""
-    twin = nodes.bucket[_hash(nodes, node, var, choice, lane)]
+def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
+    """The node in memory that fixes `var` with the frontier of `node` and `choice` in `chain`; -1 if none does."""
+    twin = nodes.bucket[_hash(nodes, node, var, choice, chain)]
     while twin >= 0:
-        same = nodes.var[twin] == var and nodes.frontier[twin, lane] == choice
+        same = nodes.var[twin] == var and nodes.frontier[twin, chain] == choice
         for k in range(nodes.frontier.shape[1]):
             if not same:
                 break
-            same = k == lane or nodes.frontier[twin, k] == nodes.frontier[node, k]
+            same = k == chain or nodes.frontier[twin, k] == nodes.frontier[node, k]
         if same:
             return int(twin)
         twin = nodes.following[twin]
@@ -273,18 +273,18 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, lane: int) -> int:
 
 
 @jit
-def _add(nodes: _Nodes, node: int, var: int, choice: int, lane: int, f: float, key: float) -> None:
+def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, key: float) -> None:
     """A new open child of `node`."""
     nodes.tally[_FREE] -= 1
     child = nodes.free[nodes.tally[_FREE]]
     nodes.tally[_NODES] += 1
     nodes.tally[_PEAK] = max(nodes.tally[_PEAK], nodes.tally[_NODES])
     nodes.frontier[child] = nodes.frontier[node]
-    nodes.frontier[child, lane] = choice
+    nodes.frontier[child, chain] = choice
     nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
     nodes.parent[child], nodes.children[child] = node, 0
     nodes.children[node] += 1
-    home = _hash(nodes, child, var, choice, lane)
+    home = _hash(nodes, child, var, choice, chain)
     nodes.following[child] = nodes.bucket[home]
     nodes.bucket[home] = child
     _open(nodes, child)
@@ -293,8 +293,8 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, lane: int, f: float, k
 @jit
 def _drop(nodes: _Nodes, node: int) -> None:
     """Take a closed node without children out of memory."""
-    lane = nodes.var[node] % nodes.frontier.shape[1]
-    home = _hash(nodes, node, nodes.var[node], nodes.frontier[node, lane], lane)
+    chain = nodes.var[node] % nodes.frontier.shape[1]
+    home = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
     if nodes.bucket[home] == node:
         nodes.bucket[home] = nodes.following[node]
     else:

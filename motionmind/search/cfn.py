@@ -12,54 +12,61 @@ from itertools import pairwise
 
 from motionmind._typing import Ints
 from motionmind.search.problem import Model, Rules, Via
-from motionmind.search.trellis import leg_grids
+from motionmind.search.trellis import segment_trellises
 
 DECIMALS = 6
 
 
 def cfn(
-    model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, lanes: Sequence[str], vias: Sequence[Via] = ()
+    model: Model, start: Ints, goal: Ints, rules: Rules, moves: int, chains: Sequence[str], vias: Sequence[Via] = ()
 ) -> str:
     """The problem of exactly `moves` moves from states `start` [L] to `goal` [L], with the costs that are searched.
 
-    Variables are named lane_t and their values after the lane's states, such as "s12", or, where moves are searched,
+    Variables are named chain_t and their values after the chain's states, such as "s12", or, where moves are searched,
     after the number of the move and the state that it leads to, "m40_s12". The optimum is the cost that a certificate
     states, the price of the moves themselves included. `vias` are passed at the moves that they name; where moves are
-    searched, lanes go on from there as variables lane_t_on.
+    searched, chains go on from there as variables chain_t_on.
     """
     stops = [(0, start), *((via.move or 0, via.states) for via in vias), (moves, goal)]
-    grids = leg_grids(model, goal, rules.wait, stops)
+    trellises = segment_trellises(model, goal, rules.wait, stops)
     variables: dict[str, list[str]] = {}
 
     def functions() -> Iterator[tuple[str, list[str], dict[str, object]]]:
         yield "moves", [], {"costs": [_round(rules.per_move * moves)]}
-        for (first, _), grid in zip(stops, grids, strict=False):
-            domains = [slice(*span) for span in pairwise(grid.dom_ptr)]
-            names = [f"{lanes[i % grid.lanes]}_{first + i // grid.lanes}" for i in range(len(grid.dom_ptr) - 1)]
-            values = [[_value(model, i % grid.lanes, int(s)) for s in grid.dom[d]] for i, d in enumerate(domains)]
-            if first > 0:  # a leg starts where the one before ends, which is in the same states unless these are moves
-                starts = zip(names[: grid.lanes], values, strict=False)
-                names[: grid.lanes] = [name if variables[name] == here else f"{name}_on" for name, here in starts]
+        for (first, _), trellis in zip(stops, trellises, strict=False):
+            domains = [slice(*span) for span in pairwise(trellis.dom_ptr)]
+            names = [
+                f"{chains[i % trellis.chains]}_{first + i // trellis.chains}" for i in range(len(trellis.dom_ptr) - 1)
+            ]
+            values = [
+                [_value(model, i % trellis.chains, int(s)) for s in trellis.dom[d]] for i, d in enumerate(domains)
+            ]
+            if (
+                first > 0
+            ):  # a segment starts where the one before ends, which is in the same states unless these are moves
+                starts = zip(names[: trellis.chains], values, strict=False)
+                names[: trellis.chains] = [name if variables[name] == here else f"{name}_on" for name, here in starts]
             for i, name in enumerate(names):
-                lane = i % grid.lanes
-                if name not in variables:  # what a leg starts with, the leg before has paid for
+                chain = i % trellis.chains
+                if name not in variables:  # what a segment starts with, the segment before has paid for
                     variables[name] = values[i]
-                    yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in grid.unary[domains[i]]]}
-                if i + grid.lanes < len(names):
-                    after = i + grid.lanes
+                    yield f"stand_{name}", [name], {"costs": [_round(cost) for cost in trellis.unary[domains[i]]]}
+                if i + trellis.chains < len(names):
+                    after = i + trellis.chains
                     rows = range(domains[i].start, domains[i].stop)
-                    edges = [(p, e) for p in rows for e in range(grid.row_ptr[p], grid.row_ptr[p + 1])]
+                    edges = [(p, e) for p in rows for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1])]
                     listed = [
-                        (p - domains[i].start, grid.row_to[e] - domains[after].start, grid.row_cost[e])
+                        (p - domains[i].start, trellis.row_to[e] - domains[after].start, trellis.row_cost[e])
                         for p, e in edges
                     ]
                     yield f"move_{name}", [name, names[after]], {"defaultcost": None, "costs": _flat(listed)}
-                if grid.up_ptr[i + 1] > grid.up_ptr[i]:
-                    above = i - lane + grid.parents[lane]
-                    couplings = range(grid.up_ptr[i], grid.up_ptr[i + 1])
-                    pairs = [(u, q) for u in couplings for q in range(grid.col_ptr[u], grid.col_ptr[u + 1])]
+                if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+                    above = i - chain + trellis.parents[chain]
+                    couplings = range(trellis.up_ptr[i], trellis.up_ptr[i + 1])
+                    pairs = [(u, q) for u in couplings for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1])]
                     listed = [
-                        (u - couplings.start, grid.col_to[q] - domains[i].start, grid.col_cost[q]) for u, q in pairs
+                        (u - couplings.start, trellis.col_to[q] - domains[i].start, trellis.col_cost[q])
+                        for u, q in pairs
                     ]
                     yield f"coordinate_{name}", [names[above], name], {"defaultcost": 0.0, "costs": _flat(listed)}
 
@@ -81,8 +88,8 @@ def cfn(
     )
 
 
-def _value(model: Model, lane: int, state: int) -> str:
-    place = model.place[model.starts[lane] + state]
+def _value(model: Model, chain: int, state: int) -> str:
+    place = model.place[model.starts[chain] + state]
     return f"s{state}" if place == state else f"m{state}_s{place}"
 
 

@@ -1,7 +1,8 @@
-"""A way in legs, from stop to stop, when all lanes are known at every stop: what is known of each leg, put together.
+"""A way in segments, from stop to stop, when all chains are known at every stop: what is known of each segment, put
+together.
 
-What a leg costs then depends on its own moves alone, so a path of N moves in K legs costs the sum over k of what leg k
-costs in n_k moves, with n_1 + ... + n_K = N. Least costs of all splits are min-plus convolutions.
+What a segment costs then depends on its own moves alone, so a path of N moves in K segments costs the sum over k of
+what segment k costs in n_k moves, with n_1 + ... + n_K = N. Least costs of all splits are min-plus convolutions.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ import numpy as np
 from motionmind._typing import Floats, States
 
 
-class Legs:
-    """What is known of K legs at each number of moves up to N.
+class Segments:
+    """What is known of K segments at each number of moves up to N.
 
     Attributes:
-        lower: no path of leg k with n moves costs less [K, N + 1].
+        lower: no path of segment k with n moves costs less [K, N + 1].
         best: the least cost of a whole path that is known.
     """
 
@@ -25,7 +26,7 @@ class Legs:
         """Nothing but bounds.
 
         Args:
-            lower: the bounds [K, N + 1], infinite where a leg cannot have as many moves.
+            lower: the bounds [K, N + 1], infinite where a segment cannot have as many moves.
             shortest: least number of moves of the whole; N is the greatest.
             at: the moves at which the K - 1 stops are passed, None for any.
         """
@@ -42,51 +43,51 @@ class Legs:
         return min(float((self.lower + self._others(self.lower)).min()), self.best)
 
     def most_promising(self) -> tuple[int, int, float, float]:
-        """Of what has not been looked at the leg and its number of moves that may be part of the cheapest path.
+        """Of what has not been looked at the segment and its number of moves that may be part of the cheapest path.
 
-        With it come the least that such a path may cost, and the cost below which the leg is better than it is known to
-        be and part of a better path than the best known.
+        With it come the least that such a path may cost, and the cost below which the segment is better than it is
+        known to be and part of a better path than the best known.
         """
         others = self._others(self.lower)
         through = np.where(self._unseen, self.lower + others, np.inf)
-        leg, moves = map(int, np.unravel_index(through.argmin(), through.shape))
-        below = min(self.best - float(others[leg, moves]), float(self._cost[leg, moves]))
-        return leg, moves, float(through[leg, moves]), below
+        segment, moves = map(int, np.unravel_index(through.argmin(), through.shape))
+        below = min(self.best - float(others[segment, moves]), float(self._cost[segment, moves]))
+        return segment, moves, float(through[segment, moves]), below
 
     def reopen(self, left: Iterable[tuple[int, int]]) -> None:
-        """Have just these legs and numbers of moves looked at, again."""
+        """Have just these segments and numbers of moves looked at, again."""
         self._unseen[:] = False
-        for leg, moves in left:
-            self._unseen[leg, moves] = True
+        for segment, moves in left:
+            self._unseen[segment, moves] = True
 
-    def learn(self, leg: int, moves: int, lower: float, cost: float, path: States) -> None:
-        """Take in what looking at a leg gave: a bound, and a path [n + 1, L] with its cost, or an empty one."""
-        self._unseen[leg, moves] = False
-        self.lower[leg, moves] = max(self.lower[leg, moves], lower)
-        if len(path) > 0 and cost < self._cost[leg, moves]:
-            self._cost[leg, moves], self._paths[leg, moves] = cost, path
+    def learn(self, segment: int, moves: int, lower: float, cost: float, path: States) -> None:
+        """Take in what looking at a segment gave: a bound, and a path [n + 1, L] with its cost, or an empty one."""
+        self._unseen[segment, moves] = False
+        self.lower[segment, moves] = max(self.lower[segment, moves], lower)
+        if len(path) > 0 and cost < self._cost[segment, moves]:
+            self._cost[segment, moves], self._paths[segment, moves] = cost, path
             self.best = min(self.best, float((self._cost + self._others(self._cost)).min()))
 
     def path(self) -> tuple[States, tuple[int, ...]]:
         """The best path [N + 1, L], and the moves at which it passes its stops."""
         cost, pieces = self._cost.copy(), []
-        for leg in range(len(cost)):
-            moves = int((cost + self._others(cost))[leg].argmin())
-            cost[leg, np.arange(cost.shape[1]) != moves] = np.inf
-            pieces.append(self._paths[leg, moves])
+        for segment in range(len(cost)):
+            moves = int((cost + self._others(cost))[segment].argmin())
+            cost[segment, np.arange(cost.shape[1]) != moves] = np.inf
+            pieces.append(self._paths[segment, moves])
         stops = np.cumsum([len(piece) - 1 for piece in pieces[:-1]])
         return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])]), tuple(map(int, stops))
 
     def _others(self, table: Floats) -> Floats:
-        """The least that all other legs cost together when a leg has as many moves [K, N + 1]."""
+        """The least that all other segments cost together when a segment has as many moves [K, N + 1]."""
         before = [np.where(np.arange(table.shape[1]) == 0, 0.0, np.inf)]
         for costs, at in zip(table[:-1], self._at, strict=True):
             before.append(_joined(before[-1], costs) + at)
         after, out = self._total, np.empty_like(table)
-        for leg in range(len(table) - 1, -1, -1):
-            out[leg] = _joined(before[leg], after[::-1])[::-1]
-            if leg:
-                after = _joined(table[leg], after[::-1])[::-1] + self._at[leg - 1]
+        for segment in range(len(table) - 1, -1, -1):
+            out[segment] = _joined(before[segment], after[::-1])[::-1]
+            if segment:
+                after = _joined(table[segment], after[::-1])[::-1] + self._at[segment - 1]
         return out
 
 

@@ -1,7 +1,7 @@
-"""A lower bound on the cost of a grid, and on the cost to go from any partial path: tree-reweighted messages.
+"""A lower bound on the cost of a trellis, and on the cost to go from any partial path: tree-reweighted messages.
 
 Source: Kolmogorov, "Convergent tree-reweighted message passing for energy minimization", IEEE TPAMI 28(10), 2006.
-Variables are ordered by move, then by lane. Each carries gamma = 1 / max(edges in, edges out); a sweep visits all in
+Variables are ordered by move, then by chain. Each carries gamma = 1 / max(edges in, edges out); a sweep visits all in
 order, or in reverse, and sends from variable a along each edge (a, b) that leads on
 
     M(a -> b)(x_b) = min over x_a of  gamma_a * theta_a(x_a) - M(b -> a)(x_a) + theta_ab(x_a, x_b)
@@ -36,15 +36,15 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.trellis import Grid
+from motionmind.search.trellis import Trellis
 
 
 class Messages(NamedTuple):
-    """Messages of a grid, P positions and U coupling rows, and what the backward sweep took out.
+    """Messages of a trellis, P positions and U coupling rows, and what the backward sweep took out.
 
     Attributes:
-        down_row: to each position from its lane's variable one move before [P].
-        up_row: to each position from its lane's variable one move after [P].
+        down_row: to each position from its chain's variable one move before [P].
+        up_row: to each position from its chain's variable one move after [P].
         down_col: to each position from its parent variable [P].
         up_col: to each position of its parent variable from a variable, by coupling row [U].
         constants: taken out at each variable by the backward sweep [n].
@@ -64,41 +64,41 @@ class Messages(NamedTuple):
     through: Floats
 
 
-def no_messages(grid: Grid) -> Messages:
+def no_messages(trellis: Trellis) -> Messages:
     """Messages of zero: the bound they give is the sum of each variable's minimum."""
-    count = len(grid.dom)
+    count = len(trellis.dom)
     return Messages(
         np.zeros(count),
         np.zeros(count),
         np.zeros(count),
-        np.zeros(grid.up_ptr[-1]),
-        np.zeros(len(grid.dom_ptr) - 1),
-        np.zeros(len(grid.dom_ptr) - 1),
+        np.zeros(trellis.up_ptr[-1]),
+        np.zeros(len(trellis.dom_ptr) - 1),
+        np.zeros(len(trellis.dom_ptr) - 1),
         np.zeros(count),
         np.zeros(count),
     )
 
 
 @jit
-def _ahead(grid: Grid, m: Messages, i: int) -> None:
+def _ahead(trellis: Trellis, m: Messages, i: int) -> None:
     """A variable's own cost and all that later variables sent to it, into `ahead`."""
-    lanes, lane = grid.lanes, i % grid.lanes
-    first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
+    chains, chain = trellis.chains, i % trellis.chains
+    first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
     for p in range(first, last):
-        m.ahead[p] = grid.unary[p] + m.up_row[p]
-    if i >= lanes:
-        for child in range(lane + 1, lanes):
-            if grid.parents[child] == lane:
-                base = grid.up_ptr[i - lane + child]
+        m.ahead[p] = trellis.unary[p] + m.up_row[p]
+    if i >= chains:
+        for child in range(chain + 1, chains):
+            if trellis.parents[child] == chain:
+                base = trellis.up_ptr[i - chain + child]
                 for p in range(first, last):
                     m.ahead[p] += m.up_col[base + p - first]
 
 
 @jit
-def _theta(grid: Grid, m: Messages, i: int) -> Floats:
+def _theta(trellis: Trellis, m: Messages, i: int) -> Floats:
     """The variable's own cost plus all messages to it, their minimum (its constant) taken out."""
-    first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
-    _ahead(grid, m, i)
+    first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
+    _ahead(trellis, m, i)
     theta = np.empty(last - first)
     for p in range(first, last):
         theta[p - first] = m.ahead[p] + m.down_row[p] + m.down_col[p]
@@ -108,106 +108,108 @@ def _theta(grid: Grid, m: Messages, i: int) -> Floats:
 
 
 @jit
-def _gamma(grid: Grid, i: int) -> float:
+def _gamma(trellis: Trellis, i: int) -> float:
     """1 / max(edges in, edges out) of a variable."""
-    lanes, lane = grid.lanes, i % grid.lanes
-    edges_in = 0 if i < lanes else 1 if grid.parents[lane] < 0 else 2
-    edges_out = 1 if i < lanes * grid.moves else 0
-    if i >= lanes:
-        for child in range(lane + 1, lanes):
-            if grid.parents[child] == lane:
+    chains, chain = trellis.chains, i % trellis.chains
+    edges_in = 0 if i < chains else 1 if trellis.parents[chain] < 0 else 2
+    edges_out = 1 if i < chains * trellis.moves else 0
+    if i >= chains:
+        for child in range(chain + 1, chains):
+            if trellis.parents[child] == chain:
                 edges_out += 1
     return 1.0 / max(edges_in, edges_out, 1)
 
 
 @jit
-def forward(grid: Grid, m: Messages) -> None:
-    """One sweep from the first variable to the last: each sends to its lane's next move and to its children."""
-    lanes = grid.lanes
-    for i in range(len(grid.dom_ptr) - 1):
-        lane = i % lanes
-        first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
-        theta = _gamma(grid, i) * _theta(grid, m, i)
+def forward(trellis: Trellis, m: Messages) -> None:
+    """One sweep from the first variable to the last: each sends to its chain's next move and to its children."""
+    chains = trellis.chains
+    for i in range(len(trellis.dom_ptr) - 1):
+        chain = i % chains
+        first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
+        theta = _gamma(trellis, i) * _theta(trellis, m, i)
         m.before[i] = m.constants[i]
-        if i < lanes * grid.moves:
-            begin, end = grid.dom_ptr[i + lanes], grid.dom_ptr[i + lanes + 1]
+        if i < chains * trellis.moves:
+            begin, end = trellis.dom_ptr[i + chains], trellis.dom_ptr[i + chains + 1]
             for x in range(begin, end):
                 m.down_row[x] = np.inf
             for p in range(first, last):
                 value = theta[p - first] - m.up_row[p]
-                for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
-                    x = grid.row_to[e]
-                    m.down_row[x] = min(m.down_row[x], value + grid.row_cost[e])
+                for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                    x = trellis.row_to[e]
+                    m.down_row[x] = min(m.down_row[x], value + trellis.row_cost[e])
             m.before[i] += _settle(m.down_row, begin, end)
-        if i >= lanes:
-            for child in range(lane + 1, lanes):
-                if grid.parents[child] == lane:
-                    below = i - lane + child
-                    begin, end, base = grid.dom_ptr[below], grid.dom_ptr[below + 1], grid.up_ptr[below]
+        if i >= chains:
+            for child in range(chain + 1, chains):
+                if trellis.parents[child] == chain:
+                    below = i - chain + child
+                    begin, end, base = trellis.dom_ptr[below], trellis.dom_ptr[below + 1], trellis.up_ptr[below]
                     values = theta - m.up_col[base : base + last - first]
                     best = np.argmin(values)
                     m.down_col[begin:end] = values[best]
                     order = np.empty(0, np.int64)
-                    for q in range(grid.col_ptr[base + best], grid.col_ptr[base + best + 1]):
-                        if grid.col_cost[q] > 0.0:  # the best of all costs more here: go on to those that may do better
-                            x = grid.col_to[q]
+                    for q in range(trellis.col_ptr[base + best], trellis.col_ptr[base + best + 1]):
+                        if (
+                            trellis.col_cost[q] > 0.0
+                        ):  # the best of all costs more here: go on to those that may do better
+                            x = trellis.col_to[q]
                             order = np.argsort(values) if len(order) == 0 else order
                             m.down_col[x] = np.inf
                             for other in order:
                                 if values[other] >= m.down_col[x]:
                                     break
-                                m.down_col[x] = min(m.down_col[x], values[other] + correction(grid, base + other, x))
+                                m.down_col[x] = min(m.down_col[x], values[other] + correction(trellis, base + other, x))
                     for k in range(last - first):
-                        for q in range(grid.col_ptr[base + k], grid.col_ptr[base + k + 1]):
-                            x = grid.col_to[q]
-                            m.down_col[x] = min(m.down_col[x], values[k] + grid.col_cost[q])
+                        for q in range(trellis.col_ptr[base + k], trellis.col_ptr[base + k + 1]):
+                            x = trellis.col_to[q]
+                            m.down_col[x] = min(m.down_col[x], values[k] + trellis.col_cost[q])
                     m.before[i] += _settle(m.down_col, begin, end)
 
 
 @jit
-def backward(grid: Grid, m: Messages) -> float:
+def backward(trellis: Trellis, m: Messages) -> float:
     """One sweep from the last variable to the first; the lower bound that it proves."""
-    lanes = grid.lanes
+    chains = trellis.chains
     bound, earlier, later = 0.0, np.sum(m.before), 0.0
-    sent = np.zeros(len(grid.dom_ptr) - 1)  # constants of the messages that have been sent to each variable
-    for i in range(len(grid.dom_ptr) - 2, -1, -1):
-        lane = i % lanes
-        first, last = grid.dom_ptr[i], grid.dom_ptr[i + 1]
-        theta = _theta(grid, m, i)
+    sent = np.zeros(len(trellis.dom_ptr) - 1)  # constants of the messages that have been sent to each variable
+    for i in range(len(trellis.dom_ptr) - 2, -1, -1):
+        chain = i % chains
+        first, last = trellis.dom_ptr[i], trellis.dom_ptr[i + 1]
+        theta = _theta(trellis, m, i)
         earlier -= m.before[i]
         later += m.constants[i] + sent[i]
         for p in range(first, last):
             m.through[p] = earlier + theta[p - first] + later
-        theta *= _gamma(grid, i)
-        if i >= lanes:
-            before = i - lanes
-            for p in range(grid.dom_ptr[before], grid.dom_ptr[before + 1]):
+        theta *= _gamma(trellis, i)
+        if i >= chains:
+            before = i - chains
+            for p in range(trellis.dom_ptr[before], trellis.dom_ptr[before + 1]):
                 least = np.inf
-                for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
-                    x = grid.row_to[e]
-                    least = min(least, grid.row_cost[e] + theta[x - first] - m.down_row[x])
+                for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                    x = trellis.row_to[e]
+                    least = min(least, trellis.row_cost[e] + theta[x - first] - m.down_row[x])
                 m.up_row[p] = least
-            settled = _settle(m.up_row, grid.dom_ptr[before], grid.dom_ptr[before + 1])
+            settled = _settle(m.up_row, trellis.dom_ptr[before], trellis.dom_ptr[before + 1])
             m.constants[i] += settled
             sent[before] += settled
-            if grid.parents[lane] >= 0:
+            if trellis.parents[chain] >= 0:
                 values = theta - m.down_col[first:last]
                 best, order = np.argmin(values), np.empty(0, np.int64)
-                for u in range(grid.up_ptr[i], grid.up_ptr[i + 1]):
+                for u in range(trellis.up_ptr[i], trellis.up_ptr[i + 1]):
                     value = values[best]
-                    if correction(grid, u, first + best) > 0.0:
+                    if correction(trellis, u, first + best) > 0.0:
                         order = np.argsort(values) if len(order) == 0 else order
                         value = np.inf
                         for other in order:
                             if values[other] >= value:
                                 break
-                            value = min(value, values[other] + correction(grid, u, first + other))
-                    for q in range(grid.col_ptr[u], grid.col_ptr[u + 1]):
-                        value = min(value, values[grid.col_to[q] - first] + grid.col_cost[q])
+                            value = min(value, values[other] + correction(trellis, u, first + other))
+                    for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1]):
+                        value = min(value, values[trellis.col_to[q] - first] + trellis.col_cost[q])
                     m.up_col[u] = value
-                settled = _settle(m.up_col, grid.up_ptr[i], grid.up_ptr[i + 1])
+                settled = _settle(m.up_col, trellis.up_ptr[i], trellis.up_ptr[i + 1])
                 m.constants[i] += settled
-                sent[i - lane + grid.parents[lane]] += settled
+                sent[i - chain + trellis.parents[chain]] += settled
         for p in range(first, last):
             m.ahead[p] -= m.constants[i]
         bound += m.constants[i]
@@ -226,69 +228,69 @@ def _settle(message: Floats, begin: int, end: int) -> float:
 
 
 @jit
-def correction(grid: Grid, u: int, x: int) -> float:
+def correction(trellis: Trellis, u: int, x: int) -> float:
     """What the coupling of position `x` in coupling row `u` is listed with; 0 for a pair that is not listed."""
-    low, high = grid.col_ptr[u], grid.col_ptr[u + 1]
+    low, high = trellis.col_ptr[u], trellis.col_ptr[u + 1]
     while low < high:
         middle = (low + high) // 2
-        if grid.col_to[middle] < x:
+        if trellis.col_to[middle] < x:
             low = middle + 1
         else:
             high = middle
-    return float(grid.col_cost[low]) if low < grid.col_ptr[u + 1] and grid.col_to[low] == x else 0.0
+    return float(trellis.col_cost[low]) if low < trellis.col_ptr[u + 1] and trellis.col_to[low] == x else 0.0
 
 
 @jit
-def step(grid: Grid, m: Messages, i: int, before: int, above: int, e: int) -> float:
+def step(trellis: Trellis, m: Messages, i: int, before: int, above: int, e: int) -> float:
     """What f grows by when variable i takes the position that edge `e` leads to.
 
-    `before` is the position of its lane one move earlier, `above` that of its parent variable (-1 without one): the
+    `before` is the position of its chain one move earlier, `above` that of its parent variable (-1 without one): the
     cost of the position and of its edges in, plus what later variables have sent back to it, less what its edges in
     had promised and the variable's constant. At least 0 but for rounding.
     """
-    x = grid.row_to[e]
-    grown = float(grid.row_cost[e] + m.ahead[x] - m.up_row[before])
+    x = trellis.row_to[e]
+    grown = float(trellis.row_cost[e] + m.ahead[x] - m.up_row[before])
     if above >= 0:
-        u = grid.up_ptr[i] + above - grid.dom_ptr[i - i % grid.lanes + grid.parents[i % grid.lanes]]
-        grown += correction(grid, u, x) - m.up_col[u]
+        u = trellis.up_ptr[i] + above - trellis.dom_ptr[i - i % trellis.chains + trellis.parents[i % trellis.chains]]
+        grown += correction(trellis, u, x) - m.up_col[u]
     return grown
 
 
 @jit
-def descend(grid: Grid, m: Messages, path: Ints, start: int) -> float:
+def descend(trellis: Trellis, m: Messages, path: Ints, start: int) -> float:
     """Complete `path` [n] (positions) from variable `start` on, by the least growth of f each time; the sum of it.
 
-    It never fails: every position of a domain leads on along its lane, and couplings forbid nothing.
+    It never fails: every position of a domain leads on along its chain, and couplings forbid nothing.
     """
-    lanes = grid.lanes
+    chains = trellis.chains
     grown = 0.0
-    for i in range(start, len(grid.dom_ptr) - 1):
-        parent, before = grid.parents[i % lanes], path[i - lanes]
-        above = path[i - i % lanes + parent] if parent >= 0 else -1
+    for i in range(start, len(trellis.dom_ptr) - 1):
+        parent, before = trellis.parents[i % chains], path[i - chains]
+        above = path[i - i % chains + parent] if parent >= 0 else -1
         least = np.inf
-        for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
-            value = step(grid, m, i, before, above, e)
+        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+            value = step(trellis, m, i, before, above, e)
             if value < least:
-                least, path[i] = value, grid.row_to[e]
+                least, path[i] = value, trellis.row_to[e]
         grown += least
     return grown
 
 
 @jit
-def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> tuple[float, float]:
+def tighten(trellis: Trellis, m: Messages, path: Ints, sweeps: int, enough: float) -> tuple[float, float]:
     """Run up to `sweeps` pairs of sweeps; the bound, and the cost of the best path met on the way.
 
     The path is written to `path` [n] (positions). Stops when the bound reaches that cost or `enough`.
     """
-    lanes = grid.lanes
+    chains = trellis.chains
     trial = np.zeros(len(path), np.int64)
-    for lane in range(lanes):
-        path[lane] = trial[lane] = grid.dom_ptr[lane]
+    for chain in range(chains):
+        path[chain] = trial[chain] = trellis.dom_ptr[chain]
     bound, cost = -np.inf, np.inf
     for _ in range(sweeps):
-        forward(grid, m)
-        bound = backward(grid, m)
-        found = bound + descend(grid, m, trial, lanes)
+        forward(trellis, m)
+        bound = backward(trellis, m)
+        found = bound + descend(trellis, m, trial, chains)
         if found < cost:
             cost = found
             path[:] = trial
@@ -298,71 +300,73 @@ def tighten(grid: Grid, m: Messages, path: Ints, sweeps: int, enough: float) -> 
 
 
 @jit
-def narrow(grid: Grid, m: Messages, below: float) -> tuple[Grid, Messages]:
-    """The grid without the positions that no path cheaper than `below` goes through, and the messages of the rest.
+def prune(trellis: Trellis, m: Messages, below: float) -> tuple[Trellis, Messages]:
+    """The trellis without the positions that no path cheaper than `below` goes through, and the messages of the rest.
 
     A domain is left empty where there is no such path at all.
     """
-    kept = worth(grid, m.through, below)
+    kept = reachable(trellis, m.through, below)
     held = np.flatnonzero(kept)
-    rows = _coupled(grid, kept)
-    return subset(grid, kept), Messages(
+    rows = _coupled(trellis, kept)
+    return subset(trellis, kept), Messages(
         m.down_row[held], m.up_row[held], m.down_col[held], m.up_col[rows],
         m.constants.copy(), m.before.copy(), m.ahead[held], m.through[held],
     )  # fmt: skip
 
 
 @jit
-def worth(grid: Grid, through: Floats, below: float) -> Bools:
+def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     """The positions [P] that a path cheaper than `below` may go through, each of which leads on and is led to.
 
     `through` [P] is a lower bound on the cost of all paths through each.
     """
     kept = through < below
-    for i in range(len(grid.dom_ptr) - 2 - grid.lanes, -1, -1):  # what leads nowhere
-        for p in range(grid.dom_ptr[i], grid.dom_ptr[i + 1]):
+    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):  # what leads nowhere
+        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
             leads = False
-            for e in range(grid.row_ptr[p], grid.row_ptr[p + 1]):
-                leads = leads or kept[grid.row_to[e]]
+            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                leads = leads or kept[trellis.row_to[e]]
             kept[p] = kept[p] and leads
     led_to = np.zeros(len(kept), np.bool_)
-    led_to[: grid.dom_ptr[grid.lanes]] = True
+    led_to[: trellis.dom_ptr[trellis.chains]] = True
     for p in range(len(kept)):  # what nothing leads to
         kept[p] = kept[p] and led_to[p]
         if kept[p]:
-            led_to[grid.row_to[grid.row_ptr[p] : grid.row_ptr[p + 1]]] = True
+            led_to[trellis.row_to[trellis.row_ptr[p] : trellis.row_ptr[p + 1]]] = True
     return kept
 
 
 @jit
-def _coupled(grid: Grid, kept: Bools) -> Ints:
+def _coupled(trellis: Trellis, kept: Bools) -> Ints:
     """The coupling rows of the positions that are kept."""
-    coupled = np.zeros(grid.up_ptr[-1], np.bool_)
-    for i in range(len(grid.dom_ptr) - 1):
-        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
-            above = i - i % grid.lanes + grid.parents[i % grid.lanes]
-            coupled[grid.up_ptr[i] : grid.up_ptr[i + 1]] = kept[grid.dom_ptr[above] : grid.dom_ptr[above + 1]]
+    coupled = np.zeros(trellis.up_ptr[-1], np.bool_)
+    for i in range(len(trellis.dom_ptr) - 1):
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            above = i - i % trellis.chains + trellis.parents[i % trellis.chains]
+            coupled[trellis.up_ptr[i] : trellis.up_ptr[i + 1]] = kept[
+                trellis.dom_ptr[above] : trellis.dom_ptr[above + 1]
+            ]
     return np.flatnonzero(coupled)
 
 
 @jit
-def subset(grid: Grid, kept: Bools) -> Grid:
-    """The grid of the positions that are kept."""
-    lanes, variables = grid.lanes, len(grid.dom_ptr) - 1
+def subset(trellis: Trellis, kept: Bools) -> Trellis:
+    """The trellis of the positions that are kept."""
+    chains, variables = trellis.chains, len(trellis.dom_ptr) - 1
     number = np.cumsum(kept).astype(np.int32) - 1  # of each kept position among them
-    held, rows = np.flatnonzero(kept), _coupled(grid, kept)
+    held, rows = np.flatnonzero(kept), _coupled(trellis, kept)
     dom_ptr = np.zeros(variables + 1, np.int64)
     up_ptr = np.zeros(variables + 1, np.int64)
     for i in range(variables):
-        dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[grid.dom_ptr[i] : grid.dom_ptr[i + 1]])
+        dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]])
         up_ptr[i + 1] = up_ptr[i]
-        if grid.up_ptr[i + 1] > grid.up_ptr[i]:
-            above = i - i % lanes + grid.parents[i % lanes]
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            above = i - i % chains + trellis.parents[i % chains]
             up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
-    row_ptr, row_to, row_cost = _subset(held, grid.row_ptr, grid.row_to, grid.row_cost, kept, number)
-    col_ptr, col_to, col_cost = _subset(rows, grid.col_ptr, grid.col_to, grid.col_cost, kept, number)
-    return Grid(
-        lanes, grid.moves, grid.parents, dom_ptr, grid.dom[held], grid.unary[held],
+    row_ptr, row_to, row_cost = _subset(held, trellis.row_ptr, trellis.row_to, trellis.row_cost, kept, number)
+    col_ptr, col_to, col_cost = _subset(rows, trellis.col_ptr, trellis.col_to, trellis.col_cost, kept, number)
+    return Trellis(
+        chains, trellis.moves, trellis.parents, dom_ptr, trellis.dom[held], trellis.unary[held],
         row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,
     )  # fmt: skip
 

@@ -18,13 +18,13 @@ from motionmind.search.solve import Certificate
 
 
 @dataclass(frozen=True, eq=False)
-class Account:
-    """The cost of a path of T moves of L lanes, taken apart: `moves`, `coordination` and `per_move` for each move add
+class CostBreakdown:
+    """The cost of a path of T moves of L chains, taken apart: `moves`, `coordination` and `per_move` for each move add
     up to it.
 
     Attributes:
-        moves: nats for each lane's move, bridge or wait [T, L].
-        coordination: nats for the state that each lane arrives in, or the move that it makes, beside its parent's:
+        moves: nats for each chain's move, bridge or wait [T, L].
+        coordination: nats for the state that each chain arrives in, or the move that it makes, beside its parent's:
             lambda * -log P [T, L].
         per_move: tau, nats for each move.
         likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move [T, L].
@@ -45,7 +45,7 @@ class Account:
         return float(self.moves.sum() + self.coordination.sum()) + self.per_move * len(self.moves)
 
 
-def account(
+def break_down_cost(
     path: Int32s,
     model: Model,
     goal: Ints,
@@ -54,25 +54,25 @@ def account(
     space: StateSpace,
     net: Coordination,
     lambda_: float,
-) -> Account:
+) -> CostBreakdown:
     """What `path` [T + 1, L] costs in a model that was made of a grammar, with the factor `lambda_` of `net`."""
     held, graph, at = with_waits(model, goal, rules.wait), grammar.transitions, places(model, path)
     probability = np.exp(-graph.weights("conditional"))
-    shape = (len(path) - 1, len(grammar.lanes))
+    shape = (len(path) - 1, len(grammar.chains))
     moves, together, likelihood = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    for t, lane in np.ndindex(*shape):
-        before, after, parent = int(path[t, lane]), int(path[t + 1, lane]), int(net.parents[lane])
-        row = held.starts[lane] + before
+    for t, chain in np.ndindex(*shape):
+        before, after, parent = int(path[t, chain]), int(path[t + 1, chain]), int(net.parents[chain])
+        row = held.starts[chain] + before
         first, last = held.indptr[row], held.indptr[row + 1]
-        moves[t, lane] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
+        moves[t, chain] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
         if parent >= 0:
-            together[t, lane] = lambda_ * net.cost(lane, int(path[t + 1, parent]), after, held.starts)
-        edge = graph.edge(lane, int(at[t, lane]), int(at[t + 1, lane]))
-        likelihood[t, lane] = probability[edge] if edge >= 0 else 0.0
+            together[t, chain] = lambda_ * net.cost(chain, int(path[t + 1, parent]), after, held.starts)
+        edge = graph.edge(chain, int(at[t, chain]), int(at[t + 1, chain]))
+        likelihood[t, chain] = probability[edge] if edge >= 0 else 0.0
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
-    names = tuple(tuple(space.label(lane, int(state)) for lane, state in enumerate(row)) for row in at)
-    return Account(moves, together, rules.per_move, likelihood, degrees, names)
+    names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)
+    return CostBreakdown(moves, together, rules.per_move, likelihood, degrees, names)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Source:
     seconds: float = 0.0
 
 
-def explain(
+def trace_path(
     certificate: Certificate, grammar: Grammar, corpus: Corpus, weights: Floats, wait: float, bridge_price: float
 ) -> tuple[float, tuple[Bridge, ...], tuple[Wait, ...], tuple[tuple[Source | None, ...], ...]]:
     """What a path is made of: the share attested, bridges, waits, and sources, as in Tween.
@@ -126,14 +126,14 @@ def explain(
     bridges, waits, sources = [], [], []
     for move, (before, after) in enumerate(pairwise(path)):
         row: list[Source | None] = []
-        for lane, joint in enumerate(grammar.lanes):
-            edge = graph.edge(lane, before[lane], after[lane])
+        for chain, joint in enumerate(grammar.chains):
+            edge = graph.edge(chain, before[chain], after[chain])
             row.append(source_of(corpus, int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None)
-            holds_goal = before[lane] == after[lane] == path[-1, lane]
+            holds_goal = before[chain] == after[chain] == path[-1, chain]
             if holds_goal and (edge < 0 or wait < weights[edge]):
                 waits.append(Wait(joint, move, wait))
             elif edge < 0:
-                degrees = grammar.bridges.span(graph.starts[lane] + before[lane], after[lane])
+                degrees = grammar.bridges.span(graph.starts[chain] + before[chain], after[chain])
                 bridges.append(Bridge(joint, move, degrees, bridge_price * degrees))
         sources.append(tuple(row))
     attested = [source is not None for row in sources for source in row]

@@ -11,27 +11,27 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.discretize import StateSpace
 from motionmind.errors import MotionMindError, NoPathError
-from motionmind.search.problem import Model, Posed, Via, costs_to_go, with_waits
+from motionmind.search.problem import Model, Problem, Via, costs_to_go, with_waits
 from motionmind.search.solve import feasible
 
 FARTHEST = 60  # moves by which a via is moved to see whether that helps
 
 
-class Restriction(NamedTuple):
+class Constraint(NamedTuple):
     """What was asked, such as "pin left_wrist=B", and whether each state may then be on the way [G]."""
 
     name: str
     allowed: Bools
 
 
-def restrictions(
+def constraints_of(
     space: StateSpace,
     start: Ints,
     goal: Ints,
     pin: Mapping[str, str],
     hold: Sequence[str],
     avoid: Sequence[tuple[str, int | str]],
-) -> list[Restriction]:
+) -> list[Constraint]:
     """Which states each joint may be in on the way, after posture A and before posture B.
 
     Args:
@@ -51,31 +51,31 @@ def restrictions(
         if end not in ("A", "B"):
             raise MotionMindError(f"pin {joint}={end}: a joint is pinned to A or to B")
         state = int((start if end == "A" else goal)[space.index(joint)])
-        out.append(Restriction(f"pin {joint}={end}", _only(space, space.index(joint), state)))
+        out.append(Constraint(f"pin {joint}={end}", _only(space, space.index(joint), state)))
     for joint in hold:
-        lane = space.index(joint)
-        if start[lane] != goal[lane]:
-            a, b = (space.label(lane, int(end[lane])) for end in (start, goal))
+        chain = space.index(joint)
+        if start[chain] != goal[chain]:
+            a, b = (space.label(chain, int(end[chain])) for end in (start, goal))
             raise NoPathError(f"hold {joint}: A and B differ there, {a} and {b}, so that it cannot be held")
-        out.append(Restriction(f"hold {joint}", _only(space, lane, int(start[lane]))))
+        out.append(Constraint(f"hold {joint}", _only(space, chain, int(start[chain]))))
     for joint, wanted in avoid:
-        lane = space.index(joint)
+        chain = space.index(joint)
         allowed = np.ones(space.starts[-1], dtype=bool)
-        allowed[space.starts[lane] + _state(space, lane, wanted)] = False
-        out.append(Restriction(f"avoid {joint}={wanted}", allowed))
+        allowed[space.starts[chain] + _state(space, chain, wanted)] = False
+        out.append(Constraint(f"avoid {joint}={wanted}", allowed))
     return out
 
 
-def restricted(model: Model, asked: Sequence[Restriction]) -> Model:
+def restrict(model: Model, asked: Sequence[Constraint]) -> Model:
     """The model with those states on the way that all restrictions allow."""
     return model._replace(allowed=np.logical_and.reduce([model.allowed, *(one.allowed for one in asked)]))
 
 
-def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[Restriction]) -> str:
+def find_conflicts(chains: Sequence[str], model: Model, posed: Problem, asked: Sequence[Constraint]) -> str:
     """What was asked that leaves no path, one line each; nothing where without all of it there is none either.
 
     Args:
-        lanes: names [L].
+        chains: names [L].
         model: the costs before any restriction.
         posed: the problem that has no path.
         asked: the restrictions in it.
@@ -84,9 +84,9 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
     names = [*(one.name for one in asked), *(_via(posed, i) for i in range(len(vias)))]
 
     def possible(kept: Sequence[int]) -> bool:
-        restrictions = [one for i, one in enumerate(asked) if i in kept]
+        constraints_of = [one for i, one in enumerate(asked) if i in kept]
         through = [via for i, via in enumerate(vias, start=len(asked)) if i in kept]
-        return feasible(restricted(model, restrictions), *ends, rules, through)
+        return feasible(restrict(model, constraints_of), *ends, rules, through)
 
     if not possible([]):
         return ""
@@ -108,11 +108,11 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
 
     held = with_waits(posed.model, posed.goal, rules.wait)
     stops = [posed.start, *(via.states for via in vias), posed.goal]
-    for leg in range(len(stops) - 1):
-        costs = costs_to_go(held, stops[leg + 1], rules.longest)[1:, held.starts[:-1] + stops[leg]]
-        stuck = [joint for lane, joint in enumerate(lanes) if not np.isfinite(costs[:, lane]).any()]
+    for segment in range(len(stops) - 1):
+        costs = costs_to_go(held, stops[segment + 1], rules.longest)[1:, held.starts[:-1] + stops[segment]]
+        stuck = [joint for chain, joint in enumerate(chains) if not np.isfinite(costs[:, chain]).any()]
         if stuck:
-            here, there = ("A", *(_via(posed, i) for i in range(len(vias))), "B")[leg : leg + 2]
+            here, there = ("A", *(_via(posed, i) for i in range(len(vias))), "B")[segment : segment + 2]
             lines.append(f"{', '.join(stuck)}: no way from {here} to {there}")
     number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
     return "\n  ".join(
@@ -120,28 +120,28 @@ def culprits(lanes: Sequence[str], model: Model, posed: Posed, asked: Sequence[R
     )
 
 
-def _via(posed: Posed, i: int) -> str:
+def _via(posed: Problem, i: int) -> str:
     move = posed.vias[i].move
     return f"via {i + 1}" + ("" if move is None else f" at move {move}")
 
 
-def _only(space: StateSpace, lane: int, state: int) -> Bools:
+def _only(space: StateSpace, chain: int, state: int) -> Bools:
     allowed = np.ones(space.starts[-1], dtype=bool)
-    allowed[space.starts[lane] : space.starts[lane + 1]] = False
-    allowed[space.starts[lane] + state] = True
+    allowed[space.starts[chain] : space.starts[chain + 1]] = False
+    allowed[space.starts[chain] + state] = True
     return allowed
 
 
-def _state(space: StateSpace, lane: int, wanted: int | str) -> int:
+def _state(space: StateSpace, chain: int, wanted: int | str) -> int:
     """The state that a number or a name stands for."""
     word = str(wanted)
-    if word in space.labels[lane]:
-        return space.labels[lane].index(word)
+    if word in space.labels[chain]:
+        return space.labels[chain].index(word)
     if word.isdecimal():
-        space.label(lane, int(word))  # which says what numbers there are
+        space.label(chain, int(word))  # which says what numbers there are
         return int(word)
-    named = f": {', '.join(space.labels[lane])}" if space.labels[lane] else "; here none is named"
+    named = f": {', '.join(space.labels[chain])}" if space.labels[chain] else "; here none is named"
     raise MotionMindError(
-        f"avoid {space.names[lane]}={word}: a state is given by its number, 0 to {space.sizes[lane] - 1}, or by its "
+        f"avoid {space.names[chain]}={word}: a state is given by its number, 0 to {space.sizes[chain] - 1}, or by its "
         f"name{named}"
     )

@@ -43,7 +43,7 @@ class Gap:
 
 
 @dataclass(frozen=True)
-class Fault:
+class BlockedJoint:
     """A joint that does not get from its state in A to that in B.
 
     Attributes:
@@ -76,7 +76,7 @@ class Diagnosis:
 
     max_moves: int
     strict: bool
-    faults: tuple[Fault, ...]
+    faults: tuple[BlockedJoint, ...]
     helps: tuple[str, ...]
 
     def plain(self) -> dict[str, Any]:
@@ -124,81 +124,81 @@ def diagnose(
     where all have a way of few enough moves, there is a path.
     """
     faults = []
-    for lane in range(len(grammar.lanes)):
-        first, last = model.starts[lane], model.starts[lane + 1]
+    for chain in range(len(grammar.chains)):
+        first, last = model.starts[chain], model.starts[chain + 1]
         rows = slice(model.indptr[first], model.indptr[last])
         edges = np.repeat(np.arange(last - first), np.diff(model.indptr[first : last + 1])), model.targets[rows]
-        graph, a, b = _graph(*edges, last - first), int(start[lane]), int(goal[lane])
+        graph, a, b = _graph(*edges, last - first), int(start[chain]), int(goal[chain])
         needs = _moves(graph, a, b)
         if needs is not None and needs <= rules.longest:
             continue
-        tried = _remedies(graph, grammar, corpus, space, lane, a, b, strict)
+        tried = _remedies(graph, grammar, corpus, space, chain, a, b, strict)
         remedies = tuple(Remedy(what, moves) for what, moves in tried if moves is not None and moves <= rules.longest)
         ahead = breadth_first_order(graph, a, return_predecessors=False)
         behind = breadth_first_order(graph.T.tocsr(), b, return_predecessors=False)
-        centres = space.of(lane)
+        centres = space.of(chain)
         cosines = np.abs(centres[ahead] @ centres[behind].T)
         i, k = np.unravel_index(int(cosines.argmax()), cosines.shape)
         degrees = float(np.degrees(2.0 * np.arccos(min(1.0, cosines[i, k]))))
-        gap = Gap(_called(space, lane, ahead[i]), _called(space, lane, behind[k]), degrees) if needs is None else None
-        ends = _called(space, lane, a), _called(space, lane, b)
-        faults.append(Fault(grammar.lanes[lane], *ends, needs, len(ahead), len(behind), gap, remedies))
+        gap = Gap(_called(space, chain, ahead[i]), _called(space, chain, behind[k]), degrees) if needs is None else None
+        ends = _called(space, chain, a), _called(space, chain, b)
+        faults.append(BlockedJoint(grammar.chains[chain], *ends, needs, len(ahead), len(behind), gap, remedies))
     every = [{remedy.what for remedy in fault.remedies} for fault in faults]
     helps = tuple(sorted(set.intersection(*every))) if every else ()
     return Diagnosis(rules.longest, strict, tuple(faults), helps)
 
 
 def _remedies(
-    graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, lane: int, a: int, b: int, strict: bool
+    graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int, a: int, b: int, strict: bool
 ) -> Iterator[tuple[str, int | None]]:
-    """Moves that a lane needs from state `a` to `b`, None where none suffice, with each thing that might help."""
+    """Moves that a chain needs from state `a` to `b`, None where none suffice, with each thing that might help."""
     if strict:
-        first, last = grammar.transitions.starts[lane], grammar.transitions.starts[lane + 1]
+        first, last = grammar.transitions.starts[chain], grammar.transitions.starts[chain + 1]
         indptr = grammar.bridges.indptr[first : last + 1]
         sources = np.repeat(np.arange(last - first), np.diff(indptr))
         bridged = _graph(sources, grammar.bridges.targets[indptr[0] : indptr[-1]], last - first)
         yield "bridges, without strict", _moves(graph + bridged, a, b)
     yield "the corpus learned backwards too (--reverse)", _moves(graph + graph.T, a, b)
-    mirrored = _mirrored(grammar, corpus, space, lane)
+    mirrored = _mirrored(grammar, corpus, space, chain)
     if mirrored is not None:
         yield "the corpus learned in a mirror too (--mirror)", _moves(graph + mirrored, a, b)
-    if grammar.lanes[lane] != FACING:
+    if grammar.chains[chain] != FACING:
         for times in _COARSER:
-            degrees = times * float(space.tolerances[lane])
-            moves = _coarser(corpus, space.of(lane)[[a, b]], lane, min(degrees, 180.0))
+            degrees = times * float(space.tolerances[chain])
+            moves = _coarser(corpus, space.of(chain)[[a, b]], chain, min(degrees, 180.0))
             if moves is not None:
-                yield f"a tolerance of {degrees:g} degrees for {grammar.lanes[lane]}", moves
+                yield f"a tolerance of {degrees:g} degrees for {grammar.chains[chain]}", moves
                 break
 
 
-def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, lane: int) -> csr_array | None:
-    """The moves that a lane's partner makes, seen in a mirror, between the lane's own states; None where the body has
-    no mirror image, or the lane's image is more than its partner's reflection."""
+def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -> csr_array | None:
+    """The moves that a chain's partner makes, seen in a mirror, between the chain's own states; None where the body has
+    no mirror image, or the chain's image is more than its partner's reflection."""
     graph = grammar.transitions
-    if grammar.lanes[lane] == FACING:
-        partner, image = lane, space.of(lane) * np.array([-1.0, -1.0, -1.0, 1.0])
+    if grammar.chains[chain] == FACING:
+        partner, image = chain, space.of(chain) * np.array([-1.0, -1.0, -1.0, 1.0])
     else:
         try:
             sides = find_sides(corpus.skeleton)
         except SkeletonError:
             return None
-        if lane == 0 and sides.axis != sides.world:
+        if chain == 0 and sides.axis != sides.world:
             return None
-        partner = int(sides.partners[lane])
+        partner = int(sides.partners[chain])
         image = rot.mirror(space.of(partner), sides.axis)
-    here, cosines = nearest(image, space.of(lane))
-    near = np.degrees(2.0 * np.arccos(np.minimum(cosines, 1.0))) <= space.tolerances[lane]
+    here, cosines = nearest(image, space.of(chain))
+    near = np.degrees(2.0 * np.arccos(np.minimum(cosines, 1.0))) <= space.tolerances[chain]
     first, last = graph.starts[partner], graph.starts[partner + 1]
     rows = slice(graph.indptr[first], graph.indptr[last])
     sources = np.repeat(np.arange(last - first), np.diff(graph.indptr[first : last + 1]))
     targets = graph.targets[rows]
     kept = near[sources] & near[targets]
-    return _graph(here[sources[kept]], here[targets[kept]], int(space.sizes[lane]))
+    return _graph(here[sources[kept]], here[targets[kept]], int(space.sizes[chain]))
 
 
-def _coarser(corpus: Corpus, ends: Floats, lane: int, degrees: float) -> int | None:
+def _coarser(corpus: Corpus, ends: Floats, chain: int, degrees: float) -> int | None:
     """Moves that a joint needs between two orientations [2, 4], if its states are learned anew, `degrees` wide."""
-    orientations = corpus.to_lanes(corpus.rotations)[:, lane]
+    orientations = corpus.to_chains(corpus.rotations)[:, chain]
     centres = codebook(orientations, degrees)
     states, (a, b) = nearest(orientations, centres)[0], nearest(ends, centres)[0]
     return _moves(_graph(states[corpus.moves.begins], states[corpus.moves.ends], len(centres)), int(a), int(b))
@@ -214,7 +214,7 @@ def _moves(graph: csr_array, a: int, b: int) -> int | None:
     return int(hops) if np.isfinite(hops) else None
 
 
-def _called(space: StateSpace, lane: int, state: int) -> str:
+def _called(space: StateSpace, chain: int, state: int) -> str:
     """A state by its number, and its name where it has one."""
-    number, name = f"state {state}", space.label(lane, int(state))
+    number, name = f"state {state}", space.label(chain, int(state))
     return number if name == number else f"{number} ({name})"

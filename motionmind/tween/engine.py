@@ -21,20 +21,20 @@ from motionmind.grammar.coordination import Coordination, fit_network
 from motionmind.grammar.progression import fit_progression
 from motionmind.grammar.transitions import Weights
 from motionmind.learned import summary as survey
-from motionmind.learned.model import Learned
+from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import realise
 from motionmind.realise.timeline import usual
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
 from motionmind.search.astar import nodes_in
-from motionmind.search.problem import Model, Posed, Rules, Via, places, with_waits
-from motionmind.search.sample import drawn
-from motionmind.search.solve import MOST_STATES, Certificate, Watch, solve
-from motionmind.tween.certificate import account, explain, source_of
-from motionmind.tween.constraints import Restriction, culprits, restricted, restrictions
+from motionmind.search.problem import Model, Problem, Rules, Via, places, with_waits
+from motionmind.search.sample import sample_path
+from motionmind.search.solve import MOST_STATES_OF_CHAIN, Certificate, Watch, solve
+from motionmind.tween.certificate import break_down_cost, source_of, trace_path
+from motionmind.tween.constraints import Constraint, constraints_of, find_conflicts, restrict
 from motionmind.tween.nearest_body import diagnose_posturewise, nearest_posture
-from motionmind.tween.problem import dearer, price, shared_moves
-from motionmind.tween.progression import of_moves
+from motionmind.tween.problem import build_model, penalise, shared_moves
+from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
@@ -54,7 +54,7 @@ Scheme = Literal["posture", "progression", "none"]  # of coordination
 
 
 @dataclass(frozen=True, eq=False)
-class Engine(Learned):
+class Engine(LearnedCorpus):
     """What was learned from a corpus (see Learned), ready to answer."""
 
     _priced: dict[tuple[Weights, float, float | None, float], Model] = field(default_factory=dict, repr=False)
@@ -102,7 +102,7 @@ class Engine(Learned):
             duration: seconds that the motion lasts, exactly; where `moves` is None they tell how many moves, each as
                 long as the corpus's usual.
             pin: joints that are in A's state until the last move ("A"), or in B's from the first move on ("B").
-            hold: joints that stay in their state all the way, where A and B agree; a standing leg, say.
+            hold: joints that stay in their state all the way, where A and B agree; a standing segment, say.
             avoid: joints, each with a state, by its number or name, that it is not in on the way from A to B.
             via: postures to pass through on the way, in this order; at any move, or as (posture, move) at that one.
             unlike: tweens that it is to differ from.
@@ -154,21 +154,21 @@ class Engine(Learned):
         a, b = self._on_skeleton(a, "posture A"), self._on_skeleton(b, "posture B")
         postures, at = self._vias(via)
         began = perf_counter()
-        stops = self.corpus.to_lanes(np.stack([end.rotations for end in (a, *postures, b)]))
+        stops = self.corpus.to_chains(np.stack([end.rotations for end in (a, *postures, b)]))
         states, near = self.space.assign(stops), None
         if posturewise:
             near = nearest_posture(self.corpus, a.rotations), nearest_posture(self.corpus, b.rotations)
             states[:, : len(a.skeleton)] = self.states[list(near), : len(a.skeleton)]
         snap = self.space.distance(stops, states)
         start, *passing, goal = states.astype(np.int64)
-        asked = restrictions(self.space, start, goal, pin, hold, avoid)
+        asked = constraints_of(self.space, start, goal, pin, hold, avoid)
         factor = 0.0 if coordination == "none" else lambda_
         of_postures = 0.0 if coordination == "progression" else factor
         model = self._model(weights, of_postures, None if strict else bridge_price, novelty)
         if unlike:
-            model = dearer(model, [other.path for other in unlike], diversity)
-        posed = Posed(
-            restricted(model, asked),
+            model = penalise(model, [other.path for other in unlike], diversity)
+        posed = Problem(
+            restrict(model, asked),
             start,
             goal,
             Rules(beta, tau, least, most, node_budget),
@@ -183,10 +183,12 @@ class Engine(Learned):
         else:
             certificate = self._answer(model, posed, searched, near, asked, strict, watch)
         if sample and len(certificate.path) > 1:
-            certificate = drawn(searched.model, start, goal, searched.rules, posed.vias, certificate, seed)
-        spent = account(certificate.path, searched.model, goal, searched.rules, self.grammar, self.space, net, factor)
+            certificate = sample_path(searched.model, start, goal, searched.rules, posed.vias, certificate, seed)
+        spent = break_down_cost(
+            certificate.path, searched.model, goal, searched.rules, self.grammar, self.space, net, factor
+        )
         certificate = replace(certificate, path=places(searched.model, certificate.path))
-        attested, bridges, waits, sources = explain(
+        attested, bridges, waits, sources = trace_path(
             certificate,
             self.grammar,
             self.corpus,
@@ -214,7 +216,7 @@ class Engine(Learned):
         bridged = tuple(dict.fromkeys(named))
         return Tween(
             motion=replace(motion, insertions=(replace(insertion, bridged=bridged),)),
-            joints=self.corpus.lanes,
+            joints=self.corpus.chains,
             path=certificate.path,
             status=certificate.status,
             cost=certificate.cost,
@@ -274,15 +276,15 @@ class Engine(Learned):
 
     def _off(self, motion: Motion, path: States) -> Floats:
         """Degrees [T + 1, L] between the motion's orientations at its moves and the states of a path."""
-        return self.space.distance(self.corpus.to_lanes(motion.at(motion.insertions[0].times).rotations), path)
+        return self.space.distance(self.corpus.to_chains(motion.at(motion.insertions[0].times).rotations), path)
 
     def _answer(
         self,
         model: Model,
-        posed: Posed,
-        searched: Posed,
+        posed: Problem,
+        searched: Problem,
         near: tuple[int, int] | None,
-        asked: Sequence[Restriction],
+        asked: Sequence[Constraint],
         strict: bool,
         watch: Watch | None,
     ) -> Certificate:
@@ -299,7 +301,7 @@ class Engine(Learned):
             return whole
         certificate = solve(searched.model, start, goal, searched.rules, posed.vias, watch)
         if certificate is None:
-            if faults := culprits(self.grammar.lanes, model, posed, asked):
+            if faults := find_conflicts(self.grammar.chains, model, posed, asked):
                 raise NoPathError(faults, {"restrictions": faults})
             # Imported here, for SciPy's graphs are slow to import.
             from motionmind.tween.diagnosis import diagnose
@@ -340,18 +342,18 @@ class Engine(Learned):
         asked = (weights, coordination, bridge_price, novelty)
         if asked not in self._priced:
             self._priced.clear()
-            self._priced[asked] = price(self.grammar, *asked)
+            self._priced[asked] = build_model(self.grammar, *asked)
         return self._priced[asked]
 
-    def _of_moves(self, posed: Posed, lambda_: float) -> tuple[Posed, Coordination]:
+    def _of_moves(self, posed: Problem, lambda_: float) -> tuple[Problem, Coordination]:
         """The same problem with moves for states, and how these go together."""
         held = with_waits(posed.model, posed.goal, posed.rules.wait)
-        count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each lane's states
-        if count.max() > MOST_STATES:
-            joint = self.grammar.lanes[int(count.argmax())]
+        count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each chain's states
+        if count.max() > MOST_STATES_OF_CHAIN:
+            joint = self.grammar.chains[int(count.argmax())]
             raise MotionMindError(
                 f"coordination progression: {joint} has {count.max()} states and moves, and the search takes up to "
-                f"{MOST_STATES}; build the corpus with a coarser tolerance for it, or ask for strict"
+                f"{MOST_STATES_OF_CHAIN}; build the corpus with a coarser tolerance for it, or ask for strict"
             )
         moves = self.corpus.moves
         net = fit_progression(
@@ -365,7 +367,7 @@ class Engine(Learned):
             moves.weights,
         )
         rules = replace(posed.rules, wait=np.inf)  # those at the goal are moves by now
-        return replace(posed, model=of_moves(held, net, lambda_), rules=rules), net
+        return replace(posed, model=lift_to_moves(held, net, lambda_), rules=rules), net
 
     @cached_property
     def _bodies(self) -> Bodies:
@@ -395,20 +397,20 @@ class Engine(Learned):
         """
         import networkx as nx
 
-        graph, lane = self.grammar.transitions, self.space.index(joint)
-        first, last = graph.starts[lane], graph.starts[lane + 1]
+        graph, chain = self.grammar.transitions, self.space.index(joint)
+        first, last = graph.starts[chain], graph.starts[chain + 1]
         weights = graph.weights("conditional")
-        parent = int(self.grammar.coordination.parents[lane])
+        parent = int(self.grammar.coordination.parents[chain])
         out = nx.DiGraph(
-            corpus=self.corpus.name, joint=joint, parent=self.corpus.lanes[parent] if parent >= 0 else None
+            corpus=self.corpus.name, joint=joint, parent=self.corpus.chains[parent] if parent >= 0 else None
         )
-        given = self._given(lane, parent)
+        given = self._given(chain, parent)
         for state, row in enumerate(range(first, last)):
             out.add_node(
                 state,
                 orientation=tuple(map(float, self.space.centres[row])),
                 visits=float(graph.visits[row]),
-                label=self.space.label(lane, state),
+                label=self.space.label(chain, state),
                 given=given[state],
             )
         for row in range(first, last):
@@ -422,13 +424,13 @@ class Engine(Learned):
                 )
         return out
 
-    def _given(self, lane: int, parent: int) -> list[tuple[tuple[str, float], ...]]:
-        """For each state of a lane the parent's states that it goes with best, each with P(state | parent's state)."""
+    def _given(self, chain: int, parent: int) -> list[tuple[tuple[str, float], ...]]:
+        """For each state of a chain the parent's states that it goes with best, each with P(state | parent's state)."""
         if parent < 0:
-            return [()] * int(self.space.sizes[lane])
-        likely = np.exp(-self.grammar.coordination.table(lane, self.grammar.transitions.starts))
+            return [()] * int(self.space.sizes[chain])
+        likely = np.exp(-self.grammar.coordination.table(chain, self.grammar.transitions.starts))
         seen = np.zeros(likely.shape, dtype=bool)
-        seen[self.states[:, parent], self.states[:, lane]] = True
+        seen[self.states[:, parent], self.states[:, chain]] = True
         best = np.argsort(-np.where(seen, likely, 0.0), axis=0, kind="stable")[:MOST_GIVEN]
         return [
             tuple((self.space.label(parent, int(p)), float(likely[p, state])) for p in column if seen[p, state])
@@ -438,17 +440,17 @@ class Engine(Learned):
     def network(self) -> DiscreteBayesianNetwork:
         """The coordination net as a pgmpy network over the joints: what the search's costs were compiled from."""
         joints = len(self.corpus.skeleton)
-        parents, sizes = self.corpus.lane_parents[:joints], self.space.sizes[:joints]
+        parents, sizes = self.corpus.chain_parents[:joints], self.space.sizes[:joints]
         states, weights = np.asarray(self.states[:, :joints]), self.corpus.weights
         return fit_network(self.corpus.skeleton.names, parents, states, sizes, weights)
 
     def info(self) -> dict[str, Any]:
         """What the corpus is and how large: see `survey.info`."""
-        return survey.info(self.corpus, self.grammar)
+        return survey.summarise(self.corpus, self.grammar)
 
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
         """How well the corpus hangs together: see `survey.check`."""
-        return survey.check(self.corpus, self.grammar, self.states, pairs, seed)
+        return survey.check_corpus(self.corpus, self.grammar, self.states, pairs, seed)
 
 
 def _stay(path: States) -> Certificate:
@@ -474,10 +476,10 @@ def _range(moves: int | tuple[int, int] | None, max_moves: int) -> tuple[int, in
     return int(least), int(most)
 
 
-def _nodes(memory: int, lanes: int) -> int:
+def _nodes(memory: int, chains: int) -> int:
     """How many nodes there may be in `memory` bytes."""
     _check_count("memory", memory, MOST_MEMORY)
-    nodes = nodes_in(int(memory), lanes)
+    nodes = nodes_in(int(memory), chains)
     if nodes < 1:
         raise MotionMindError(f"memory of {memory} bytes holds not one node; give some megabytes")
     return min(nodes, MOST_NODES)

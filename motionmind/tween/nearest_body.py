@@ -17,7 +17,7 @@ def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
     """The posture of the corpus with the least sum of squared angles between its joints' rotations and `rotations`
     [J, 4], but for where it faces, if that is free."""
     count = len(corpus.skeleton)
-    angles = rot.angle(corpus.to_lanes(corpus.rotations)[:, :count], corpus.to_lanes(rotations)[:count])
+    angles = rot.angle(corpus.to_chains(corpus.rotations)[:, :count], corpus.to_chains(rotations)[:count])
     return int(np.argmin(np.sum(angles**2, axis=1)))
 
 
@@ -42,7 +42,7 @@ def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], 
     # One posture of each body is enough to tell how far apart they are.
     one = np.unique(bodies.of, return_index=True)[1]
     found, led = one[np.isfinite(ahead)], one[np.isfinite(back)]
-    joints = corpus.to_lanes(corpus.rotations)[:, : len(corpus.skeleton)]
+    joints = corpus.to_chains(corpus.rotations)[:, : len(corpus.skeleton)]
     some, others = (which[:: 1 + len(which) // _COMPARED] for which in (found, led))
     # The sum over joints of (q . p)^2 = cos^2 of half the angle is a product of what each posture brings to it.
     squares = [(q[..., :, None] * q[..., None, :]).reshape(len(q), -1) for q in (joints[some], joints[others])]

@@ -14,7 +14,7 @@ from motionmind.grammar.transitions import Weights
 from motionmind.search.problem import Model
 
 
-def price(
+def build_model(
     grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float = 0.0
 ) -> Model:
     """The costs of a grammar.
@@ -49,7 +49,7 @@ def price(
 
 
 class Couplings(NamedTuple):
-    """How the lanes of a Model are coupled; attributes as there."""
+    """How the chains of a Model are coupled; attributes as there."""
 
     parents: Ints
     unary: Floats
@@ -61,14 +61,14 @@ class Couplings(NamedTuple):
 
 
 def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
-    """The costs of a network with a factor; lane j has the rows `starts[j]` to `starts[j + 1]` of its states."""
+    """The costs of a network with a factor; chain j has the rows `starts[j]` to `starts[j + 1]` of its states."""
     unary, alone = factor * net.child_costs, np.zeros(starts[-1])
     corrections = np.zeros(len(net.pair_costs))
-    for lane, parent in enumerate(net.parents):
+    for chain, parent in enumerate(net.parents):
         if parent < 0:
             continue
-        mine, above = (slice(starts[k], starts[k + 1]) for k in (lane, parent))
-        rows = slice(net.pair_starts[lane], net.pair_starts[lane + 1])
+        mine, above = (slice(starts[k], starts[k + 1]) for k in (chain, parent))
+        rows = slice(net.pair_starts[chain], net.pair_starts[chain + 1])
         unary[above] += factor * net.parent_costs[rows]
         pairs = slice(net.pair_ptr[rows.start], net.pair_ptr[rows.stop])
         row_of_pair = np.repeat(net.parent_costs[rows], np.diff(net.pair_ptr[rows.start : rows.stop + 1]))
@@ -82,21 +82,21 @@ def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
 
 
 def changes(path: Int32s) -> list[tuple[int, int, int]]:
-    """The moves of a path of states [T + 1, L] from one state to another: lane, from, to."""
+    """The moves of a path of states [T + 1, L] from one state to another: chain, from, to."""
     before, after = path[:-1], path[1:]
-    moves, lanes = np.nonzero(before != after)
-    return list(zip(lanes.tolist(), before[moves, lanes].tolist(), after[moves, lanes].tolist(), strict=True))
+    moves, chains = np.nonzero(before != after)
+    return list(zip(chains.tolist(), before[moves, chains].tolist(), after[moves, chains].tolist(), strict=True))
 
 
-def dearer(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
+def penalise(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
     """The model in which each move from one state to another costs `nats` more for every one of `paths` that makes it.
 
     To hold still is no move that could be shared.
     """
     costs = model.costs.copy()
     for path in paths:
-        for lane, state, target in set(changes(path)):
-            row = model.starts[lane] + state
+        for chain, state, target in set(changes(path)):
+            row = model.starts[chain] + state
             first, last = model.indptr[row], model.indptr[row + 1]
             at = first + np.searchsorted(model.targets[first:last], target)
             if at < last and model.targets[at] == target:
@@ -105,6 +105,6 @@ def dearer(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
 
 
 def shared_moves(path: Int32s, others: Sequence[Int32s]) -> int:
-    """How many moves of lanes from one state to another a path shares with others, counted for each of these."""
+    """How many moves of chains from one state to another a path shares with others, counted for each of these."""
     made = changes(path)
     return sum(move in theirs for theirs in map(set, map(changes, others)) for move in made)

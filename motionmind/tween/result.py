@@ -8,9 +8,9 @@ from typing import Any
 from motionmind._typing import Floats, Int32s
 from motionmind.body.motion import Motion
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Posed, Via
+from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
-from motionmind.tween.certificate import Account, Bridge, Source, Wait
+from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +19,8 @@ class Tween:
 
     Attributes:
         motion: the movement; its first and last frames are A and B, and its one insertion leads from one to the other.
-        joints: the lanes [L]: the skeleton's joints, then "facing" where that is a lane of its own.
-        path: states of the lanes [moves + 1, L].
+        joints: the chains [L]: the skeleton's joints, then "facing" where that is a chain of its own.
+        path: states of the chains [moves + 1, L].
         status: "optimal" where the cost is proven least to 1e-6 nats, else "bounded", or "interrupted" if the search
             was ended before its time, or "sampled" if the path was drawn at random.
         cost: of the path, nats.
@@ -33,7 +33,7 @@ class Tween:
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
         via_degrees: angle to their states for the postures that it was to pass through [K, L].
-        sources: for each move and lane one place in the corpus that attests it, None where none does.
+        sources: for each move and chain one place in the corpus that attests it, None where none does.
         detail: where the movement's fine detail was recorded, a place for each even part of its time; empty where the
             corpus has none to give.
         expansions: of A*.
@@ -64,9 +64,9 @@ class Tween:
     expansions: int
     peak_nodes: int
     node_budget: int
-    account: Account
+    account: CostBreakdown
     seconds: dict[str, float]
-    posed: Posed
+    posed: Problem
     asked: dict[str, Any]
 
     @property

@@ -1,8 +1,8 @@
 """The search that the papers began with, as a baseline: whole postures of a corpus, in the order that they were in.
 
-Its nodes are whole bodies, states of all lanes at once, and its edges the moves that the corpus made between them. Both
-cost what they cost the search that moves lanes on their own, so this is that search restricted, and no path of it is
-cheaper. Lanes beyond those of the nodes (the facing, which goes with nothing) travel on their own.
+Its nodes are whole bodies, states of all chains at once, and its edges the moves that the corpus made between them.
+Both cost what they cost the search that moves chains on their own, so this is that search restricted, and no path of it
+is cheaper. Chains beyond those of the nodes (the facing, which goes with nothing) travel on their own.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Bodies(NamedTuple):
     """Whole bodies and the moves between them.
 
     Attributes:
-        states: of the first K lanes, each body once [P, K].
+        states: of the first K chains, each body once [P, K].
         of: the body that each posture of the corpus is [N].
         indptr: moves from each body [P + 1]; `targets` from `indptr[body]` to `indptr[body + 1]`.
         targets: the body that a move leads to [M].
@@ -82,11 +82,11 @@ def solve_posturewise(model: Model, bodies: Bodies, start: Ints, goal: Ints, rul
         edges = np.arange(bodies.indptr[body], bodies.indptr[body + 1])
         body = int(bodies.targets[edges[np.argmin(costs[edges] + value[k - 1][bodies.targets[edges]])]])
         path[moves - k + 1, :count] = bodies.states[body]
-        for lane in range(count, len(start)):
-            row = held.starts[lane] + path[moves - k, lane]
+        for chain in range(count, len(start)):
+            row = held.starts[chain] + path[moves - k, chain]
             edges = np.arange(held.indptr[row], held.indptr[row + 1])
-            left = to_go[k - 1, held.starts[lane] + held.targets[edges]]
-            path[moves - k + 1, lane] = held.targets[edges[np.argmin(held.costs[edges] + left)]]
+            left = to_go[k - 1, held.starts[chain] + held.targets[edges]]
+            path[moves - k + 1, chain] = held.targets[edges[np.argmin(held.costs[edges] + left)]]
     seconds = {"problem": posed - began, "bound": 0.0, "search": perf_counter() - posed}
     return Certificate(path, best, best, "optimal", 0, 0, seconds)
 
@@ -97,18 +97,18 @@ def _body(bodies: Bodies, states: Ints) -> int:
 
 
 def _costs(model: Model, bodies: Bodies) -> Floats:
-    """What each move [M] costs: its lanes' moves, and the body that it leads to."""
+    """What each move [M] costs: its chains' moves, and the body that it leads to."""
     sources, states = bodies.sources, bodies.states.astype(np.int64)
     span = int(np.diff(model.starts).max())
     edges = np.repeat(np.arange(len(model.indptr) - 1), np.diff(model.indptr)) * span + model.targets
     pairs = np.repeat(np.arange(len(model.pair_ptr) - 1), np.diff(model.pair_ptr)) * span + model.pair_states
     costs, stand = np.zeros(len(sources)), np.zeros(len(states))
-    for lane in range(states.shape[1]):
-        rows, parent = model.starts[lane] + states[:, lane], model.parents[lane]
-        costs += model.costs[np.searchsorted(edges, rows[sources] * span + states[bodies.targets, lane])]
+    for chain in range(states.shape[1]):
+        rows, parent = model.starts[chain] + states[:, chain], model.parents[chain]
+        costs += model.costs[np.searchsorted(edges, rows[sources] * span + states[bodies.targets, chain])]
         stand += model.unary[rows]
         if parent >= 0:  # a body was seen, and so were its pairs
             stand += model.pair_costs[
-                np.searchsorted(pairs, (model.pair_starts[lane] + states[:, parent]) * span + states[:, lane])
+                np.searchsorted(pairs, (model.pair_starts[chain] + states[:, parent]) * span + states[:, chain])
             ]
     return np.asarray(costs + stand[bodies.targets])

@@ -27,7 +27,7 @@ from motionmind.tween.result import Tween, gap_of
 from motionmind.variation.arguments import whole
 from motionmind.variation.piece import Piece
 
-Told = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 
 _ROUNDING = 1.0 + 1e-6  # a corpus's fastest move, made again, is not faster than itself
 BODY = "body"  # what a break is named after where whole bodies are judged
@@ -56,7 +56,7 @@ class Candidate:
 
     Attributes:
         motion: the movement, from and to `Piece.ends`.
-        path: states of the lanes [moves + 1, L].
+        path: states of the chains [moves + 1, L].
         status: what is proven of it.
         cost: nats.
         lower_bound: no path costs less, nats.
@@ -140,7 +140,7 @@ class Join:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class TransitionTest:
     """A corpus, asked which transitions are abrupt.
 
     Attributes:
@@ -158,14 +158,14 @@ class Judge:
         for posture in (a, b):
             if (difference := corpus.skeleton.difference(posture.skeleton)) is not None:
                 raise SkeletonError(f"the piece is on another skeleton than corpus {corpus.name!r}: {difference}")
-        lanes = corpus.to_lanes(np.stack([a.rotations, b.rotations]))
-        before, after = engine.space.assign(lanes)
-        turned = np.degrees(rot.angle(*lanes))
+        chains = corpus.to_chains(np.stack([a.rotations, b.rotations]))
+        before, after = engine.space.assign(chains)
+        turned = np.degrees(rot.angle(*chains))
         # Within a state's tolerance orientations are one to the corpus: that is no turn.
         fast = turned > np.maximum(engine.space.tolerances, self._fastest * seconds) * _ROUNDING
         moved = before != after
         graph = engine.grammar.transitions
-        known = [not moved[lane] or graph.edge(lane, before[lane], after[lane]) >= 0 for lane in range(len(moved))]
+        known = [not moved[chain] or graph.edge(chain, before[chain], after[chain]) >= 0 for chain in range(len(moved))]
         joints = len(corpus.skeleton)
         found = []
         if self.posturewise:
@@ -174,20 +174,20 @@ class Judge:
             if not attested:
                 found.append(Break(BODY, float(turned[:joints].max()), attested=False, fast=False))
         found += [
-            Break(name, float(turned[lane]), attested=known[lane], fast=bool(fast[lane]))
-            for lane, name in enumerate(corpus.lanes)
-            if fast[lane] or not known[lane]
+            Break(name, float(turned[chain]), attested=known[chain], fast=bool(fast[chain]))
+            for chain, name in enumerate(corpus.chains)
+            if fast[chain] or not known[chain]
         ]
         return tuple(found)
 
     @cached_property
     def _fastest(self) -> Floats:
-        """Degrees a second that each lane turns at most in a move of the corpus [L]."""
+        """Degrees a second that each chain turns at most in a move of the corpus [L]."""
         corpus, moves = self.engine.corpus, self.engine.corpus.moves
         if len(moves.begins) == 0:
-            return np.zeros(len(corpus.lanes))
-        lanes = corpus.to_lanes(np.asarray(corpus.rotations))
-        turned = np.degrees(rot.angle(lanes[moves.begins], lanes[moves.ends]))
+            return np.zeros(len(corpus.chains))
+        chains = corpus.to_chains(np.asarray(corpus.rotations))
+        turned = np.degrees(rot.angle(chains[moves.begins], chains[moves.ends]))
         return np.asarray((turned / moves.seconds[:, None]).max(axis=0))
 
     def _has_made(self, before: Int32s, after: Int32s) -> bool:
@@ -198,7 +198,7 @@ class Judge:
 
 def judge(piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, posturewise: bool) -> list[Join]:
     """What a corpus says of each posture k of a piece following on a posture i, for pairs (i, k)."""
-    court, name = Judge(engine, posturewise), engine.corpus.name
+    court, name = TransitionTest(engine, posturewise), engine.corpus.name
     return [Join(i, k, name, court.breaks(*piece.ends(i, k), float(piece.lasting[i]))) for i, k in pairs]
 
 
@@ -222,7 +222,7 @@ def smooth(
     engine: Engine,
     alternatives: int,
     *,
-    told: Told | None = None,
+    told: OnProgress | None = None,
     watch: Watch | None = None,
     **asked: Any,
 ) -> tuple[Join, ...]:

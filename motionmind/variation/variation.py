@@ -31,7 +31,7 @@ from motionmind.variation.review import (
     begun,
     edited,
 )
-from motionmind.variation.seams import Join, Told, check_asked, judge, smooth
+from motionmind.variation.seams import Join, OnProgress, check_asked, judge, smooth
 
 NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewhere than with the first posture
 SKIP = 10
@@ -175,7 +175,7 @@ class Variation:
         *,
         alternatives: int = ALTERNATIVES,
         posturewise: bool = False,
-        told: Told | None = None,
+        told: OnProgress | None = None,
         watch: Watch | None = None,
         **asked: Any,
     ) -> Variation:
@@ -266,7 +266,7 @@ def vary(
     length: int | None = None,
     alternatives: int = ALTERNATIVES,
     posturewise: bool = False,
-    told: Told | None = None,
+    told: OnProgress | None = None,
     watch: Watch | None = None,
     **asked: Any,
 ) -> Variation:

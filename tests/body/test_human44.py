@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy_file import body, read_body
+from motionmind.body.anatomy_file import anatomy_named, read_body
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
@@ -320,7 +320,7 @@ def test_words_of_human23_mean_the_same(tmp_path: Path) -> None:
 
 
 def test_rows_share_out_all_that_human23_can_do() -> None:
-    fine, coarse = body("human44"), body("human23")
+    fine, coarse = anatomy_named("human44"), anatomy_named("human23")
     for group, joints in fine.groups.items():
         for angle in ("flexion", "bend", "turn"):
             assert sum(shares[angle] for shares in joints.values()) == pytest.approx(1.0), group
@@ -340,7 +340,7 @@ def test_rows_share_out_all_that_human23_can_do() -> None:
 
 def test_a_joint_that_gives_its_name_to_a_row_can_bend_alone(tmp_path: Path) -> None:
     text = "body human44\ntorso\n  a = sacrum flexion 20\n  b = lumbar flexion 40\nclip c\n  start |||a\n  1 |||b"
-    degrees = body("human44").degrees(composed(tmp_path, text).rotations)[..., 0]
+    degrees = anatomy_named("human44").degrees(composed(tmp_path, text).rotations)[..., 0]
     rows = [BODY.index(name) for name in SPINE[:3]]
     np.testing.assert_allclose(degrees[0, rows], [20.0, 0.0, 0.0], atol=1e-4)
     np.testing.assert_allclose(degrees[1, rows], [18.0, 15.6, 6.4], atol=1e-4)
@@ -389,7 +389,7 @@ def test_a_body_that_extends_another_says_only_what_differs(tmp_path: Path) -> N
     path = tmp_path / "stiff.toml"
     text = 'extends = "human23"\nformat = "motionmind-body"\nversion = 1\nname = "human23"\n'
     path.write_text(text + "joints.knee.flexion.range = [0, 90]\n")
-    stiff, coarse = read_body(path), body("human23")
+    stiff, coarse = read_body(path), anatomy_named("human23")
     assert stiff.joints["knee"].angles["flexion"].range == (0.0, 90.0)
     assert stiff.joints["knee"].mass == coarse.joints["knee"].mass
     assert {name for name, joint in stiff.joints.items() if joint != coarse.joints[name]} == {"knee"}

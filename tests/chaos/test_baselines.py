@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from motionmind.body.human import human23, human44
-from motionmind.body.limbs import TRUNK, limbs
+from motionmind.body.limbs import TRUNK, sided_parts
 from motionmind.body.skeleton import Skeleton
 from motionmind.chaos.baselines import chunk_shuffled, dabby, quadrants, shuffled
 from motionmind.chaos.reorder import runs
@@ -79,7 +79,7 @@ def test_dabbys_mapping_needs_sites() -> None:
 
 @pytest.mark.parametrize("body", [human23(), human44()], ids=lambda body: body.name)
 def test_a_person_has_four_limbs_and_a_trunk(body: Skeleton) -> None:
-    parts = limbs(body)
+    parts = sided_parts(body)
     assert set(parts) == {TRUNK, "left_hip", "right_hip", "left_clavicle", "right_clavicle"}
     assert sorted(np.concatenate(list(parts.values()))) == list(range(len(body)))
     for part, joints in parts.items():
@@ -90,14 +90,14 @@ def test_a_person_has_four_limbs_and_a_trunk(body: Skeleton) -> None:
 
 def test_a_body_without_sides_is_all_trunk() -> None:
     snake = Skeleton("snake", ("a", "b", "c"), (-1, 0, 1), np.zeros((3, 3)))
-    assert {part: list(joints) for part, joints in limbs(snake).items()} == {TRUNK: [0, 1, 2]}
+    assert {part: list(joints) for part, joints in sided_parts(snake).items()} == {TRUNK: [0, 1, 2]}
 
 
 def test_quadrants_go_through_the_piece_each_in_its_own_order() -> None:
     motion = ballet_clip("jump")
     indices = quadrants(motion.skeleton, 40, np.random.default_rng(4))
     orders = []
-    for joints in limbs(motion.skeleton).values():
+    for joints in sided_parts(motion.skeleton).values():
         assert np.all(indices[:, joints] == indices[:, joints[:1]])
         assert sorted(indices[:, joints[0]]) == list(range(40))
         orders.append(indices[:, joints[0]].tobytes())

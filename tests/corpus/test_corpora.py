@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from motionmind import Engine, Posture, read_posture
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.motion import Motion
 from motionmind.corpus import store
 from motionmind.corpus.bundled import bundled
@@ -177,8 +177,8 @@ def test_states_have_names(name: str) -> None:
     engine = Engine.load(name)
     space = engine.space
     assert space.kind == "library"
-    assert all(space.label(lane, 0) for lane in range(len(engine.corpus.skeleton)))
-    orientations = engine.corpus.to_lanes(engine.corpus.rotations)
+    assert all(space.label(chain, 0) for chain in range(len(engine.corpus.skeleton)))
+    orientations = engine.corpus.to_chains(engine.corpus.rotations)
     apart = space.distance(orientations, np.asarray(engine.states))
     assert np.quantile(apart, 0.99) <= 20.0
 
@@ -235,7 +235,7 @@ def test_medley_is_made_of_the_others(clips: dict[str, list[tuple[Score, list[Ro
 
 def test_a_mirrored_score_mirrors_the_movement(tmp_path: Path) -> None:
     """Of the whole ballet: every clip done on the other side is its mirror image."""
-    anatomy = body("human23")
+    anatomy = anatomy_named("human23")
     names = anatomy.skeleton.names
     swap = [names.index(_opposite(name)) for name in names]
     for file in manifest("ballet").scores[:1]:

@@ -174,18 +174,18 @@ def test_recordings_of_one_name_are_told_apart() -> None:
     assert [clip.name for clip in corpus.clips] == ["a", "a (2)", "clip", "a (3)", "clip (2)"]
 
 
-def test_lanes_come_back_as_the_rotations_that_they_were_made_of() -> None:
+def test_chains_come_back_as_the_rotations_that_they_were_made_of() -> None:
     rng = np.random.default_rng(0)
     q = rot.normalise(rng.normal(size=(50, 3, 4)))
-    for facing, lanes in (("free", ("shoulder", "elbow", "wrist", "facing")), ("stage", ARM.names)):
+    for facing, chains in (("free", ("shoulder", "elbow", "wrist", "facing")), ("stage", ARM.names)):
         corpus = gather("arms", [swing("a")], facing=facing)  # type: ignore[arg-type]
-        assert corpus.lanes == lanes
-        assert corpus.to_lanes(q).shape == (50, len(lanes), 4)
-        assert rot.angle(corpus.from_lanes(corpus.to_lanes(q)), q).max() < 1e-14
+        assert corpus.chains == chains
+        assert corpus.to_chains(q).shape == (50, len(chains), 4)
+        assert rot.angle(corpus.from_chains(corpus.to_chains(q)), q).max() < 1e-14
     turned = q.copy()
     turned[:, 0] = rot.mul(rot.about_vertical(1.0), q[:, 0])
     free = gather("arms", [swing("a")], facing="free")
-    assert rot.angle(free.to_lanes(turned)[:, :3], free.to_lanes(q)[:, :3]).max() < 1e-7
+    assert rot.angle(free.to_chains(turned)[:, :3], free.to_chains(q)[:, :3]).max() < 1e-7
 
 
 @pytest.mark.parametrize(

@@ -241,21 +241,21 @@ def learned(clips: Sequence[Motion], **options: Any) -> Engine:
     return Engine.fit(clips, discretization=Codebook(STEP / 3.0), facing="stage", **options)
 
 
-def steps(engine: Engine, lane: int = 0) -> list[int]:
-    """What each state of a lane is called in the walks."""
-    return [round(math.degrees(float(rot.log(q)[2])) / STEP) for q in engine.space.of(lane)]
+def steps(engine: Engine, chain: int = 0) -> list[int]:
+    """What each state of a chain is called in the walks."""
+    return [round(math.degrees(float(rot.log(q)[2])) / STEP) for q in engine.space.of(chain)]
 
 
-def edges(engine: Engine, values: NDArray[Any], lane: int = 0) -> dict[tuple[int, int], float]:
-    """Values [E] of a lane's transitions, by the walks' states."""
-    graph, called = engine.grammar.transitions, steps(engine, lane)
-    rows = graph.sources - graph.starts[lane]
-    mine = range(graph.indptr[graph.starts[lane]], graph.indptr[graph.starts[lane + 1]])
+def edges(engine: Engine, values: NDArray[Any], chain: int = 0) -> dict[tuple[int, int], float]:
+    """Values [E] of a chain's transitions, by the walks' states."""
+    graph, called = engine.grammar.transitions, steps(engine, chain)
+    rows = graph.sources - graph.starts[chain]
+    mine = range(graph.indptr[graph.starts[chain]], graph.indptr[graph.starts[chain + 1]])
     return {(called[rows[e]], called[graph.targets[e]]): float(values[e]) for e in mine}
 
 
-def weights(engine: Engine, lane: int = 0) -> dict[tuple[int, int], float]:
-    return edges(engine, engine.grammar.transitions.weights("conditional"), lane)
+def weights(engine: Engine, chain: int = 0) -> dict[tuple[int, int], float]:
+    return edges(engine, engine.grammar.transitions.weights("conditional"), chain)
 
 
 def counted(walks: Sequence[Sequence[int]]) -> Counter[tuple[int, int]]:
@@ -421,8 +421,8 @@ def test_a_mix_is_the_weighted_union_of_counts(home: Home, weight: float) -> Non
     counts: dict[tuple[int, int], float] = defaultdict(float, counted([ONE]))
     for move, number in counted([TWO]).items():
         counts[move] += weight * number
-    for lane in (0, 1):
-        assert weights(engine, lane) == pytest.approx(expected(counts), rel=1e-9, abs=1e-9)
+    for chain in (0, 1):
+        assert weights(engine, chain) == pytest.approx(expected(counts), rel=1e-9, abs=1e-9)
     assert_rows_sum_to_one(engine)
     # P(1 | 0) by hand, so that the counting is checked as well: both of one's moves out of 0, and one of two's two.
     p = math.exp(-weights(engine)[0, 1])
@@ -612,7 +612,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Engine:
     )
 
 
-def assert_attested(engine: Engine, source: Source, lane: int, before: int, after: int) -> None:
+def assert_attested(engine: Engine, source: Source, chain: int, before: int, after: int) -> None:
     """That the source's postures are in the states of the transition."""
     (clip,) = (
         clip
@@ -623,9 +623,9 @@ def assert_attested(engine: Engine, source: Source, lane: int, before: int, afte
     to = source.posture + (-1 if source.reversed else 1)
     assert min(source.posture, to) >= 0
     assert max(source.posture, to) < len(clip)
-    seen = engine.states[[clip.start + source.posture, clip.start + to], lane].astype(int)
-    if engine.corpus.lanes[lane] == "facing":  # pooled: by how many steps it turns
-        assert (seen[1] - seen[0] - (after - before)) % engine.space.sizes[lane] == 0
+    seen = engine.states[[clip.start + source.posture, clip.start + to], chain].astype(int)
+    if engine.corpus.chains[chain] == "facing":  # pooled: by how many steps it turns
+        assert (seen[1] - seen[0] - (after - before)) % engine.space.sizes[chain] == 0
     else:
         assert seen.tolist() == [before, after]
     if source.reversed:
@@ -635,8 +635,8 @@ def assert_attested(engine: Engine, source: Source, lane: int, before: int, afte
 def test_every_transition_is_attested_where_it_is_said_to_be(everything: Engine) -> None:
     graph, corpus = everything.grammar.transitions, everything.corpus
     kinds = set()
-    for lane in range(len(corpus.lanes)):
-        for row in range(graph.starts[lane], graph.starts[lane + 1]):
+    for chain in range(len(corpus.chains)):
+        for row in range(graph.starts[chain], graph.starts[chain + 1]):
             for edge in range(graph.indptr[row], graph.indptr[row + 1]):
                 posture, to = int(graph.attests[edge]), int(graph.arrives[edge])
                 clip = corpus.clip_of(posture)
@@ -644,17 +644,17 @@ def test_every_transition_is_attested_where_it_is_said_to_be(everything: Engine)
                     clip.name, posture - clip.start, clip.corpus or corpus.name, clip.mirrored, to < posture
                 )
                 kinds.add((source.corpus, source.mirrored, source.reversed))
-                assert_attested(everything, source, lane, row - int(graph.starts[lane]), int(graph.targets[edge]))
+                assert_attested(everything, source, chain, row - int(graph.starts[chain]), int(graph.targets[edge]))
     assert kinds == {(name, m, r) for name in ("mine", "other") for m in (False, True) for r in (False, True)}
 
 
 def test_nothing_is_said_to_be_reversed_that_is_attested_as_it_was_made(everything: Engine) -> None:
     graph, states = everything.grammar.transitions, everything.states.astype(int)
     forward = everything.corpus.moves.begins[everything.corpus.moves.ends > everything.corpus.moves.begins]
-    for lane in range(len(human23())):
-        made = {(states[n, lane], states[n + 1, lane]) for n in forward}
-        for edge in range(graph.indptr[graph.starts[lane]], graph.indptr[graph.starts[lane + 1]]):
-            move = int(graph.sources[edge] - graph.starts[lane]), int(graph.targets[edge])
+    for chain in range(len(human23())):
+        made = {(states[n, chain], states[n + 1, chain]) for n in forward}
+        for edge in range(graph.indptr[graph.starts[chain]], graph.indptr[graph.starts[chain + 1]]):
+            move = int(graph.sources[edge] - graph.starts[chain]), int(graph.targets[edge])
             assert (graph.arrives[edge] > graph.attests[edge]) == (move in made)
 
 
@@ -669,16 +669,16 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
     for tween in tweens(everything):
         report = json.loads(json.dumps(tween.report()))
         for move, (before, after) in enumerate(pairwise(tween.path.tolist())):
-            for lane, source in enumerate(tween.sources[move]):
-                edge = everything.grammar.transitions.edge(lane, before[lane], after[lane])
+            for chain, source in enumerate(tween.sources[move]):
+                edge = everything.grammar.transitions.edge(chain, before[chain], after[chain])
                 assert (source is None) == (edge < 0)
-                said = report["sources"][move][lane]
+                said = report["sources"][move][chain]
                 if source is None:
                     assert said is None
                     continue
                 assert set(said) == {"clip", "posture", "corpus", "mirrored", "reversed", "seconds"}
                 assert Source(**said) == source
-                assert_attested(everything, source, lane, before[lane], after[lane])
+                assert_attested(everything, source, chain, before[chain], after[chain])
                 kinds.add((source.corpus, source.mirrored, source.reversed))
     assert {corpus for corpus, _, _ in kinds} == {"mine", "other"}
     assert any(is_mirrored for _, is_mirrored, _ in kinds)
@@ -739,13 +739,13 @@ def test_a_mirrored_corpus_is_the_same_on_both_sides() -> None:
     engine = Engine.fit([dance("solo", 1), dance("duet", 2)], mirror=True, discretization=Codebook(20.0))
     graph, names = engine.grammar.transitions, human23().names
     partners = find_sides(human23()).partners
-    for lane, name in enumerate(names):
+    for chain, name in enumerate(names):
         if not name.startswith("left_"):
             continue
-        assert engine.space.sizes[lane] == engine.space.sizes[partners[lane]]
+        assert engine.space.sizes[chain] == engine.space.sizes[partners[chain]]
         one, other = (
             sorted(graph.counts[graph.indptr[graph.starts[side]] : graph.indptr[graph.starts[side + 1]]])
-            for side in (lane, partners[lane])
+            for side in (chain, partners[chain])
         )
         assert one == other
     turns: dict[int, float] = defaultdict(float)

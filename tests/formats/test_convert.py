@@ -14,7 +14,7 @@ from command_line import Run
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.formats import lost, read_motion, write_motion
+from motionmind.formats import lossy_fields, read_motion, write_motion
 from motionmind.formats.bvh import read_bvh
 from motionmind.formats.npz import smpl_bodies
 from motionmind.geometry import rotations as rot
@@ -101,17 +101,17 @@ def inserted(motion: Motion) -> Motion:
 @pytest.mark.parametrize("body", [human23(), human44(), *smpl_bodies().values()])
 def test_of_what_a_format_holds_nothing_is_said(body: Skeleton) -> None:
     motion = moving(body)
-    assert lost(motion, "a.json") == lost(motion, "a.glb") == []
+    assert lossy_fields(motion, "a.json") == lossy_fields(motion, "a.glb") == []
     inner = any(body.children(joint) and body.tips[joint].any() for joint in range(len(body)))
-    assert bool(lost(motion, "a.bvh")) == inner
-    assert lost(motion, "a.npz") == [] or body.name == "human44"
-    assert lost(replace(motion, name="another"), "a.JSON") == []
+    assert bool(lossy_fields(motion, "a.bvh")) == inner
+    assert lossy_fields(motion, "a.npz") == [] or body.name == "human44"
+    assert lossy_fields(replace(motion, name="another"), "a.JSON") == []
 
 
 @pytest.mark.parametrize("suffix", ["bvh", "glb", "npz", "txt"])
 def test_what_the_engine_made(suffix: str) -> None:
-    given = lost(moving(human23()), f"a.{suffix}")
-    assert lost(inserted(moving(human23())), f"a.{suffix}") == [
+    given = lossy_fields(moving(human23()), f"a.{suffix}")
+    assert lossy_fields(inserted(moving(human23())), f"a.{suffix}") == [
         *given,
         "the marks of frames that the engine made (3)",
         "the marks of joints that it bridged (left_hip, right_knee)",
@@ -122,7 +122,7 @@ def test_json_holds_it_all(tmp_path: Path) -> None:
     motion = inserted(moving(taller(human44())))
     late = replace(motion, times=motion.times + 3.0, insertions=())
     for one in (motion, late):
-        assert lost(one, "a.json") == []
+        assert lossy_fields(one, "a.json") == []
         write_motion(tmp_path / "a.json", one)
         again = read_motion(tmp_path / "a.json")
         assert again.skeleton == one.skeleton
@@ -138,22 +138,22 @@ def test_when_it_begins(suffix: str, tmp_path: Path) -> None:
     write_motion(tmp_path / f"a.{suffix}", motion)
     assert read_motion(tmp_path / f"a.{suffix}").times[0] == 0.0
     for other in (suffix, "glb"):
-        assert lost(motion, f"a.{other}") == ["the time when it begins, 3.5 s"]
+        assert lossy_fields(motion, f"a.{other}") == ["the time when it begins, 3.5 s"]
 
 
 @pytest.mark.parametrize("suffix", ["txt", "npz"])
 def test_proportions(suffix: str, tmp_path: Path) -> None:
     motion = moving(taller(human23()))
-    assert "the body's proportions" in lost(motion, f"a.{suffix}")
-    assert "the body's proportions" not in lost(moving(human23()), f"a.{suffix}")
+    assert "the body's proportions" in lossy_fields(motion, f"a.{suffix}")
+    assert "the body's proportions" not in lossy_fields(moving(human23()), f"a.{suffix}")
     write_motion(tmp_path / f"a.{suffix}", motion)
     assert to_human23(read_motion(tmp_path / f"a.{suffix}")).skeleton == human23()
 
 
 def test_the_papers_know_neither_times_nor_places() -> None:
     motion = moving(human23())
-    assert lost(motion, "a.txt") == ["times", "where the body is"]
-    assert lost(motion.posture(3).as_motion(), "a.txt") == ["where the body is"]
+    assert lossy_fields(motion, "a.txt") == ["times", "where the body is"]
+    assert lossy_fields(motion.posture(3).as_motion(), "a.txt") == ["where the body is"]
 
 
 def test_far_ends_in_the_middle_of_a_limb(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_far_ends_in_the_middle_of_a_limb(tmp_path: Path) -> None:
     offsets = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [0.02, 0.0, 0.05]])
     tips = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.04], [0.0, 0.05, 0.0]])
     motion = moving(Skeleton("ant", ("thorax", "head", "feeler"), (-1, 0, 1), offsets, tips))
-    assert lost(motion, "a.bvh") == ["the far ends of joints on which others hang (head)"]
+    assert lossy_fields(motion, "a.bvh") == ["the far ends of joints on which others hang (head)"]
     write_motion(tmp_path / "a.bvh", motion)
     again = read_bvh(tmp_path / "a.bvh", unit="cm").skeleton
     np.testing.assert_allclose(again.tips[[0, 2]], tips[[0, 2]], atol=1e-6)
@@ -169,7 +169,7 @@ def test_far_ends_in_the_middle_of_a_limb(tmp_path: Path) -> None:
 
 
 def test_joints_that_smpl_lacks() -> None:
-    (said,) = lost(moving(human44()), "a.npz")
+    (said,) = lossy_fields(moving(human44()), "a.npz")
     assert re.fullmatch(r"the turns of joints that SMPL does not have \(left_toes_middle, .* and 2 more\)", said)
 
 

@@ -26,7 +26,7 @@ from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions
 from motionmind.search.problem import Model, Rules
 from motionmind.search.solve import solve
-from motionmind.tween.problem import price
+from motionmind.tween.problem import build_model
 
 TURNS = 8  # steps of the facing's circle
 PARENTS = {2: (-1, 0), 3: (-1, 0, 0), 4: (-1, 0, 1, 1)}
@@ -34,7 +34,7 @@ PARENTS = {2: (-1, 0), 3: (-1, 0, 0), 4: (-1, 0, 1, 1)}
 
 @dataclass(frozen=True, eq=False)
 class Corpus:
-    """Clips of states; the last lane is the facing."""
+    """Clips of states; the last chain is the facing."""
 
     names: tuple[str, ...]
     parents: Ints
@@ -51,12 +51,12 @@ class Corpus:
     def learned(self) -> Grammar:
         return learn(self.names, self.parents, self.centres, self.states, self.sizes, self.begins, self.seconds)
 
-    def moves(self, lane: int) -> list[tuple[int, int]]:
-        return [(int(self.states[p, lane]), int(self.states[p + 1, lane])) for p in self.begins]
+    def moves(self, chain: int) -> list[tuple[int, int]]:
+        return [(int(self.states[p, chain]), int(self.states[p + 1, chain])) for p in self.begins]
 
-    def slice(self, lane: int) -> slice:
-        first = int(self.sizes[:lane].sum())
-        return slice(first, first + int(self.sizes[lane]))
+    def slice(self, chain: int) -> slice:
+        first = int(self.sizes[:chain].sum())
+        return slice(first, first + int(self.sizes[chain]))
 
 
 @cache
@@ -64,14 +64,14 @@ def corpus(seed: int) -> Corpus:
     rng = np.random.default_rng(seed)
     joints = 2 + seed % 3
     lengths = [1, *rng.integers(2, 12, size=4)]  # a clip of one posture has no move
-    lanes = []
+    chains = []
     for _ in range(joints):
         walk = rng.integers(0, rng.integers(1, 5), size=sum(lengths))
-        lanes.append(np.unique(walk, return_inverse=True)[1])  # every state of a joint occurs
-    lanes.append(rng.integers(0, TURNS, size=sum(lengths)))
+        chains.append(np.unique(walk, return_inverse=True)[1])  # every state of a joint occurs
+    chains.append(rng.integers(0, TURNS, size=sum(lengths)))
     ends = np.cumsum(lengths) - 1
     begins = np.setdiff1d(np.arange(sum(lengths)), ends)
-    sizes = np.array([*(lane.max() + 1 for lane in lanes[:-1]), TURNS])
+    sizes = np.array([*(chain.max() + 1 for chain in chains[:-1]), TURNS])
     centres = [rot.normalise(rng.normal(size=(size, 4))) for size in sizes[:-1]]
     centres.append(rot.about_vertical(np.arange(TURNS) * 2.0 * np.pi / TURNS))
     return Corpus(
@@ -79,7 +79,7 @@ def corpus(seed: int) -> Corpus:
         np.array([*PARENTS[joints], -1]),
         sizes,
         np.concatenate(centres),
-        np.stack(lanes, axis=1).astype(np.int32),
+        np.stack(chains, axis=1).astype(np.int32),
         begins,
         rng.uniform(0.1, 0.5, size=len(begins)),
     )
@@ -100,8 +100,8 @@ def seed(request: pytest.FixtureRequest) -> int:
 
 def test_transitions_are_counted_within_clips_and_never_across(seed: int) -> None:
     body, graph = corpus(seed), grammar(seed).transitions
-    for lane in range(body.joints):
-        assert edges(graph, lane) == {move: float(count) for move, count in Counter(body.moves(lane)).items()}
+    for chain in range(body.joints):
+        assert edges(graph, chain) == {move: float(count) for move, count in Counter(body.moves(chain)).items()}
     across = [p for p in range(len(body.states) - 1) if p not in set(body.begins)]
     assert len(across) == 4
     assert graph.counts[: graph.indptr[body.slice(body.joints).start]].sum() == body.joints * len(body.begins)
@@ -125,30 +125,30 @@ def test_the_weight_of_a_turn_depends_on_the_turn_alone(seed: int, scheme: Weigh
 
 def test_a_transition_is_attested_by_the_first_move_that_makes_it_and_lasts_their_mean(seed: int) -> None:
     body, graph = corpus(seed), grammar(seed).transitions
-    for lane in range(len(body.names)):
+    for chain in range(len(body.names)):
         made = defaultdict(list)
-        for (before, after), begin, seconds in zip(body.moves(lane), body.begins, body.seconds, strict=True):
-            key = (after - before) % TURNS if lane == body.joints else (before, after)
+        for (before, after), begin, seconds in zip(body.moves(chain), body.begins, body.seconds, strict=True):
+            key = (after - before) % TURNS if chain == body.joints else (before, after)
             made[key].append((begin, seconds))
-        for (before, after), k in edges(graph, lane, np.arange(len(graph.targets))).items():
-            key = (after - before) % TURNS if lane == body.joints else (before, after)
+        for (before, after), k in edges(graph, chain, np.arange(len(graph.targets))).items():
+            key = (after - before) % TURNS if chain == body.joints else (before, after)
             assert graph.attests[int(k)] == made[key][0][0]
             assert graph.seconds[int(k)] == pytest.approx(np.mean([seconds for _, seconds in made[key]]))
 
 
 def test_an_edge_is_found_by_its_ends_and_only_where_it_is_attested(seed: int) -> None:
     graph = grammar(seed).transitions
-    for lane, size in enumerate(graph.sizes()):
-        attested = edges(graph, lane, np.arange(len(graph.targets)))
+    for chain, size in enumerate(graph.sizes()):
+        attested = edges(graph, chain, np.arange(len(graph.targets)))
         for before, after in product(range(size), repeat=2):
-            assert graph.edge(lane, before, after) == attested.get((before, after), -1)
+            assert graph.edge(chain, before, after) == attested.get((before, after), -1)
 
 
 def test_all_edges_of_a_path_are_those_that_are_found_one_by_one(seed: int) -> None:
     graph = grammar(seed).transitions
     path = np.random.default_rng(seed).integers(graph.sizes(), size=(40, len(graph.sizes()))).astype(np.int32)
     expected = [
-        [graph.edge(lane, *pair) for lane, pair in enumerate(zip(*rows, strict=True))] for rows in pairwise(path)
+        [graph.edge(chain, *pair) for chain, pair in enumerate(zip(*rows, strict=True))] for rows in pairwise(path)
     ]
     np.testing.assert_array_equal(graph.edges(path), expected)
 
@@ -158,19 +158,19 @@ def test_conditional_weights_are_minus_log_p_and_each_row_sums_to_one(seed: int)
     weights = graph.weights("conditional")
     left = np.add.reduceat(np.exp(-weights), graph.indptr[:-1][np.diff(graph.indptr) > 0])
     np.testing.assert_allclose(left, 1.0, atol=1e-12)
-    for lane in range(body.joints):
-        moves = Counter(body.moves(lane))
-        leaving = Counter(before for before, _ in body.moves(lane))
-        for (before, after), weight in edges(graph, lane, weights).items():
+    for chain in range(body.joints):
+        moves = Counter(body.moves(chain))
+        leaving = Counter(before for before, _ in body.moves(chain))
+        for (before, after), weight in edges(graph, chain, weights).items():
             assert weight == pytest.approx(-np.log(moves[before, after] / leaving[before]), abs=1e-12)
 
 
 def test_printed_weights_are_what_the_papers_print(seed: int) -> None:
     body, graph = corpus(seed), grammar(seed).transitions
-    for lane in range(body.joints):
-        moves, visits = Counter(body.moves(lane)), Counter(body.states[:, lane].tolist())
+    for chain in range(body.joints):
+        moves, visits = Counter(body.moves(chain)), Counter(body.states[:, chain].tolist())
         postures, total = len(body.states), len(body.begins)
-        for (i, j), weight in edges(graph, lane, graph.weights("printed")).items():
+        for (i, j), weight in edges(graph, chain, graph.weights("printed")).items():
             f_i, f_j, f_ij = visits[i] / postures, visits[j] / postures, moves[i, j] / total
             assert weight == pytest.approx(-np.log(f_i) + np.log(f_j) - np.log(f_ij), abs=1e-12)
 
@@ -187,17 +187,17 @@ def test_postures_without_moves_teach_no_transitions() -> None:
 
 def test_a_bridge_is_never_attested_and_never_leads_nowhere(seed: int) -> None:
     learned = grammar(seed)
-    for lane in range(len(learned.lanes)):
-        bridged = set(bridge_edges(learned.transitions, learned.bridges, lane))
-        assert not bridged & set(edges(learned.transitions, lane))
+    for chain in range(len(learned.chains)):
+        bridged = set(bridge_edges(learned.transitions, learned.bridges, chain))
+        assert not bridged & set(edges(learned.transitions, chain))
         assert all(before != after for before, after in bridged)
 
 
 def test_with_bridges_every_state_reaches_every_other(seed: int) -> None:
     learned = grammar(seed)
-    for lane, size in enumerate(learned.transitions.sizes()):
+    for chain, size in enumerate(learned.transitions.sizes()):
         graph = nx.DiGraph(
-            [*edges(learned.transitions, lane), *bridge_edges(learned.transitions, learned.bridges, lane)]
+            [*edges(learned.transitions, chain), *bridge_edges(learned.transitions, learned.bridges, chain)]
         )
         graph.add_nodes_from(range(size))
         assert nx.is_strongly_connected(graph)
@@ -205,13 +205,13 @@ def test_with_bridges_every_state_reaches_every_other(seed: int) -> None:
 
 def test_a_bridge_spans_the_angle_between_its_ends(seed: int) -> None:
     body, learned = corpus(seed), grammar(seed)
-    for lane in range(len(learned.lanes)):
-        centres = body.centres[body.slice(lane)]
-        for (before, after), degrees in bridge_edges(learned.transitions, learned.bridges, lane).items():
+    for chain in range(len(learned.chains)):
+        centres = body.centres[body.slice(chain)]
+        for (before, after), degrees in bridge_edges(learned.transitions, learned.bridges, chain).items():
             turned = rot.mul(rot.inv(centres[before]), centres[after])
             angle = 2.0 * np.arctan2(np.linalg.norm(turned[:3]), abs(turned[3]))
             assert degrees == pytest.approx(np.degrees(angle), abs=1e-5)
-            row = int(learned.transitions.starts[lane]) + before
+            row = int(learned.transitions.starts[chain]) + before
             assert learned.bridges.span(row, after) == degrees
 
 
@@ -243,29 +243,29 @@ def test_states_that_coincide_are_bridged_too() -> None:
 
 def test_the_network_is_the_corpus_counted_with_a_prior_spread_as_the_marginal(seed: int) -> None:
     body = corpus(seed)
-    for lane, cpd in cpds(body).items():
-        parent = int(body.parents[lane])
-        marginal = Counter(body.states[:, lane].tolist())
+    for chain, cpd in cpds(body).items():
+        parent = int(body.parents[chain])
+        marginal = Counter(body.states[:, chain].tolist())
         if parent < 0:
-            expected = [[marginal[c] / len(body.states)] for c in range(body.sizes[lane])]
+            expected = [[marginal[c] / len(body.states)] for c in range(body.sizes[chain])]
         else:
-            pairs = Counter(zip(body.states[:, lane].tolist(), body.states[:, parent].tolist(), strict=True))
+            pairs = Counter(zip(body.states[:, chain].tolist(), body.states[:, parent].tolist(), strict=True))
             above = Counter(body.states[:, parent].tolist())
             expected = [
                 [
                     (pairs[c, p] + PSEUDO_COUNT * marginal[c] / len(body.states)) / (above[p] + PSEUDO_COUNT)
                     for p in range(body.sizes[parent])
                 ]
-                for c in range(body.sizes[lane])
+                for c in range(body.sizes[chain])
             ]
         np.testing.assert_allclose(cpd, expected, atol=1e-12)
 
 
 def test_compiled_coordination_equals_the_network_entry_by_entry(seed: int) -> None:
     body, learned = corpus(seed), grammar(seed)
-    for lane, cpd in cpds(body).items():
-        if body.parents[lane] >= 0:
-            table = learned.coordination.table(lane, learned.transitions.starts)
+    for chain, cpd in cpds(body).items():
+        if body.parents[chain] >= 0:
+            table = learned.coordination.table(chain, learned.transitions.starts)
             np.testing.assert_allclose(table, -np.log(cpd.T), rtol=0.0, atol=1e-12)
             np.testing.assert_allclose(np.exp(-table).sum(axis=1), 1.0, atol=1e-12)
 
@@ -293,19 +293,19 @@ def test_moves_cost_their_weight_and_bridges_their_degrees(
     seed: int, scheme: Weights, bridge_price: float | None
 ) -> None:
     learned = grammar(seed)
-    model = price(learned, scheme, 1.0, bridge_price)
-    for lane in range(len(learned.lanes)):
-        expected = edges(learned.transitions, lane, learned.transitions.weights(scheme))
+    model = build_model(learned, scheme, 1.0, bridge_price)
+    for chain in range(len(learned.chains)):
+        expected = edges(learned.transitions, chain, learned.transitions.weights(scheme))
         if bridge_price is not None:
-            bridges = bridge_edges(learned.transitions, learned.bridges, lane)
+            bridges = bridge_edges(learned.transitions, learned.bridges, chain)
             expected |= {ends: bridge_price * degrees for ends, degrees in bridges.items()}
-        assert model_edges(model, lane) == pytest.approx(expected, abs=1e-12)
+        assert model_edges(model, chain) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.5, 1.0])
 def test_standing_somewhere_costs_lambda_times_minus_log_p(seed: int, factor: float) -> None:
     body = corpus(seed)
-    model = price(grammar(seed), "conditional", factor, None)
+    model = build_model(grammar(seed), "conditional", factor, None)
     tables = coupling_tables(body)
     for posture in product(*map(range, body.sizes[: body.joints])):
         expected = factor * sum(table[posture[body.parents[j]], posture[j]] for j, table in tables.items())
@@ -316,7 +316,7 @@ def test_standing_somewhere_costs_lambda_times_minus_log_p(seed: int, factor: fl
 
 
 def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> None:
-    model = price(grammar(seed), "conditional", 1.0, 1.0)
+    model = build_model(grammar(seed), "conditional", 1.0, 1.0)
     for pointer, listed in ((model.indptr, model.targets), (model.pair_ptr, model.pair_states)):
         for first, last in pairwise(pointer):
             assert np.all(np.diff(listed[first:last]) > 0)
@@ -333,7 +333,7 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
     rng = np.random.default_rng(seed)
     start, goal = (rng.integers(body.sizes) for _ in range(2))
     optima = brute_force(body, learned.bridges, scheme, factor, bridge_price, start, goal, wait=0.7, moves=4)
-    found = solve(price(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000))
+    found = solve(build_model(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000))
     least = min(optima[moves] + 0.4 * moves for moves in range(1, 5))
     if found is None:
         assert least == np.inf
@@ -342,8 +342,8 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
         assert found.cost == pytest.approx(least, abs=2e-6)
         if bridge_price is None:
             for before, after in zip(found.path[:-1], found.path[1:], strict=True):
-                for lane, (s, t) in enumerate(zip(before, after, strict=True)):
-                    assert learned.transitions.edge(lane, s, t) >= 0 or s == t == goal[lane]
+                for chain, (s, t) in enumerate(zip(before, after, strict=True)):
+                    assert learned.transitions.edge(chain, s, t) >= 0 or s == t == goal[chain]
 
 
 def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
@@ -374,17 +374,17 @@ def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
 # --- helpers ---------------------------------------------------------------------------------------------------------
 
 
-def edges(graph: Transitions, lane: int, values: Floats | None = None) -> dict[tuple[int, int], float]:
-    """Attested transitions of a lane with their counts, or other values."""
-    return listed(graph.starts, graph.indptr, graph.targets, graph.counts if values is None else values, lane)
+def edges(graph: Transitions, chain: int, values: Floats | None = None) -> dict[tuple[int, int], float]:
+    """Attested transitions of a chain with their counts, or other values."""
+    return listed(graph.starts, graph.indptr, graph.targets, graph.counts if values is None else values, chain)
 
 
-def bridge_edges(graph: Transitions, bridges: Bridges, lane: int) -> dict[tuple[int, int], float]:
-    return listed(graph.starts, bridges.indptr, bridges.targets, bridges.degrees, lane)
+def bridge_edges(graph: Transitions, bridges: Bridges, chain: int) -> dict[tuple[int, int], float]:
+    return listed(graph.starts, bridges.indptr, bridges.targets, bridges.degrees, chain)
 
 
-def model_edges(model: Model, lane: int) -> dict[tuple[int, int], float]:
-    return listed(model.starts, model.indptr, model.targets, model.costs, lane)
+def model_edges(model: Model, chain: int) -> dict[tuple[int, int], float]:
+    return listed(model.starts, model.indptr, model.targets, model.costs, chain)
 
 
 def listed(
@@ -392,24 +392,24 @@ def listed(
     indptr: Ints,
     targets: Int32s,
     values: Floats,
-    lane: int,
+    chain: int,
 ) -> dict[tuple[int, int], float]:
     found = {}
-    for row in range(starts[lane], starts[lane + 1]):
+    for row in range(starts[chain], starts[chain + 1]):
         for k in range(indptr[row], indptr[row + 1]):
-            found[row - int(starts[lane]), int(targets[k])] = float(values[k])
+            found[row - int(starts[chain]), int(targets[k])] = float(values[k])
     return found
 
 
 def model_standing(model: Model, posture: tuple[int, ...]) -> float:
     """What a model charges for a posture, moves apart."""
     total = 0.0
-    for lane, parent in enumerate(model.parents):
-        total += model.unary[model.starts[lane] + posture[lane]]
+    for chain, parent in enumerate(model.parents):
+        total += model.unary[model.starts[chain] + posture[chain]]
         if parent >= 0:
-            row = model.pair_starts[lane] + posture[parent]
+            row = model.pair_starts[chain] + posture[parent]
             for q in range(model.pair_ptr[row], model.pair_ptr[row + 1]):
-                total += model.pair_costs[q] if model.pair_states[q] == posture[lane] else 0.0
+                total += model.pair_costs[q] if model.pair_states[q] == posture[chain] else 0.0
     return float(total)
 
 
@@ -443,13 +443,13 @@ def brute_force(
     The facing is coupled to nothing, so it is left out of the joint states and added as a chain of its own.
     """
     tables = []
-    for lane in range(len(body.names)):
-        pooled = lane == body.joints
-        counts = np.zeros((body.sizes[lane],) * 2)
-        for before, after in body.moves(lane):
+    for chain in range(len(body.names)):
+        pooled = chain == body.joints
+        counts = np.zeros((body.sizes[chain],) * 2)
+        for before, after in body.moves(chain):
             for turn in range(TURNS) if pooled else [0]:
-                counts[(before + turn) % body.sizes[lane], (after + turn) % body.sizes[lane]] += 1
-        visits = np.full(TURNS, 1.0) if pooled else np.bincount(body.states[:, lane], minlength=body.sizes[lane])
+                counts[(before + turn) % body.sizes[chain], (after + turn) % body.sizes[chain]] += 1
+        visits = np.full(TURNS, 1.0) if pooled else np.bincount(body.states[:, chain], minlength=body.sizes[chain])
         with np.errstate(divide="ignore", invalid="ignore"):
             if scheme == "conditional":
                 table = -np.log(counts / counts.sum(axis=1, keepdims=True))
@@ -458,11 +458,11 @@ def brute_force(
                 table = -np.log(visited)[:, None] + np.log(visited)[None, :] - np.log(counts / counts.sum())
         table[counts == 0] = np.inf
         if bridge_price is not None:
-            row = body.slice(lane).start
-            for s in range(body.sizes[lane]):
+            row = body.slice(chain).start
+            for s in range(body.sizes[chain]):
                 for k in range(bridges.indptr[row + s], bridges.indptr[row + s + 1]):
                     table[s, bridges.targets[k]] = bridge_price * bridges.degrees[k]
-        table[goal[lane], goal[lane]] = min(table[goal[lane], goal[lane]], wait)
+        table[goal[chain], goal[chain]] = min(table[goal[chain], goal[chain]], wait)
         tables.append(table)
 
     joint = np.array(list(product(*map(range, body.sizes[:-1]))))

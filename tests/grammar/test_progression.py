@@ -27,11 +27,11 @@ from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
 from motionmind.grammar.progression import fit_progression
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Rules, Via, costs_to_go, places, with_waits
-from motionmind.search.sample import drawn, sample
+from motionmind.search.sample import gibbs_sample, sample_path
 from motionmind.search.solve import PROVEN, solve
-from motionmind.search.trellis import build_grid
+from motionmind.search.trellis import build_trellis
 from motionmind.tween.engine import Engine
-from motionmind.tween.progression import of_moves
+from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.result import Tween
 
 ALIKE = 2 * PROVEN
@@ -41,13 +41,13 @@ POSTURES = bundled("corpora") / "ballet" / "postures"
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A corpus of states in one clip, and dense tables of what its lanes' moves cost, bridges among them.
+    """A corpus of states in one clip, and dense tables of what its chains' moves cost, bridges among them.
 
     Attributes:
-        parents: parent lane [L], or -1.
+        parents: parent chain [L], or -1.
         states: of N postures [N, L].
         weights: what each move counts [N - 1].
-        edges: cost of a move of each lane, infinite where there is none, L arrays of [S, S].
+        edges: cost of a move of each chain, infinite where there is none, L arrays of [S, S].
     """
 
     parents: Ints
@@ -89,20 +89,20 @@ class Body:
     def of_moves(self, goal: Ints, wait: float, factor: float) -> tuple[Model, Coordination]:
         held = with_waits(self.model(), goal, wait)
         net = self.net(held)
-        return of_moves(held, net, factor), net
+        return lift_to_moves(held, net, factor), net
 
-    def counts(self, lane: int) -> Floats:
-        """How often the lane was seen to move from s to s' while its parent moved from p to p' [s, s', p, p']."""
-        size, above = self.sizes[lane], self.sizes[self.parents[lane]]
+    def counts(self, chain: int) -> Floats:
+        """How often the chain was seen to move from s to s' while its parent moved from p to p' [s, s', p, p']."""
+        size, above = self.sizes[chain], self.sizes[self.parents[chain]]
         seen = np.zeros((size, size, above, above))
         for (before, after), weight in zip(pairwise(self.states), self.weights, strict=True):
-            parent = self.parents[lane]
-            seen[before[lane], after[lane], before[parent], after[parent]] += weight
+            parent = self.parents[chain]
+            seen[before[chain], after[chain], before[parent], after[parent]] += weight
         return seen
 
-    def together(self, lane: int) -> Floats:
+    def together(self, chain: int) -> Floats:
         """-log P(s' | s, p, p') by its definition [s, s', p, p']; of the unattested s' all have that of their class."""
-        seen = self.counts(lane)
+        seen = self.counts(chain)
         pairs = seen.sum(axis=(2, 3))
         alone = np.where(pairs > 0.0, pairs, PSEUDO_COUNT) / (pairs.sum(axis=1, keepdims=True) + PSEUDO_COUNT)
         return np.asarray(
@@ -121,13 +121,13 @@ class Body:
         """Least cost over all joint states and numbers of moves."""
         joint = np.array(list(product(*map(range, self.sizes))))
         move = np.zeros((len(joint), len(joint)))
-        for lane, parent in enumerate(self.parents):
-            costs, here = self.edges[lane].copy(), joint[:, lane]
-            costs[goal[lane], goal[lane]] = min(costs[goal[lane], goal[lane]], rules.wait)
+        for chain, parent in enumerate(self.parents):
+            costs, here = self.edges[chain].copy(), joint[:, chain]
+            costs[goal[chain], goal[chain]] = min(costs[goal[chain], goal[chain]], rules.wait)
             move += costs[here[:, None], here[None]]
             if parent >= 0:
                 above = joint[:, parent]
-                move += factor * self.together(lane)[here[:, None], here[None], above[:, None], above[None]]
+                move += factor * self.together(chain)[here[:, None], here[None], above[:, None], above[None]]
         firsts = np.concatenate([[0], np.cumsum(self.sizes)])[:-1]
         inner = np.where(allowed[firsts + joint].all(axis=1), 0.0, np.inf)
         least = np.inf
@@ -150,16 +150,16 @@ class Body:
 @cache
 def body(seed: int) -> Body:
     rng = np.random.default_rng(seed)
-    lanes = int(rng.integers(1, 4))
-    sizes = rng.integers(1, 4, lanes)
-    states = rng.integers(0, sizes, (int(rng.integers(2, 25)), lanes)).astype(np.int32)
+    chains = int(rng.integers(1, 4))
+    sizes = rng.integers(1, 4, chains)
+    states = rng.integers(0, sizes, (int(rng.integers(2, 25)), chains)).astype(np.int32)
     edges = []
-    for lane, size in enumerate(sizes):
+    for chain, size in enumerate(sizes):
         table = np.where(rng.random((size, size)) < 0.3, rng.uniform(0.5, 4.0, (size, size)), np.inf)  # bridges
-        attested = states[:-1, lane], states[1:, lane]
+        attested = states[:-1, chain], states[1:, chain]
         table[attested] = rng.uniform(0.0, 2.0, (size, size))[attested]
         edges.append(table)
-    parents = [int(rng.integers(-1, lane)) if lane else -1 for lane in range(lanes)]
+    parents = [int(rng.integers(-1, chain)) if chain else -1 for chain in range(chains)]
     weights = rng.choice([1.0, 1.0, 0.5, 3.0], len(states) - 1)
     return Body(np.array(parents, dtype=np.int64), states, weights, tuple(edges))
 
@@ -176,11 +176,11 @@ def ends_of(seed: int) -> tuple[Ints, Ints]:
 def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
     """pgmpy's, with the same counts and pseudo-counts; whatever is not attested is one state more."""
     toy = body(seed)
-    for lane, parent in enumerate(toy.parents):
+    for chain, parent in enumerate(toy.parents):
         if parent < 0:
             continue
-        size, above = toy.sizes[lane], toy.sizes[parent]
-        pairs = toy.counts(lane).sum(axis=(2, 3))
+        size, above = toy.sizes[chain], toy.sizes[parent]
+        pairs = toy.counts(chain).sum(axis=(2, 3))
         alone = np.zeros((size, size + 1))
         alone[:, :size], alone[:, size] = pairs, PSEUDO_COUNT
         alone /= alone.sum(axis=1, keepdims=True)
@@ -191,10 +191,10 @@ def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
         flat = {name: np.ones((len(names[name]), 1)) for name in "abc"}
         frame = pd.DataFrame(
             {
-                "a": toy.states[:-1, lane],
+                "a": toy.states[:-1, chain],
                 "b": toy.states[:-1, parent],
                 "c": toy.states[1:, parent],
-                "next": toy.states[1:, lane],
+                "next": toy.states[1:, chain],
             }
         )
         estimator = DiscreteBayesianEstimator(
@@ -210,25 +210,25 @@ def test_the_tables_are_those_of_a_network_over_two_postures(seed: int) -> None:
 
         held = toy.model()
         net, starts = toy.net(held), held.starts + held.indptr[held.starts]
-        for (s, after), (p, p_after) in product(moves_of(held, lane), moves_of(held, parent)):
+        for (s, after), (p, p_after) in product(moves_of(held, chain), moves_of(held, parent)):
             row = after if pairs[s, after] > 0.0 else size
-            m, n = move(held, lane, s, after), move(held, parent, p, p_after)
-            assert net.cost(lane, n, m, starts) == pytest.approx(-np.log(values[row, s, p, p_after]), abs=1e-12)
-            assert net.cost(lane, n, m, starts) == pytest.approx(toy.together(lane)[s, after, p, p_after], abs=1e-12)
+            m, n = move(held, chain, s, after), move(held, parent, p, p_after)
+            assert net.cost(chain, n, m, starts) == pytest.approx(-np.log(values[row, s, p, p_after]), abs=1e-12)
+            assert net.cost(chain, n, m, starts) == pytest.approx(toy.together(chain)[s, after, p, p_after], abs=1e-12)
 
 
-def moves_of(held: Model, lane: int) -> list[tuple[int, int]]:
-    rows = range(held.starts[lane], held.starts[lane + 1])
+def moves_of(held: Model, chain: int) -> list[tuple[int, int]]:
+    rows = range(held.starts[chain], held.starts[chain + 1])
     return [
-        (row - int(held.starts[lane]), int(after))
+        (row - int(held.starts[chain]), int(after))
         for row in rows
         for after in held.targets[held.indptr[row] : held.indptr[row + 1]]
     ]
 
 
-def move(held: Model, lane: int, before: int, after: int) -> int:
-    """The number of a move among the states of the lane when these are moves."""
-    return int(np.diff(held.starts)[lane]) + moves_of(held, lane).index((before, after))
+def move(held: Model, chain: int, before: int, after: int) -> int:
+    """The number of a move among the states of the chain when these are moves."""
+    return int(np.diff(held.starts)[chain]) + moves_of(held, chain).index((before, after))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -252,7 +252,7 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: flo
     vias = [Via(rng.integers(toy.sizes), None if rng.random() < 0.6 else k + 1) for k in range(passed)]
     held = with_waits(toy.model()._replace(allowed=allowed), goal, rules.wait)
     net = toy.net(held)
-    model = of_moves(held, net, factor)
+    model = lift_to_moves(held, net, factor)
     expected = toy.best(start, goal, rules, factor, allowed, vias)
     rules = replace(rules, wait=np.inf)
     found = solve(model, start, goal, rules, vias)
@@ -270,19 +270,19 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: flo
     for via, t in zip(vias, found.passed, strict=True):
         assert path[t].tolist() == via.states.tolist()
 
-    lanes = [f"lane{lane}" for lane in range(len(toy.sizes))]
+    chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
     through = [Via(via.states, t) for via, t in zip(vias, found.passed, strict=True)]
-    text = json.loads(cfn(model, start, goal, rules, len(path) - 1, lanes, through))
-    assert written_cost(text, model, found.path, found.passed, lanes) == pytest.approx(found.cost, abs=1e-4)
+    text = json.loads(cfn(model, start, goal, rules, len(path) - 1, chains, through))
+    assert written_cost(text, model, found.path, found.passed, chains) == pytest.approx(found.cost, abs=1e-4)
 
 
-def written_cost(text: dict[str, Any], model: Model, path: Int32s, passed: tuple[int, ...], lanes: list[str]) -> float:
+def written_cost(text: dict[str, Any], model: Model, path: Int32s, passed: tuple[int, ...], chains: list[str]) -> float:
     """What a path of moves costs in the problem as it is written."""
     at = places(model, path)
     value = {
-        f"{lane}_{t}": word(int(path[t, j]), int(at[t, j])) for j, lane in enumerate(lanes) for t in range(len(path))
+        f"{chain}_{t}": word(int(path[t, j]), int(at[t, j])) for j, chain in enumerate(chains) for t in range(len(path))
     }
-    value |= {f"{lane}_{t}_on": word(int(at[t, j]), int(at[t, j])) for j, lane in enumerate(lanes) for t in passed}
+    value |= {f"{chain}_{t}_on": word(int(at[t, j]), int(at[t, j])) for j, chain in enumerate(chains) for t in passed}
     index = {name: text["variables"][name].index(value[name]) for name in text["variables"]}
     total = 0.0
     for function in text["functions"].values():
@@ -309,16 +309,16 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         likely = paths_of(toy, model, start, goal)
         if not 4 <= len(likely) <= 300:
             continue
-        grid = build_grid(model, start, 3, costs_to_go(model, goal, 3), np.inf)
+        trellis = build_trellis(model, start, 3, costs_to_go(model, goal, 3), np.inf)
         best = solve(model, start, goal, Rules(np.inf, 0.0, 3, 3, 1000))
         assert best is not None
-        lanes, domains = grid.lanes, [grid.dom[a:b] for a, b in pairwise(grid.dom_ptr)]
+        chains, domains = trellis.chains, [trellis.dom[a:b] for a, b in pairwise(trellis.dom_ptr)]
         path = np.array([np.searchsorted(d, s) for d, s in zip(domains, best.path.ravel(), strict=True)])
-        path += grid.dom_ptr[:-1]
+        path += trellis.dom_ptr[:-1]
         rng, draws, seen = np.random.default_rng(seed), 4000, dict.fromkeys(likely, 0)
         for _ in range(draws):
-            sample(grid, path, 1, rng)
-            seen[places(model, grid.dom[path].reshape(4, lanes)).tobytes()] += 1
+            gibbs_sample(trellis, path, 1, rng)
+            seen[places(model, trellis.dom[path].reshape(4, chains)).tobytes()] += 1
         apart = 0.5 * sum(abs(seen[one] / draws - p) for one, p in likely.items())
         chance = 0.5 * sum(np.sqrt(2.0 * p * (1.0 - p) / (np.pi * draws)) for p in likely.values())
         assert apart < 2.5 * chance + 0.01, (seed, apart, chance)
@@ -334,11 +334,11 @@ def paths_of(toy: Body, model: Model, start: Ints, goal: Ints) -> dict[bytes, fl
         path = np.array([start, *inner, goal], dtype=np.int32)
         cost = 0.0
         for before, after in pairwise(path):
-            for lane, parent in enumerate(toy.parents):
-                waits = before[lane] == after[lane] == goal[lane]
-                cost += min(toy.edges[lane][before[lane], after[lane]], 0.7 if waits else np.inf)
+            for chain, parent in enumerate(toy.parents):
+                waits = before[chain] == after[chain] == goal[chain]
+                cost += min(toy.edges[chain][before[chain], after[chain]], 0.7 if waits else np.inf)
                 if parent >= 0:
-                    cost += toy.together(lane)[before[lane], after[lane], before[parent], after[parent]]
+                    cost += toy.together(chain)[before[chain], after[chain], before[parent], after[parent]]
         if cost < np.inf:
             weight[path.tobytes()] = np.exp(-cost)
     return {path: w / sum(weight.values()) for path, w in weight.items()}
@@ -352,7 +352,7 @@ def test_a_path_that_is_drawn_passes_what_the_best_one_does() -> None:
         rules = Rules(np.inf, 0.3, 1, MOVES, 1000)
         best = solve(model, start, goal, rules, [via])
         if best is not None:
-            other = drawn(model, start, goal, rules, [via], best, seed)
+            other = sample_path(model, start, goal, rules, [via], best, seed)
             path = places(model, other.path)
             assert path[best.passed[0]].tolist() == via.states.tolist()
             assert (path[0].tolist(), path[-1].tolist()) == (start.tolist(), goal.tolist())
@@ -407,7 +407,7 @@ def test_whole_postures_have_no_progressions(engine: Engine) -> None:
 
 
 def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.tween.engine.MOST_STATES", 50)
+    monkeypatch.setattr("motionmind.tween.engine.MOST_STATES_OF_CHAIN", 50)
     with pytest.raises(
         MotionMindError, match=r"has \d+ states and moves, and the search takes up to 50; build the corpus"
     ):

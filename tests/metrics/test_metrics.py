@@ -28,8 +28,8 @@ from motionmind.metrics import (
     find_feet,
     find_floor,
     find_habits,
-    find_judge,
     find_phrases,
+    fit_style_classifier,
     foot_slide,
     l2p,
     l2q,
@@ -287,9 +287,9 @@ def own_paths(engine: Engine) -> list[Int32s]:
 def test_arrivals_are_the_first_postures_after_which_nothing_changes(seed: int) -> None:
     path = np.random.default_rng(seed).integers(3, size=(6, 4)).astype(np.int32)
     found = arrivals(path)
-    for lane, arrival in enumerate(found):
-        assert np.all(path[arrival:, lane] == path[-1, lane])
-        assert arrival == 0 or path[arrival - 1, lane] != path[-1, lane]
+    for chain, arrival in enumerate(found):
+        assert np.all(path[arrival:, chain] == path[-1, chain])
+        assert arrival == 0 or path[arrival - 1, chain] != path[-1, chain]
     moving = found[found > 0]
     assert arrival_spread(path) == pytest.approx(moving.std() if len(moving) else 0.0)
 
@@ -311,13 +311,13 @@ def test_cliches_are_the_most_frequent_moves_where_there_is_a_choice(engine: Eng
     seen: dict[tuple[int, int], Counter[int]] = {}
     for path in own_paths(engine):
         for before, after in pairwise(path.tolist()):
-            for lane, (a, b) in enumerate(zip(before, after, strict=True)):
+            for chain, (a, b) in enumerate(zip(before, after, strict=True)):
                 if a != b:
-                    seen.setdefault((lane, a), Counter())[b] += 1
+                    seen.setdefault((chain, a), Counter())[b] += 1
     expected = []
     for before, after in pairwise(own_paths(engine)[0].tolist()):
-        for lane, (a, b) in enumerate(zip(before, after, strict=True)):
-            known = seen[lane, a] if a != b else Counter()
+        for chain, (a, b) in enumerate(zip(before, after, strict=True)):
+            known = seen[chain, a] if a != b else Counter()
             if len(known) > 1:
                 expected.append(known[b] == max(known.values()) > min(known.values()))
     assert habits.cliches(own_paths(engine)[0]).tolist() == expected
@@ -327,14 +327,14 @@ def test_cliches_are_the_most_frequent_moves_where_there_is_a_choice(engine: Eng
 def test_a_move_that_nobody_made_is_no_cliche(engine: Engine) -> None:
     habits, graph = find_habits(engine.grammar), engine.grammar.transitions
     path = own_paths(engine)[0][:2].copy()
-    lane = 5
-    known = {int(b) for a, b in pairwise(own_paths(engine)[0][:, lane]) if a == path[0, lane]}
+    chain = 5
+    known = {int(b) for a, b in pairwise(own_paths(engine)[0][:, chain]) if a == path[0, chain]}
     path[1] = path[0]
-    path[1, lane] = next(s for s in range(graph.sizes()[lane]) if graph.edge(lane, path[0, lane], s) < 0)
-    assert path[1, lane] not in known
+    path[1, chain] = next(s for s in range(graph.sizes()[chain]) if graph.edge(chain, path[0, chain], s) < 0)
+    assert path[1, chain] not in known
     assert habits.percentiles(path).tolist() == [0.0]
     assert not habits.cliches(path).any()
-    assert not habits.attested(path)[lane]
+    assert not habits.attested(path)[chain]
 
 
 # --- what is copied ---------------------------------------------------------------------------------------------------
@@ -386,7 +386,7 @@ def wavers(rng: np.random.Generator, pace: float, count: int = 4) -> dict[str, l
 
 def test_style_is_told_by_how_joints_move_and_not_by_where_they_are() -> None:
     rng = np.random.default_rng(3)
-    judge = find_judge({"slow": wavers(rng, 0.4), "fast": wavers(rng, 1.6)}, 60)
+    judge = fit_style_classifier({"slow": wavers(rng, 0.4), "fast": wavers(rng, 1.6)}, 60)
     found = judge.table(0)
     for shares in found.values():
         assert shares["held out"] > 0.8  # 95 % at most, as what is too far off is taken for nothing
@@ -400,7 +400,7 @@ def test_style_is_told_by_how_joints_move_and_not_by_where_they_are() -> None:
 
 def test_of_two_corpora_in_one_style_each_is_taken_for_the_other_as_often() -> None:
     rng = np.random.default_rng(5)
-    judge = find_judge({"one": wavers(rng, 1.0, 12), "other": wavers(rng, 1.0, 12)}, 60)
+    judge = fit_style_classifier({"one": wavers(rng, 1.0, 12), "other": wavers(rng, 1.0, 12)}, 60)
     for shares in judge.table(0).values():
         assert 0.25 < shares["held out"] < 0.75
 
@@ -414,7 +414,7 @@ def test_style_needs_something_to_be_judged_by() -> None:
         ({"slow": slow, "fast": dict([next(iter(fast.items()))])}, 60, "two sequences"),
     ):
         with pytest.raises(MotionMindError, match=words):
-            find_judge(corpora, frames)
+            fit_style_classifier(corpora, frames)
 
 
 # --- all at once ------------------------------------------------------------------------------------------------------
@@ -459,7 +459,7 @@ def test_what_cannot_be_measured_is_said(engine: Engine) -> None:
     clip = engine.corpus.motion(engine.corpus.clips[0])
     with pytest.raises(MotionMindError, match="too short"):
         measure(clip.slice(0, 1), engine)
-    with pytest.raises(MotionMindError, match="23 lanes"):
+    with pytest.raises(MotionMindError, match="23 chains"):
         measure(clip, engine, np.zeros((3, 5), dtype=np.int32))
     crawling = Motion(insect(), np.tile(rot.IDENTITY, (9, 14, 1)), np.zeros((9, 3)), np.arange(9) / 5.0)
     with pytest.raises(SkeletonError, match="another skeleton"):

@@ -18,8 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy import Body
-from motionmind.body.anatomy_file import body, read_body
+from motionmind.body.anatomy import Anatomy
+from motionmind.body.anatomy_file import anatomy_named, read_body
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion, Posture
 from motionmind.cli import main
@@ -35,7 +35,7 @@ from motionmind.notation.sources import sources
 
 Mutate = Callable[[str, random.Random], bytes]
 
-HUMAN = body("human23")
+HUMAN = anatomy_named("human23")
 BODIES = ("human23", "human44")
 SIDES = ("left", "right")
 
@@ -138,7 +138,7 @@ def same(a: Motion, b: Motion) -> None:
 # --- anatomy ----------------------------------------------------------------------------------------------------------
 
 
-def angles_of(human: Body, said: dict[str, str]) -> dict[str, Floats]:
+def angles_of(human: Anatomy, said: dict[str, str]) -> dict[str, Floats]:
     """Angles as `rotations` takes them, from words as scores have them: {"left_hip": "flexion 90"}."""
     out = {name: np.zeros((1, 3)) for name in human.skeleton.names}
     for name, text in said.items():
@@ -151,7 +151,7 @@ def angles_of(human: Body, said: dict[str, str]) -> dict[str, Floats]:
     return out
 
 
-def held(human: Body, said: dict[str, str]) -> tuple[dict[str, Floats], dict[str, Floats]]:
+def held(human: Anatomy, said: dict[str, str]) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Where joints and tips are, and how joints are turned, as matrices; the pelvis in the middle of the world."""
     local = human.rotations(angles_of(human, said))[0]
     turned = rot.to_matrix(human.skeleton.global_rotations(local))
@@ -286,7 +286,7 @@ def test_the_arm_is_measured_against_the_chest_not_the_collar_bone() -> None:
 @given(data=st.data())
 @settings(max_examples=40)
 def test_angles_within_their_limits_can_be_read_back(name: str, data: st.DataObject) -> None:
-    human = body(name)
+    human = anatomy_named(name)
     said = {}
     for joint_name in human.skeleton.names:
         _, joint = human.anatomy(joint_name)
@@ -306,7 +306,7 @@ def test_angles_within_their_limits_can_be_read_back(name: str, data: st.DataObj
 
 @pytest.mark.parametrize("name", BODIES)
 def test_masses_are_shares_of_a_whole(name: str) -> None:
-    human = body(name)
+    human = anatomy_named(name)
     masses = [human.anatomy(joint)[1].mass for joint in human.skeleton.names]
     assert sum(masses) == pytest.approx(1.0, abs=1e-3)
     assert min(masses) >= 0.0
@@ -315,7 +315,7 @@ def test_masses_are_shares_of_a_whole(name: str) -> None:
 @pytest.mark.parametrize("name", BODIES)
 def test_the_centre_of_mass_is_where_people_have_it(name: str) -> None:
     """At 55 to 58 % of the height, in the middle, above the feet, when a person stands with the arms hanging."""
-    human = body(name)
+    human = anatomy_named(name)
     rotations = human.rotations({joint: np.zeros((1, 3)) for joint in human.skeleton.names})[0]
     lowest = human.skeleton.positions_and_tips(rotations, np.zeros(3))[:, 1].min()
     centre = human.centre_of_mass(rotations, np.array([0.0, -lowest, 0.0]))
@@ -326,7 +326,7 @@ def test_the_centre_of_mass_is_where_people_have_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", BODIES)
 def test_both_bodies_weigh_alike(name: str) -> None:
-    human = body(name)
+    human = anatomy_named(name)
     whole = {"hip": 0.1416, "knee": 0.0433, "ankle": 0.0137, "shoulder": 0.0271, "elbow": 0.0162}  # de Leva's men
     for joint, mass in whole.items():
         assert human.joints[joint].mass == mass
@@ -336,7 +336,7 @@ def test_both_bodies_weigh_alike(name: str) -> None:
 
 @pytest.mark.parametrize("name", BODIES)
 def test_limits_and_words_make_sense(name: str) -> None:
-    human = body(name)
+    human = anatomy_named(name)
     for stem, joint in human.joints.items():
         words = [word for key, angle in joint.angles.items() for word in (key, angle.opposite) if word]
         assert len(words) == len(set(words)), stem
@@ -356,7 +356,7 @@ def test_limits_and_words_make_sense(name: str) -> None:
 
 def test_one_body_goes_as_far_as_the_other() -> None:
     """What human44 divides goes together about as far as it does in one on human23, to the last tenth at least."""
-    fine = body("human44")
+    fine = anatomy_named("human44")
     rows = {
         "lumbar": ("lumbar", "lumbar_middle", "lumbar_upper"),
         "thorax": ("thorax", "thorax_middle", "thorax_upper"),
@@ -903,7 +903,7 @@ def test_what_comes_later_replaces_what_came_before_angle_by_angle(tmp_path: Pat
 
 
 def test_the_opposite_of_an_angle_is_its_negative(tmp_path: Path) -> None:
-    for human in (HUMAN, body("human44")):
+    for human in (HUMAN, anatomy_named("human44")):
         for layer, joints in human.layers.items():
             for joint in joints:
                 for word, angle in human.joints[joint].angles.items():
@@ -1108,7 +1108,7 @@ def test_what_a_score_is_made_of_is_found(tmp_path: Path) -> None:
 def test_a_score_for_one_body_is_one_for_the_other(tmp_path: Path) -> None:
     """Feet are on the floor where they were; the heavier parts, and so the hips, are almost where they were."""
     coarse, fine = (compose(write(tmp_path, VOCABULARY.replace("human23", name) + PIECE)) for name in BODIES)
-    assert fine.skeleton.names == body("human44").skeleton.names
+    assert fine.skeleton.names == anatomy_named("human44").skeleton.names
     np.testing.assert_array_equal(fine.times, coarse.times)
     a, b = places(coarse), places(fine)
     for joint in ("left_toes", "right_toes"):

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 import motionmind.body
 from motionmind._typing import Floats
-from motionmind.body.anatomy import Body
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy import Anatomy
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
@@ -26,7 +26,7 @@ from motionmind.notation.stance import Feet, Stance, place
 
 SIDES = ("left", "right")
 SIGN = (1.0, -1.0)
-HUMAN = body("human23")
+HUMAN = anatomy_named("human23")
 BONES: Skeleton = human23()
 TOML = tomllib.loads((Path(motionmind.body.__file__).parent / "bodies" / "human23.toml").read_text("utf-8"))
 TOES = BONES.offsets[BONES.index("left_toes")]  # the ball of the foot, seen from the ankle
@@ -577,5 +577,5 @@ def test_a_stance_with_a_name_is_what_a_general_solver_finds(name: str) -> None:
 
 
 def test_the_body_of_the_tests_is_the_body() -> None:
-    assert isinstance(HUMAN, Body)
+    assert isinstance(HUMAN, Anatomy)
     assert HUMAN.skeleton == BONES

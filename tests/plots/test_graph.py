@@ -16,7 +16,7 @@ from PIL import Image
 from motionmind.errors import MotionMindError
 from motionmind.plots.joint_graph import (
     GRAPHS,
-    Drawing,
+    GraphLayout,
     draw,
     png,
     svg,
@@ -47,7 +47,7 @@ def toy(edges: list[tuple[int, int]], states: int, joint: str = "knee") -> nx.Di
     return graph
 
 
-def assert_readable(drawing: Drawing) -> None:
+def assert_readable(drawing: GraphLayout) -> None:
     """Everything is in the picture, no circle touches another, no name covers a circle or another name."""
     boxes = []
     for circle in drawing.circles:
@@ -158,15 +158,15 @@ def test_the_facing_goes_round() -> None:
 def test_states_tell_which_of_their_parents_states_they_go_with() -> None:
     engine = Engine.load("ballet")
     for joint in ("left_knee", "pelvis"):
-        lane = engine.space.index(joint)
-        parent = int(engine.corpus.lane_parents[lane])
+        chain = engine.space.index(joint)
+        parent = int(engine.corpus.chain_parents[chain])
         graph = engine.joint_graph(joint)
         if parent < 0:
             assert {data["given"] for _, data in graph.nodes(data=True)} == {()}
             continue
         cpd = engine.network().get_cpds(joint).get_values()
         for state, data in graph.nodes(data=True):
-            seen = {int(p) for p in engine.states[engine.states[:, lane] == state, parent]}
+            seen = {int(p) for p in engine.states[engine.states[:, chain] == state, parent]}
             best = sorted((cpd[state, p] for p in seen), reverse=True)[:3]
             assert [chance for _, chance in data["given"]] == pytest.approx(best)
             names = {engine.space.label(parent, p) for p in seen}

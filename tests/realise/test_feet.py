@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.contact import foot_slide, skating
 from motionmind.body.human import human23, human44
 from motionmind.body.limbs import limbs_of, parts_of
@@ -27,7 +27,7 @@ from motionmind.realise.feet import (
     _legs,
     _reach,
     _track,
-    plant,
+    plant_feet,
 )
 from motionmind.realise.root import lowest, stand
 
@@ -53,7 +53,7 @@ def sway(seconds: float = 1.2, size: float = 0.12, travel: float = 0.0, fps: flo
 
 def planted(q: Floats, root: Floats, fps: float = 30.0, given: Sequence[float] = ()) -> tuple[Floats, Floats]:
     zero = np.zeros(len(q))
-    return plant(human23(), q, root, zero, zero, stands(q), TIGHT, fps, np.array(given or [0.0, len(q) - 1.0]))
+    return plant_feet(human23(), q, root, zero, zero, stands(q), TIGHT, fps, np.array(given or [0.0, len(q) - 1.0]))
 
 
 def stands(q: Floats, skeleton: Skeleton | None = None) -> Floats:
@@ -77,7 +77,9 @@ def test_feet_slide_much_less_and_all_but_legs_and_root_stay() -> None:
 def test_feet_that_are_to_slide_are_let_slide() -> None:
     q, root = sway(size=0.05)
     zero = np.zeros(len(q))
-    found, went = plant(human23(), q, root, zero, zero, 0.0 * stands(q), TIGHT, 30.0, np.array([0.0, len(q) - 1.0]))
+    found, went = plant_feet(
+        human23(), q, root, zero, zero, 0.0 * stands(q), TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
+    )
     before, after = (human23().positions(*one)[:, LEGS][..., [0, 2]] for one in ((q, root), (found, went)))
     assert np.abs(after - before).max() < 0.003  # what a knee yields where one foot is lower
     assert foot_slide(human23(), found, went) == pytest.approx(foot_slide(human23(), q, root), rel=0.1)
@@ -94,7 +96,9 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     assert np.ptp(root[:, 1]) > 0.01
     standing = stands(q)
     standing[:, [number for number, leg in enumerate(limbs_of(skeleton)) if knee in leg]] = 0.2
-    found, went = plant(skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, 30.0, np.array([0.0, len(q) - 1.0]))
+    found, went = plant_feet(
+        skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
+    )
     assert abs(went[18, 1] - went[0, 1]) < 0.1 * abs(root[18, 1] - root[0, 1])
     assert np.ptp(went[:, 1]) < 0.3 * np.ptp(root[:, 1])  # near the ends it begins to
     np.testing.assert_allclose(lowest(skeleton, found, went), 0.0, atol=1e-9)
@@ -123,7 +127,7 @@ def test_the_floor_and_the_limits_hold_and_the_height_stays() -> None:
 def test_knees_keep_to_their_side_and_feet_to_their_orientations() -> None:
     q, root = sway()
     found, _ = planted(q, root)
-    knees = body("human23").degrees(found)[:, [2, 6], 0]
+    knees = anatomy_named("human23").degrees(found)[:, [2, 6], 0]
     assert knees.min() > 5.0
     turned = [human23().global_rotations(rotations)[:, [3, 4, 7, 8]] for rotations in (q, found)]
     inside = rot.angle(within_limits(human23(), found, found[[0, -1]], TIGHT), found).max(axis=1) < 1e-12
@@ -221,7 +225,9 @@ def test_legs_hang_where_the_body_forks_first() -> None:
 def test_a_body_without_legs_stays_as_it_is() -> None:
     rod = Skeleton("rod", ("a", "b"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     q, root = np.tile(rot.IDENTITY, (5, 2, 1)), np.arange(15.0).reshape(5, 3)
-    found, went = plant(rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), TIGHT[:2], 30.0, np.array([0.0, 4.0]))
+    found, went = plant_feet(
+        rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), TIGHT[:2], 30.0, np.array([0.0, 4.0])
+    )
     np.testing.assert_array_equal(found, q)
     np.testing.assert_array_equal(went, root * np.array([1.0, 0.0, 1.0]))  # on the floor
 

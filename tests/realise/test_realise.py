@@ -10,7 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from motionmind._typing import Floats, Int32s
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.limbs import parts_of
 from motionmind.body.limits import find_loose, within_limits
@@ -24,9 +24,9 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
 from motionmind.realise.realise import _headings, realise
-from motionmind.realise.root import carry, lowest, stand
+from motionmind.realise.root import lowest, root_trajectory, stand
 from motionmind.realise.timeline import durations
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, likely, mean_rotations
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, mean_rotations, posterior_marginals
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -64,14 +64,14 @@ def test_splines_of_many_knots_are_made_in_pieces_that_fit() -> None:
     assert rot.angle(rotation_spline(times, spans, at), rot.about_vertical(expected)).max() < 1e-6
 
 
-def wander(count: int, degrees: float, seed: int, lanes: int = 5) -> tuple[Floats, Floats]:
-    """Times [K] and rotations [K, lanes, 4] that turn by at most so many degrees from one to the next."""
+def wander(count: int, degrees: float, seed: int, chains: int = 5) -> tuple[Floats, Floats]:
+    """Times [K] and rotations [K, chains, 4] that turn by at most so many degrees from one to the next."""
     rng = np.random.default_rng(seed)
-    keys = [rot.normalise(rng.normal(size=(lanes, 4)))]
+    keys = [rot.normalise(rng.normal(size=(chains, 4)))]
     for _ in range(count - 1):
-        axis = rng.normal(size=(lanes, 3))
+        axis = rng.normal(size=(chains, 3))
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        keys.append(rot.mul(keys[-1], rot.from_axis_angle(axis, np.radians(degrees) * rng.uniform(0.2, 1.0, lanes))))
+        keys.append(rot.mul(keys[-1], rot.from_axis_angle(axis, np.radians(degrees) * rng.uniform(0.2, 1.0, chains))))
     return np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.3, count - 1))]), np.array(keys)
 
 
@@ -146,7 +146,7 @@ def graph(states: Int32s, seconds: list[float]) -> Transitions:
     )
 
 
-def test_moves_take_the_time_that_moving_lanes_took() -> None:
+def test_moves_take_the_time_that_moving_chains_took() -> None:
     clip = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [0, 0, 0]])
     transitions = graph(clip, [0.1, 0.2, 5.0, 0.4])
     path = np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [2, 1, 0], [1, 1, 0]], dtype=np.int32)
@@ -172,7 +172,7 @@ def test_a_foot_that_stands_carries_the_body() -> None:
     rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
     feet = [stander.index("left_toes"), stander.index("right_toes")]
     seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
-    root = carry(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1])
+    root = root_trajectory(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1])
     np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
     assert np.ptp(seen[:, 2]) > 0.1
 
@@ -199,7 +199,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
 def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
-    flown = carry(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b)
+    flown = root_trajectory(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b)
     missing = b - drift.sum(axis=0)
     np.testing.assert_allclose(np.diff(flown, axis=0), drift + missing / 11.0, atol=1e-9)
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
@@ -239,7 +239,7 @@ def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
         weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
         expected[np.arange(steps + 1), walked] += weight
     expected /= expected.sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(likely(begins, ends, shares, kinds, near), expected, atol=1e-12)
+    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, kinds, near), expected, atol=1e-12)
 
 
 def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
@@ -251,7 +251,7 @@ def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
 
 
 def test_joints_are_brought_to_their_limits_and_no_further() -> None:
-    anatomy = body("human23")
+    anatomy = anatomy_named("human23")
     q = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (3, 1, 1))
     bent = anatomy.rotations({"left_knee": np.array([[170.0, 0.0, 0.0]]), "right_hip": np.array([[0.0, 100.0, 0.0]])})
     q[1] = bent[0]
@@ -269,7 +269,7 @@ def test_joints_are_brought_to_their_limits_and_no_further() -> None:
 
 
 def test_joints_that_a_corpus_itself_has_beyond_their_limits_are_loose() -> None:
-    anatomy, knee = body("human23"), human23().index("left_knee")
+    anatomy, knee = anatomy_named("human23"), human23().index("left_knee")
     straight = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (200, 1, 1))
     for degrees, count, loose in ((154.0, 200, False), (156.0, 2, False), (156.0, 3, True), (170.0, 200, True)):
         q = straight.copy()
@@ -294,9 +294,9 @@ def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
 def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
     corpus = gather("walks", [walk(5), walk(4, seed=1)], reverse=1.0)
     moves, poses = corpus.moves, walk(4, seed=2)
-    lanes = corpus.to_lanes(poses.rotations)
-    shown = corpus.to_lanes(corpus.rotations)
-    far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in lanes])
+    chains = corpus.to_chains(poses.rotations)
+    shown = corpus.to_chains(corpus.rotations)
+    far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in chains])
 
     def cost(sequence: tuple[int, ...]) -> float:
         near = sum(far[t, moves.begins[m]] + far[t + 1, moves.ends[m]] for t, m in enumerate(sequence))
@@ -305,7 +305,7 @@ def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
     def straight(m: int, n: int) -> bool:
         return bool(moves.ends[m] == moves.begins[n] and moves.begins[m] != moves.ends[n])
 
-    found = likest_moves(moves, shown[:, :23], lanes[:, :23])
+    found = likest_moves(moves, shown[:, :23], chains[:, :23])
     assert cost(tuple(found)) == pytest.approx(min(map(cost, product(range(len(moves.begins)), repeat=3))), abs=1e-9)
 
 
@@ -313,8 +313,8 @@ def test_a_movement_of_the_corpus_has_its_own_detail_again() -> None:
     clip = recorded()
     corpus = gather("trembling", [clip], rate=5.0)
     rows = np.arange(6, 25)
-    lanes = corpus.to_lanes(corpus.rotations)[:, :23]
-    moves = likest_moves(corpus.moves, lanes, lanes[rows])
+    chains = corpus.to_chains(corpus.rotations)[:, :23]
+    moves = likest_moves(corpus.moves, chains, chains[rows])
     np.testing.assert_array_equal(corpus.begins[moves], rows[:-1])
     times = np.arange(6 * len(rows) - 5) / 30.0
     spline = rotation_spline(corpus.times, corpus.rotations, times + corpus.times[6])
@@ -347,7 +347,7 @@ def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
 
 @dataclass(frozen=True)
 class Learned:
-    """As much of an engine's grammar as realisation reads; the only state of each lane is what a posture shows."""
+    """As much of an engine's grammar as realisation reads; the only state of each chain is what a posture shows."""
 
     corpus: Corpus
     states: Int32s
@@ -372,7 +372,7 @@ def learned(motion: Motion, facing: Facing = "free", rate: float | None = None) 
     states = np.repeat(np.arange(len(corpus), dtype=np.int32)[:, None], 23, axis=1)
     sizes = [len(corpus)] * 23
     ring = rot.about_vertical(np.arange(24) * np.pi / 12.0)
-    centres = list(np.swapaxes(corpus.to_lanes(corpus.rotations)[:, :23], 0, 1))
+    centres = list(np.swapaxes(corpus.to_chains(corpus.rotations)[:, :23], 0, 1))
     if facing == "free":
         steps = np.round(rot.heading(corpus.rotations[:, 0]) / (np.pi / 12.0)).astype(np.int32) % 24
         states, sizes, centres = np.concatenate([states, steps[:, None]], axis=1), [*sizes, 24], [*centres, ring]
@@ -418,10 +418,10 @@ def test_a_path_that_is_followed_is_in_its_states_at_each_move(walking: Learned)
     for within in (1e-6, np.radians(5.0)):
         found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, np.full(23, within))
         at = found.at(found.insertions[0].times)
-        lanes = [walking.corpus.to_lanes(q)[:, :23] for q in (at.rotations, motion.rotations[rows])]
+        chains = [walking.corpus.to_chains(q)[:, :23] for q in (at.rotations, motion.rotations[rows])]
         # Between two frames the spline is not the arc that `at` takes; a frame is 1 / 60 s.
-        assert rot.angle(*lanes).max() < within + 0.02
-    assert rot.angle(*lanes).max() > 0.02
+        assert rot.angle(*chains).max() < within + 0.02
+    assert rot.angle(*chains).max() > 0.02
 
 
 def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
@@ -432,7 +432,7 @@ def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
     share = np.linspace(0.0, 1.0, len(rows))[:, None]
     straight = rot.slerp(motion.rotations[5], motion.rotations[16], share)
     off, straight_off = (
-        rot.angle(*(walking.corpus.to_lanes(x)[:, :23] for x in (q, motion.rotations[rows]))).mean()
+        rot.angle(*(walking.corpus.to_chains(x)[:, :23] for x in (q, motion.rotations[rows]))).mean()
         for q in (found.rotations, straight)
     )
     assert off < 0.5 * straight_off

@@ -30,7 +30,7 @@ from motionmind.render.camera import VIEWS
 from motionmind.render.figure import BRIDGED, COLOURS, INSERTED
 from motionmind.render.film import write_film, write_still
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import HOLD, LARGEST, SMALLEST, SMOOTH, Drawing, Stage, moments
+from motionmind.render.stage import HOLD, LARGEST, SMALLEST, SMOOTH, FigurePlate, Stage, frame_times
 
 SMALL = 200  # pixels: pictures for tests
 UP = human23().height * 0.55  # metres from the floor to the root of a person who stands
@@ -114,7 +114,7 @@ ODD = {
 }
 
 
-def touched(drawing: Drawing, stage: Stage) -> tuple[Floats, Floats]:
+def touched(drawing: FigurePlate, stage: Stage) -> tuple[Floats, Floats]:
     """The rows and columns of the picture, pixels, that a body covers."""
     rows, columns = np.nonzero(drawing.canvas.solid != EMPTY)
     x, y = drawing.corner
@@ -294,7 +294,7 @@ def test_a_slice_without_its_insertions_ends_has_no_ghosts() -> None:
 @given(st.integers(2, 30), st.floats(0.3, 200.0), st.floats(0.5, 60.0))
 def test_moments_begin_and_end_with_the_motion_and_are_even(frames: int, fps: float, rate: float) -> None:
     motion = movement(frames=frames, fps=fps)
-    times = moments(motion, rate)
+    times = frame_times(motion, rate)
     steps = np.diff(times)
     assert times[[0, -1]].tolist() == motion.times[[0, -1]].tolist()
     assert np.allclose(steps, steps[0])
@@ -356,7 +356,7 @@ def test_a_gif_lasts_as_long_as_the_motion(tmp_path: Path, fps: float, frames: i
 def test_a_gif_shows_what_is_on_the_stage(tmp_path: Path) -> None:
     motion = bridged(along(movement(frames=12), 1.0, 0.2, 0.0), "left_knee")
     write_film(tmp_path / "a.gif", motion, size=SMALL)
-    stage = Stage(motion, moments(motion, 25.0), size=SMALL)
+    stage = Stage(motion, frame_times(motion, 25.0), size=SMALL)
     shown = list(opened(tmp_path / "a.gif"))
     assert len(shown) == len(stage) > 12  # motion written at 10 frames a second is drawn at 25
     for (picture, _), meant in zip(shown, stage.frames(), strict=True):
@@ -454,7 +454,7 @@ def test_an_mp4_shows_what_is_on_the_stage(tmp_path: Path, rate: float | None) -
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     motion = bridged(movement(frames=20, fps=30.0), "left_knee")
     write_film(tmp_path / "a.mp4", motion, fps=rate, size=SMALL)
-    stage = Stage(motion, moments(motion, rate or 30.0), size=SMALL)
+    stage = Stage(motion, frame_times(motion, rate or 30.0), size=SMALL)
     to_raw = [ffmpeg.get_ffmpeg_exe(), "-i", tmp_path / "a.mp4", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     run = subprocess.run(to_raw, check=True, capture_output=True)
     video = next(line for line in run.stderr.decode().splitlines() if "Video:" in line)

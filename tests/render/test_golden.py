@@ -24,8 +24,8 @@ from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.render import figure
-from motionmind.render.anatomy import body_of
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.body_shape import shape_of
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import (
     FRONT,
     STAGE_RIGHT,
@@ -52,7 +52,7 @@ def bent(skeleton: Skeleton, **turns: tuple[float, float, float]) -> Posture:
 def standing(**turns: tuple[float, float, float]) -> Posture:
     """human23, bent, with its lowest solid on the floor."""
     posture = bent(human23(), **turns)
-    cones, balls = body_of(human23()).solids(posture.rotations, posture.root)
+    cones, balls = shape_of(human23()).solids(posture.rotations, posture.root)
     lowest = min(cones.reach()[0, :, 1].min(), balls.reach()[0, :, 1].min())
     return replace(posture, root=np.array([0.0, -lowest, 0.0]))
 
@@ -90,9 +90,9 @@ def hand() -> Pixels:
     """The left palm of human44, the fingers half closed, from the front."""
     curled = dict.fromkeys(("left_fingers", "left_fingers_middle", "left_fingers_end"), (0.0, 0.0, -0.7))
     posture = bent(human44(), left_elbow=(-0.9, 0.0, 0.0), left_wrist=(-0.5, 0.0, 0.2), **curled)
-    body = body_of(posture.skeleton)
+    body = shape_of(posture.skeleton)
     fingers = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index("left_fingers")]
-    canvas = Canvas(-0.15, 0.1, 360, 240, 1200.0)
+    canvas = DepthBuffer(-0.15, 0.1, 360, 240, 1200.0)
     draw(canvas, *seen(*body.solids(posture.rotations, posture.root), FRONT, fingers))
     return halved(colour(canvas, body, np.full((240, 360, 3), 255, dtype=np.uint8)))
 

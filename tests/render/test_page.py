@@ -25,7 +25,7 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score
-from motionmind.render.anatomy import body_of
+from motionmind.render.body_shape import shape_of
 from motionmind.render.figure import BRIDGED, COLOURS, INSERTED
 from motionmind.render.page import packed, page, write_page
 
@@ -170,7 +170,7 @@ def test_what_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
 def test_solids_are_where_python_puts_them(show: Callable[..., Opened], skeleton: Skeleton) -> None:
     motion = random_motion(skeleton, 4)
     tab = show(motion)
-    cones, balls = body_of(skeleton).solids(motion.rotations, motion.root)
+    cones, balls = shape_of(skeleton).solids(motion.rotations, motion.root)
     joints = skeleton.positions(motion.rotations, motion.root)
     for frame in range(len(motion)):
         found = tab.get(f"motionmind.solids({frame})")

@@ -26,8 +26,8 @@ from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.render import sheet as sheets
-from motionmind.render.anatomy import FACE, Body, body_of
-from motionmind.render.depth_buffer import Canvas
+from motionmind.render.body_shape import FACE, BodyShape, shape_of
+from motionmind.render.depth_buffer import DepthBuffer
 from motionmind.render.figure import (
     ABOVE,
     COLOURS,
@@ -80,16 +80,16 @@ def mirrored(posture: Posture) -> Posture:
     return Posture(posture.skeleton, rot.mirror(posture.rotations[other]), posture.root * [-1.0, 1.0, 1.0])
 
 
-def drawn(posture: Posture, view: View, origin: Floats | None = None) -> tuple[Body, Canvas]:
+def drawn(posture: Posture, view: View, origin: Floats | None = None) -> tuple[BodyShape, DepthBuffer]:
     """A body on a canvas of 3 m by 3 m about the origin, which is the root's place by default."""
-    body = body_of(posture.skeleton)
-    canvas = Canvas(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
+    body = shape_of(posture.skeleton)
+    canvas = DepthBuffer(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
     solids = body.solids(posture.rotations, posture.root)
     draw(canvas, *seen(*solids, view, posture.root if origin is None else origin))
     return body, canvas
 
 
-def shown(body: Body, canvas: Canvas, *, part: str = "", paint: str = "") -> Bools:
+def shown(body: BodyShape, canvas: DepthBuffer, *, part: str = "", paint: str = "") -> Bools:
     """Which pixels [H, W] show a part, or a paint."""
     wanted = [part in {"", p} and paint in {"", c} for p, c in zip(body.parts, body.paints, strict=True)]
     return np.array([*wanted, False])[canvas.solid]
@@ -120,13 +120,13 @@ def moved(motion: Motion, *by: float) -> Motion:
     return replace(motion, root=np.add(motion.root, by))
 
 
-def cone(canvas: Canvas, number: int, a: Floats, b: Floats, a_radius: float, b_radius: float) -> None:
+def cone(canvas: DepthBuffer, number: int, a: Floats, b: Floats, a_radius: float, b_radius: float) -> None:
     """Draw one round cone."""
     one = Cones(a[None], b[None], np.array([a_radius]), np.array([b_radius]))
     canvas.draw(one, Ellipsoids(np.empty((0, 3)), np.empty((0, 3, 3))), np.array([number], dtype=np.int16))
 
 
-def ellipsoid(canvas: Canvas, number: int, centre: Floats, axes: Floats) -> None:
+def ellipsoid(canvas: DepthBuffer, number: int, centre: Floats, axes: Floats) -> None:
     """Draw one ellipsoid."""
     none = Cones(*np.empty((2, 0, 3)), *np.empty((2, 0)))
     canvas.draw(none, Ellipsoids(centre[None], axes[None]), np.array([number], dtype=np.int16))
@@ -141,9 +141,9 @@ def test_a_cone_is_the_union_of_its_balls(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.uniform(-0.8, 0.8, (2, 3)) * rng.choice([1.0, 0.1], (2, 3))
     radii = rng.uniform(0.02, 0.4, 2)
-    canvas = Canvas(-1.5, 1.5, 60, 60, 20.0)
+    canvas = DepthBuffer(-1.5, 1.5, 60, 60, 20.0)
     cone(canvas, 7, a, b, *radii)
-    balls = Canvas(-1.5, 1.5, 60, 60, 20.0)
+    balls = DepthBuffer(-1.5, 1.5, 60, 60, 20.0)
     for t in np.linspace(0.0, 1.0, 250):
         radius = radii[0] + t * (radii[1] - radii[0])
         ellipsoid(balls, 7, a + t * (b - a), radius * np.eye(3))
@@ -162,7 +162,7 @@ def test_an_ellipsoid_contains_its_axes_ends_and_no_more(seed: int) -> None:
     rng = np.random.default_rng(seed)
     radii = rng.uniform(0.1, 0.5, 3)
     axes = rot.to_matrix(rot.normalise(rng.normal(size=4))) * radii
-    canvas = Canvas(-1.0, 1.0, 200, 200, 100.0)
+    canvas = DepthBuffer(-1.0, 1.0, 200, 200, 100.0)
     ellipsoid(canvas, 0, np.zeros(3), axes)
     rows, columns = np.nonzero(canvas.solid == 0)
     x, y, z = (columns + 0.5) / 100 - 1.0, 1.0 - (rows + 0.5) / 100, canvas.depth[rows, columns]
@@ -176,8 +176,8 @@ def test_an_ellipsoid_contains_its_axes_ends_and_no_more(seed: int) -> None:
 def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None:
     posture = random_posture(4)
     _, together = drawn(posture, FRONT)
-    cones, balls = seen(*body_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
-    alone = Canvas(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
+    cones, balls = seen(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
+    alone = DepthBuffer(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
     for number in range(len(cones.a) + len(balls.centre)):
         draw(alone, cones, balls, frozenset([number]))
     assert np.array_equal(together.depth, alone.depth)
@@ -189,9 +189,9 @@ def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None
 def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
     posture = random_posture(9)
     _, whole = drawn(posture, FRONT)
-    solids = seen(*body_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
+    solids = seen(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
     rows, columns = slice(135, 165), slice(130, 170)  # the trunk and what is about it, cut on all sides
-    part = Canvas(columns.start / SCALE - HALF, HALF - rows.start / SCALE, 40, 30, SCALE)
+    part = DepthBuffer(columns.start / SCALE - HALF, HALF - rows.start / SCALE, 40, 30, SCALE)
     draw(part, *solids)
     assert all((whole.solid[rows, columns][edge] != EMPTY).any() for edge in np.s_[0, -1, (..., 0), (..., -1)])
     assert (part.solid != whole.solid[rows, columns]).mean() < 0.002
@@ -200,7 +200,7 @@ def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
 
 
 def test_what_goes_through_something_is_seen_on_both_sides_of_it() -> None:
-    canvas = Canvas(-1.0, 1.0, 100, 100, 50.0)
+    canvas = DepthBuffer(-1.0, 1.0, 100, 100, 50.0)
     cone(canvas, 0, np.array([-0.8, 0.0, 0.0]), np.array([0.8, 0.0, 0.0]), 0.1, 0.1)
     cone(canvas, 1, np.array([-0.8, 0.0, -0.5]), np.array([0.8, 0.0, 0.5]), 0.1, 0.1)
     middle_row = canvas.solid[50]
@@ -219,7 +219,7 @@ def test_views_are_right_handed_rotations(view: View) -> None:
 
 def test_a_part_pulls_the_centre_of_mass_by_its_share_of_the_mass() -> None:
     posture = standing()
-    body = body_of(human23())
+    body = shape_of(human23())
     cones, balls = body.solids(posture.rotations, posture.root)
     before = body.centre_of_mass(cones, balls)
     for part, share in {"head": 0.0694, "trunk": 0.4346, "left_thigh": 0.1416, "right_foot": 0.0137}.items():
@@ -235,7 +235,7 @@ def test_a_part_pulls_the_centre_of_mass_by_its_share_of_the_mass() -> None:
 
 def test_the_centre_of_mass_of_a_standing_body_is_over_its_feet_at_the_height_of_its_hips() -> None:
     posture = standing()
-    body = body_of(human23())
+    body = shape_of(human23())
     x, y, z = body.centre_of_mass(*body.solids(posture.rotations, posture.root))
     feet = human23().positions_and_tips(posture.rotations, posture.root)
     floor = feet[:, 1].min()
@@ -248,7 +248,7 @@ def test_sizes_grow_with_the_body() -> None:
     small = replace(human23(), name="child", offsets=human23().offsets / 2.0, tips=human23().tips / 2.0)
     rotations = random_posture(3).rotations
     for whole, half in zip(
-        body_of(human23()).solids(rotations, np.zeros(3)), body_of(small).solids(rotations, np.zeros(3)), strict=True
+        shape_of(human23()).solids(rotations, np.zeros(3)), shape_of(small).solids(rotations, np.zeros(3)), strict=True
     ):
         assert np.allclose(whole.reach(), 2.0 * half.reach())
 
@@ -256,7 +256,7 @@ def test_sizes_grow_with_the_body() -> None:
 def test_the_soles_stand_on_the_floor() -> None:
     posture = standing()
     floor = human23().positions_and_tips(posture.rotations, posture.root)[:, 1].min()
-    cones, balls = body_of(human23()).solids(posture.rotations, posture.root)
+    cones, balls = shape_of(human23()).solids(posture.rotations, posture.root)
     assert min(cones.reach()[0, :, 1].min(), balls.reach()[0, :, 1].min()) == pytest.approx(floor, abs=0.004)
 
 
@@ -302,7 +302,7 @@ def test_a_body_with_more_joints_than_human23_looks_the_same() -> None:
 def test_names_of_a_person_on_another_tree_make_no_person() -> None:
     person = human23()
     parents = (-1, *([0] * (len(person) - 1)))
-    body = body_of(replace(person, parents=parents))
+    body = shape_of(replace(person, parents=parents))
     assert FACE not in body.paints
     assert len(body.parts) >= len(person) - 1
 
@@ -350,9 +350,9 @@ def test_the_kneecap_is_on_the_side_to_which_the_knee_points(flexion: float, tur
     lifted = rot.mul(rot.about_vertical(turn), rot.exp(np.array([-lift, 0.0, 0.0])))
     posture = standing(left_hip=rot.log(lifted), left_knee=np.array([flexion, 0.0, 0.0]))
     ahead = rot.mul_vec(rot.mul(lifted, rot.exp(np.array([flexion / 2.0, 0.0, 0.0]))), np.array([0.0, 0.0, 1.0]))
-    cones, _ = body_of(human23()).solids(posture.rotations, posture.root)
+    cones, _ = shape_of(human23()).solids(posture.rotations, posture.root)
     knee = human23().positions(posture.rotations, posture.root)[NAMES.index("left_knee")]
-    beak = cones.b[body_of(human23()).parts.index("left_kneecap")] - knee
+    beak = cones.b[shape_of(human23()).parts.index("left_kneecap")] - knee
     assert np.allclose(beak / np.linalg.norm(beak), ahead)
     for view in (FRONT, STAGE_RIGHT):
         points = view.axes @ ahead
@@ -380,7 +380,7 @@ def test_the_nearer_leg_covers_the_farther(front: str) -> None:
     body, canvas = drawn(posture, FRONT)
     both = np.ones(canvas.solid.shape, dtype=bool)
     for side in swing:
-        alone = Canvas(-HALF, HALF, 300, 300, SCALE)
+        alone = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part == f"{side}_shank")
         draw(alone, *seen(*body.solids(posture.rotations, posture.root), FRONT, posture.root), only)
         both &= alone.solid != EMPTY
@@ -396,7 +396,7 @@ def test_each_pixel_shows_the_nearest_solid(seed: int) -> None:
     body, canvas = drawn(posture, FRONT)
     solids = seen(*body.solids(posture.rotations, posture.root), FRONT, posture.root)
     for solid in np.random.default_rng(seed).choice(len(body.parts), 5):
-        alone = Canvas(-HALF, HALF, 300, 300, SCALE)
+        alone = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         draw(alone, *solids, frozenset({int(solid)}))
         assert (canvas.depth >= alone.depth).all()
         mine = canvas.solid == solid
@@ -441,7 +441,7 @@ def test_a_limb_before_another_has_a_line_round_it_and_one_that_goes_on_has_none
     assert not ink[row + 8 : row + 14, column - 1 : column + 2].any()  # thigh and shank are one leg
 
 
-def lines(canvas: Canvas, parts: Floats, step: float, width: int) -> Bools:
+def lines(canvas: DepthBuffer, parts: Floats, step: float, width: int) -> Bools:
     """Pixels with one of another part that is nearer by a step within `width` above, below or beside them."""
     part = np.where(canvas.solid == EMPTY, -1, parts[canvas.solid])
     here, found = np.s_[width:-width, width:-width], np.zeros(part.shape, dtype=bool)
@@ -567,8 +567,8 @@ def test_what_is_under_the_floor_is_marked() -> None:
 def test_turned_out_feet_are_wider_from_above() -> None:
     def plan(**turns: Floats) -> Floats:
         posture = standing(**turns)
-        body = body_of(posture.skeleton)
-        feet = Canvas(-HALF, HALF, 300, 300, SCALE)
+        body = shape_of(posture.skeleton)
+        feet = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part.endswith("_foot"))
         draw(feet, *seen(*body.solids(posture.rotations, posture.root), ABOVE, posture.root), only)
         return np.ptp(np.argwhere(feet.solid != EMPTY), axis=0) / SCALE
@@ -591,7 +591,7 @@ def test_a_foot_in_the_air_is_not_on_the_floor() -> None:
 def test_an_insect_has_six_legs_in_two_colours() -> None:
     skeleton = ant()
     rotations = np.tile(rot.IDENTITY, (len(skeleton), 1))
-    body = body_of(skeleton)
+    body = shape_of(skeleton)
     assert sum(paint == LEFT for paint in body.paints) == sum(paint == RIGHT for paint in body.paints) == 9
     picture = contact_sheet(Motion(skeleton, rotations[None], np.array([[0.0, 0.006, 0.0]]), np.zeros(1)))
     pixels = np.asarray(picture).astype(int)[70:]
@@ -634,7 +634,7 @@ def tween(*bridged: tuple[str, int]) -> Motion:
 @pytest.mark.parametrize("joint", NAMES)
 def test_the_ball_of_a_bridged_joint_is_around_it_and_seen_from_somewhere(joint: str) -> None:
     posture = standing()
-    body, which = body_of(human23()), np.arange(len(NAMES)) == NAMES.index(joint)
+    body, which = shape_of(human23()), np.arange(len(NAMES)) == NAMES.index(joint)
     joints = human23().positions(posture.rotations, posture.root)
     cones, balls = body.solids(posture.rotations, posture.root)
     ball = bridge_balls(body, joints, which)
@@ -642,7 +642,7 @@ def test_the_ball_of_a_bridged_joint_is_around_it_and_seen_from_somewhere(joint:
     assert bridge_balls(body, joints, ~which).centre.shape == (len(NAMES) - 1, 3)
     green = 0
     for view in VIEWS:
-        canvas = Canvas(-HALF, HALF, 300, 300, SCALE)
+        canvas = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         draw(canvas, *seen(cones, balls.joined(ball), view, posture.root))
         assert canvas.solid.max() <= len(body.parts)
         picture = colour(canvas, body, np.full((300, 300, 3), 255, dtype=np.uint8)).astype(int)

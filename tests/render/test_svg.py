@@ -27,7 +27,7 @@ from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.render.camera import VIEWS
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import Stage, moments
+from motionmind.render.stage import Stage, frame_times
 from motionmind.render.svg import svg, write_svg
 from motionmind.render.trace import Lines, outlines, path, ridges, smooth
 
@@ -254,7 +254,7 @@ def test_frames_are_shown_when_they_are_to_be() -> None:
     total = float(film.attrib["dur"].removesuffix("s"))
     assert total == pytest.approx(motion.times[-1] - motion.times[0] + 0.8)
     shown = [float(key) * total for key in film.attrib["keyTimes"].split(";")]
-    assert shown == pytest.approx(moments(motion, 8.0) - motion.times[0], abs=1e-4)
+    assert shown == pytest.approx(frame_times(motion, 8.0) - motion.times[0], abs=1e-4)
     frames = film.attrib["values"].split(";")
     assert len(set(frames)) == len(frames) == len(shown) == 9
     assert film.attrib["calcMode"] == "discrete"
@@ -358,7 +358,7 @@ def unlike(one: Floats, other: Floats) -> float:
 def test_a_browser_shows_the_picture(browser: Any, tmp_path: Path) -> None:
     motion = tween()
     write_svg(tmp_path / "tween.svg", motion, fps=4)
-    stage = Stage(motion, moments(motion, 4.0))
+    stage = Stage(motion, frame_times(motion, 4.0))
     pictures = [picture.astype(np.float64) for picture in stage.frames()]
     size = stage.camera.width, stage.camera.height
     times = [*(stage.motion.times + 0.01), 1.79, 1.81]
@@ -371,7 +371,7 @@ def test_a_browser_shows_the_picture(browser: Any, tmp_path: Path) -> None:
 def test_who_wants_no_motion_sees_one_posture(browser: Any, tmp_path: Path) -> None:
     motion = tween()
     write_svg(tmp_path / "tween.svg", motion, fps=4)
-    stage = Stage(motion, moments(motion, 4.0))
+    stage = Stage(motion, frame_times(motion, 4.0))
     size = stage.camera.width, stage.camera.height
     first, last = shots(browser, tmp_path / "tween.svg", size, [0.01, 1.01], reduced_motion="reduce")
     assert (first == last).all()

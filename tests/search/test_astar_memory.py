@@ -14,11 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from toys import grid_of, noisy_messages, random_toy
+from toys import noisy_messages, random_toy, trellis_of
 
-from motionmind.search import astar, solve
-from motionmind.search import pair_chains as strips
-from motionmind.search.trellis import Grid
+from motionmind.search import astar, pair_chains, solve
+from motionmind.search.trellis import Trellis
 
 MOVES = 5
 ENOUGH = 50_000  # nodes, and expansions: more than any toy here needs
@@ -28,23 +27,23 @@ SEEDS = range(40)
 
 @dataclass(frozen=True)
 class Case:
-    """A grid, strips with a poor bound, and the optimum by brute force."""
+    """A trellis, pair chains with a poor bound, and the optimum by brute force."""
 
-    grid: Grid
-    cut: strips.Strips
+    trellis: Trellis
+    cut: pair_chains.PairChains
     bound: float
     optimum: float
 
     def search(self, budget: int, expansions: int = ENOUGH, cost: float = np.inf) -> tuple[float, float, int, int]:
         """Cost, bound, expansions and peak of nodes of A*."""
-        path = np.zeros(len(self.grid.dom_ptr) - 1, np.int64)
+        path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.grid, self.cut, self.bound, cost, path, budget, expansions, on)
+        return astar.search(self.trellis, self.cut, self.bound, cost, path, budget, expansions, on)
 
     @property
     def depth(self) -> int:
         """Nodes on a whole path: the root, and one for each variable but the last, which needs none."""
-        return MOVES * self.grid.lanes
+        return MOVES * self.trellis.chains
 
 
 @cache
@@ -55,9 +54,9 @@ def cases(even: bool = False) -> tuple[Case, ...]:
         toy = random_toy(seed, states=3, frustrated=True, even=even)
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if len(toy.sizes) > 1 and np.isfinite(optimum):
-            grid = grid_of(toy, MOVES)
-            cut = strips.cut(grid, noisy_messages(grid, seed, 20.0))
-            found.append(Case(grid, cut, strips.proven(cut), float(optimum)))
+            trellis = trellis_of(toy, MOVES)
+            cut = pair_chains.cut(trellis, noisy_messages(trellis, seed, 20.0))
+            found.append(Case(trellis, cut, pair_chains.proven(cut), float(optimum)))
     return tuple(found)
 
 
@@ -118,17 +117,17 @@ def test_nodes_with_the_same_frontier_are_one_so_hardly_any_is_expanded_twice() 
     """Only those are that were freed, because all that lies behind them was reached otherwise, and met again."""
     for case in cases() + cases(even=True):
         expansions = case.search(ENOUGH)[2]
-        assert expansions <= 1.05 * frontiers(case.grid)
+        assert expansions <= 1.05 * frontiers(case.trellis)
 
 
 def test_merging_frontiers_saves_what_the_tree_of_prefixes_would_cost() -> None:
-    saved = [prefixes(case.grid) / frontiers(case.grid) for case in cases()]
+    saved = [prefixes(case.trellis) / frontiers(case.trellis) for case in cases()]
     assert max(saved) > 100  # or the law above would say little
 
 
 def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
     """No theorem: who forgets other leaves looks elsewhere first. It holds for these; a change is worth a look."""
-    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
     for seed in SEEDS:
         toy = random_toy(seed, frustrated=True)
         found = [
@@ -147,13 +146,13 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
     """Or all but the way to the node that is being expanded: so forgetting is paid for by the nodes then made anew."""
     times = 0
     for case in cases():
-        path, nodes = np.zeros(len(case.grid.dom_ptr) - 1, np.int64), astar._root(case.grid, case.bound, budget)
+        path, nodes = np.zeros(len(case.trellis.dom_ptr) - 1, np.int64), astar._root(case.trellis, case.bound, budget)
         for _ in range(300):
             if nodes.tally[astar._HEAPED] == 0 or nodes.tally[astar._FREE] < 8:
                 break
             node = int(nodes.heap[0])
             astar._close(nodes, node)
-            astar._expand(case.grid, case.cut, nodes, node, np.inf, path)
+            astar._expand(case.trellis, case.cut, nodes, node, np.inf, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue
@@ -221,7 +220,7 @@ class ByTheBook:
         self.cost = np.inf
         self.expansions = self.forgotten = self.made = 0
         self.held = 1
-        self.root = Node(case.grid.lanes - 1, (0,) * case.grid.lanes, case.bound, case.bound, None, 0)
+        self.root = Node(case.trellis.chains - 1, (0,) * case.trellis.chains, case.bound, case.bound, None, 0)
         self.opened = {self.root}
         self.twins = defaultdict(list)
         self.lower = min(self.run(expansions), self.cost)
@@ -244,15 +243,15 @@ class ByTheBook:
     def expand(self, node: Node) -> bool:
         """Make the children of a node; whether there was room for all."""
         floor, var = node.key, node.var + 1
-        lane = var % self.case.grid.lanes
+        chain = var % self.case.trellis.chains
         for choice, f in children(self.case, node):
             key = max(f, floor)
             if key >= self.cost - astar.SAME:
                 continue
-            if var == len(self.case.grid.dom_ptr) - 2:
+            if var == len(self.case.trellis.dom_ptr) - 2:
                 self.cost = f
                 continue
-            frontier = (*node.frontier[:lane], choice, *node.frontier[lane + 1 :])
+            frontier = (*node.frontier[:chain], choice, *node.frontier[chain + 1 :])
             twin = next(reversed(self.twins[var, frontier]), None)
             if twin is not None and twin.f <= f + astar.SAME:
                 continue
@@ -305,30 +304,30 @@ class ByTheBook:
 
 def children(case: Case, node: Node) -> Iterator[tuple[int, float]]:
     """Choices for the next variable, and f with each."""
-    grid = case.grid
+    trellis = case.trellis
     i = node.var + 1
-    lane, frontier = i % grid.lanes, np.array(node.frontier, np.uint16)
-    before = grid.dom_ptr[i - grid.lanes] + node.frontier[lane]
-    for e in range(grid.row_ptr[before], grid.row_ptr[before + 1]):
-        grown = strips.step(grid, case.cut, i, frontier, e)
-        yield int(grid.row_to[e] - grid.dom_ptr[i]), node.f + grown
+    chain, frontier = i % trellis.chains, np.array(node.frontier, np.uint16)
+    before = trellis.dom_ptr[i - trellis.chains] + node.frontier[chain]
+    for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+        grown = pair_chains.step(trellis, case.cut, i, frontier, e)
+        yield int(trellis.row_to[e] - trellis.dom_ptr[i]), node.f + grown
 
 
-def frontiers(grid: Grid) -> int:
-    """Number of different nodes: for each variable, the choices of its lane and of all others' latest variables."""
-    sizes = np.diff(grid.dom_ptr).astype(float)
-    return int(sum(np.prod(sizes[i - grid.lanes + 1 : i + 1]) for i in range(grid.lanes - 1, len(sizes) - 1)))
+def frontiers(trellis: Trellis) -> int:
+    """Number of different nodes: for each variable, the choices of its chain and of all others' latest variables."""
+    sizes = np.diff(trellis.dom_ptr).astype(float)
+    return int(sum(np.prod(sizes[i - trellis.chains + 1 : i + 1]) for i in range(trellis.chains - 1, len(sizes) - 1)))
 
 
-def prefixes(grid: Grid) -> float:
+def prefixes(trellis: Trellis) -> float:
     """Number of ways to choose all variables, one after another."""
     total = 0.0
-    lanes = [np.ones(1)] * grid.lanes
-    for i in range(grid.lanes, len(grid.dom_ptr) - 1):
-        counts = np.zeros(grid.dom_ptr[i + 1] - grid.dom_ptr[i])
-        before = range(grid.dom_ptr[i - grid.lanes], grid.dom_ptr[i - grid.lanes + 1])
-        for p, many in zip(before, lanes[i % grid.lanes], strict=True):
-            np.add.at(counts, grid.row_to[grid.row_ptr[p] : grid.row_ptr[p + 1]] - grid.dom_ptr[i], many)
-        lanes[i % grid.lanes] = counts
-        total += float(np.prod([lane.sum() for lane in lanes]))
+    chains = [np.ones(1)] * trellis.chains
+    for i in range(trellis.chains, len(trellis.dom_ptr) - 1):
+        counts = np.zeros(trellis.dom_ptr[i + 1] - trellis.dom_ptr[i])
+        before = range(trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1])
+        for p, many in zip(before, chains[i % trellis.chains], strict=True):
+            np.add.at(counts, trellis.row_to[trellis.row_ptr[p] : trellis.row_ptr[p + 1]] - trellis.dom_ptr[i], many)
+        chains[i % trellis.chains] = counts
+        total += float(np.prod([chain.sum() for chain in chains]))
     return total

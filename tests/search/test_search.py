@@ -9,16 +9,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from toys import Toy, evaluate, grid_of, noisy_messages, random_toy
+from toys import Toy, evaluate, noisy_messages, random_toy, trellis_of
 
-from motionmind.search import astar, solve
-from motionmind.search import pair_chains as strips
+from motionmind.search import astar, pair_chains, solve
 from motionmind.search import trws as bound
 from motionmind.search.cfn import cfn
 from motionmind.search.polish import path_cost, polish
 from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Grid
+from motionmind.search.trellis import Trellis
 
 MOVES = 6
 PROVEN = 2 * solve.PROVEN
@@ -44,7 +43,7 @@ def answer(toy: Toy, rules: Rules) -> Certificate | None:
 
 
 def a_body(**changes: object) -> Toy:
-    """Two coupled lanes of two states, every move attested at 1 nat, all couplings at 0."""
+    """Two coupled chains of two states, every move attested at 1 nat, all couplings at 0."""
     toy = Toy(
         parents=(-1, 0),
         edges=(np.ones((2, 2)), np.ones((2, 2))),
@@ -102,7 +101,7 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
     monkeypatch: pytest.MonkeyPatch, sweeps: int, pairs: int
 ) -> None:
     monkeypatch.setattr(solve, "MOST_PAIRS", pairs)
-    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
     monkeypatch.setattr(solve, "SWEEPS_AT_ONCE", sweeps)
     searched = bounded = 0
     for seed in range(60):
@@ -132,14 +131,14 @@ def test_every_pair_of_sweeps_raises_the_bound_and_none_lifts_it_over_the_optimu
         toy = random_toy(seed, **kind)
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if optimum < np.inf:
-            grid = grid_of(toy, MOVES)
-            messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
-            proven = [bound.tighten(grid, messages, path, 1, np.inf)[0] for _ in range(8)]
+            trellis = trellis_of(toy, MOVES)
+            messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+            proven = [bound.tighten(trellis, messages, path, 1, np.inf)[0] for _ in range(8)]
             assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
             assert proven[-1] <= optimum + ROUNDING, seed
 
 
-def test_what_lanes_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[str, bool]) -> None:
+def test_what_chains_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[str, bool]) -> None:
     for seed in range(100):
         toy = random_toy(seed, **kind)
         start, goal = toy.ends()
@@ -148,7 +147,7 @@ def test_what_lanes_cost_on_their_own_is_no_more_than_the_optimum(kind: dict[str
         assert np.all(alone + toy.per_move * np.arange(MOVES + 1) <= toy.optima(MOVES) + ROUNDING), seed
 
 
-def test_what_lanes_cost_on_their_own_is_the_optimum_where_nothing_couples_them() -> None:
+def test_what_chains_cost_on_their_own_is_the_optimum_where_nothing_couples_them() -> None:
     for seed in range(100):
         toy = random_toy(seed)
         free = Toy(**{**vars(toy), "parents": (-1,) * len(toy.sizes)})
@@ -165,120 +164,125 @@ def test_f_never_overestimates_along_an_optimal_path_whatever_the_forward_messag
         found = answer(toy, toy.rules(MOVES, MOVES))
         if found is None:
             continue
-        grid = grid_of(toy, MOVES)
-        messages = bound.no_messages(grid) if noise is None else noisy_messages(grid, seed, noise)
+        trellis = trellis_of(toy, MOVES)
+        messages = bound.no_messages(trellis) if noise is None else noisy_messages(trellis, seed, noise)
         if noise is None:
-            bound.tighten(grid, messages, np.zeros((MOVES + 1) * grid.lanes, np.int64), 3, np.inf)
+            bound.tighten(trellis, messages, np.zeros((MOVES + 1) * trellis.chains, np.int64), 3, np.inf)
             f = float(messages.constants.sum())
         else:
-            f = bound.backward(grid, messages)
+            f = bound.backward(trellis, messages)
         optimum = found.cost - MOVES * toy.per_move
-        path = positions(grid, found.path)
-        for i in range(grid.lanes, len(path)):
-            edge = edge_between(grid, path[i - grid.lanes], path[i])
-            parent = grid.parents[i % grid.lanes]
-            above = path[i - i % grid.lanes + parent] if parent >= 0 else -1
-            grown = bound.step(grid, messages, i, path[i - grid.lanes], above, edge)
+        path = positions(trellis, found.path)
+        for i in range(trellis.chains, len(path)):
+            edge = edge_between(trellis, path[i - trellis.chains], path[i])
+            parent = trellis.parents[i % trellis.chains]
+            above = path[i - i % trellis.chains + parent] if parent >= 0 else -1
+            grown = bound.step(trellis, messages, i, path[i - trellis.chains], above, edge)
             assert grown >= -ROUNDING
             f += grown
             assert f <= optimum + PROVEN, (seed, i)
         assert f == pytest.approx(optimum, abs=ROUNDING)
 
 
-def test_two_lanes_are_one_strip_and_its_bound_is_their_optimum(kind: dict[str, bool]) -> None:
+def test_two_chains_are_one_pair_chain_and_its_bound_is_their_optimum(kind: dict[str, bool]) -> None:
     for seed in range(100):
         toy = random_toy(seed, most=2, **kind)
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if len(toy.sizes) == 2 and optimum < np.inf:
-            grid = grid_of(toy, MOVES)
-            cut, path = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros((MOVES + 1) * 2, np.int64)
-            assert strips.proven(cut) == pytest.approx(optimum, abs=ROUNDING), seed
-            strips.descend(grid, cut, path)
-            assert path_cost(grid, path) == pytest.approx(optimum, abs=ROUNDING), seed
+            trellis = trellis_of(toy, MOVES)
+            cut, path = (
+                pair_chains.cut(trellis, noisy_messages(trellis, seed, 5.0)),
+                np.zeros((MOVES + 1) * 2, np.int64),
+            )
+            assert pair_chains.proven(cut) == pytest.approx(optimum, abs=ROUNDING), seed
+            pair_chains.descend(trellis, cut, path)
+            assert path_cost(trellis, path) == pytest.approx(optimum, abs=ROUNDING), seed
 
 
-def test_every_sweep_of_strips_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
+def test_every_sweep_of_pair_chains_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
     tighter = 0
-    for grid, optimum, seed in bodies(100, kind):
-        messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
-        by_messages = bound.tighten(grid, messages, path, 50, np.inf)[0]
-        cut, through = strips.cut(grid, messages), np.zeros(len(grid.dom))
-        proven = [strips.proven(cut), *(strips.sweep(grid, cut, through) for _ in range(8))]
+    for trellis, optimum, seed in bodies(100, kind):
+        messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        by_messages = bound.tighten(trellis, messages, path, 50, np.inf)[0]
+        cut, through = pair_chains.cut(trellis, messages), np.zeros(len(trellis.dom))
+        proven = [pair_chains.proven(cut), *(pair_chains.sweep(trellis, cut, through) for _ in range(8))]
         assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
         assert proven[-1] <= optimum + ROUNDING, seed
-        assert proven[-1] == pytest.approx(strips.proven(cut), abs=ROUNDING), seed
+        assert proven[-1] == pytest.approx(pair_chains.proven(cut), abs=ROUNDING), seed
         tighter += proven[-1] > by_messages + 1e-3
     assert tighter > 3 or not kind.get("frustrated")
 
 
-def test_shares_move_between_strips_but_add_up_to_what_a_path_costs(kind: dict[str, bool]) -> None:
-    for grid, _, seed in bodies(60, kind):
-        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+def test_shares_move_between_pair_chains_but_add_up_to_what_a_path_costs(kind: dict[str, bool]) -> None:
+    for trellis, _, seed in bodies(60, kind):
+        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
         for draw in range(3):
-            path = some_path(grid, seed + draw)
-            assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), (seed, draw)
-            strips.sweep(grid, cut, through)
+            path = some_path(trellis, seed + draw)
+            assert shares(trellis, cut, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), (seed, draw)
+            pair_chains.sweep(trellis, cut, through)
 
 
 @pytest.mark.parametrize("sweeps", [0, 1, 3])
-def test_by_strips_f_grows_along_every_path_from_the_bound_to_its_cost(sweeps: int) -> None:
-    for grid, _, seed in bodies(60, {"frustrated": True}):
-        cut, through = strips.cut(grid, noisy_messages(grid, seed, 5.0)), np.zeros(len(grid.dom))
+def test_by_pair_chains_f_grows_along_every_path_from_the_bound_to_its_cost(sweeps: int) -> None:
+    for trellis, _, seed in bodies(60, {"frustrated": True}):
+        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 5.0)), np.zeros(len(trellis.dom))
         for _ in range(sweeps):
-            strips.sweep(grid, cut, through)
-        path = some_path(grid, seed)
-        f, frontier = strips.proven(cut), np.zeros(grid.lanes, np.uint16)
-        for i in range(grid.lanes, len(path)):
-            grown = strips.step(grid, cut, i, frontier, edge_between(grid, path[i - grid.lanes], path[i]))
+            pair_chains.sweep(trellis, cut, through)
+        path = some_path(trellis, seed)
+        f, frontier = pair_chains.proven(cut), np.zeros(trellis.chains, np.uint16)
+        for i in range(trellis.chains, len(path)):
+            grown = pair_chains.step(
+                trellis, cut, i, frontier, edge_between(trellis, path[i - trellis.chains], path[i])
+            )
             assert grown >= -ROUNDING, (seed, i)
             f += grown
-            frontier[i % grid.lanes] = path[i] - grid.dom_ptr[i]
-        assert f == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
+            frontier[i % trellis.chains] = path[i] - trellis.dom_ptr[i]
+        assert f == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
 
 
-def test_what_strips_bound_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
+def test_what_pair_chains_bound_through_a_position_is_no_more_than_any_path_through_it(kind: dict[str, bool]) -> None:
     moves = 4
     for seed in range(60):
         toy = random_toy(seed, **kind)
         if len(toy.sizes) == 1 or not np.isfinite(toy.optima(moves)[moves]):
             continue
-        grid, joint = grid_of(toy, moves), toy.joint_states()
-        cut, through = strips.cut(grid, noisy_messages(grid, seed, 2.0)), np.zeros(len(grid.dom))
+        trellis, joint = trellis_of(toy, moves), toy.joint_states()
+        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
         cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
         for _ in range(3):
-            strips.sweep(grid, cut, through)
-            for i, (first, last) in enumerate(pairwise(grid.dom_ptr)):
+            pair_chains.sweep(trellis, cut, through)
+            for i, (first, last) in enumerate(pairwise(trellis.dom_ptr)):
                 for p in range(first, last):
-                    here = cheapest[i // grid.lanes, joint[:, i % grid.lanes] == grid.dom[p]].min()
+                    here = cheapest[i // trellis.chains, joint[:, i % trellis.chains] == trellis.dom[p]].min()
                     assert through[p] <= here + ROUNDING, (seed, i)
 
 
 @pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
-def test_narrowed_strips_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
+def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
     taken_out = 0
     for whole, optimum, seed in bodies(100, {"frustrated": True}):
-        grid, cut = whole, strips.cut(whole, bound.no_messages(whole))
+        trellis, cut = whole, pair_chains.cut(whole, bound.no_messages(whole))
         for _ in range(3):
-            through = np.zeros(len(grid.dom))
-            proven = strips.sweep(grid, cut, through)
-            smaller, cut = strips.narrow(grid, cut, through, optimum + spare)
-            assert strips.proven(cut) >= proven - ROUNDING, seed
-            taken_out += len(grid.dom) - len(smaller.dom)
-            grid = smaller
-        path = some_path(grid, seed)
-        assert shares(grid, cut, path) == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
+            through = np.zeros(len(trellis.dom))
+            proven = pair_chains.sweep(trellis, cut, through)
+            smaller, cut = pair_chains.prune(trellis, cut, through, optimum + spare)
+            assert pair_chains.proven(cut) >= proven - ROUNDING, seed
+            taken_out += len(trellis.dom) - len(smaller.dom)
+            trellis = smaller
+        path = some_path(trellis, seed)
+        assert shares(trellis, cut, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
+        cost, lower, _, _ = astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
 
 
-def test_strips_are_left_empty_where_nothing_is_cheap_enough() -> None:
-    for grid, optimum, _ in bodies(20, {"frustrated": True}):
-        cut, through = strips.cut(grid, bound.no_messages(grid)), np.zeros(len(grid.dom))
-        proven = strips.sweep(grid, cut, through)
+def test_pair_chains_are_left_empty_where_nothing_is_cheap_enough() -> None:
+    for trellis, optimum, _ in bodies(20, {"frustrated": True}):
+        cut, through = pair_chains.cut(trellis, bound.no_messages(trellis)), np.zeros(len(trellis.dom))
+        proven = pair_chains.sweep(trellis, cut, through)
         assert proven <= optimum + ROUNDING
-        smaller, _ = strips.narrow(grid, cut, through, proven - 1.0)
+        smaller, _ = pair_chains.prune(trellis, cut, through, proven - 1.0)
         assert len(smaller.dom) == 0
 
 
@@ -288,36 +292,36 @@ def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(
         toy = random_toy(seed, **kind)
         if not np.isfinite(toy.optima(moves)[moves]):
             continue
-        grid, joint = grid_of(toy, moves), toy.joint_states()
-        messages = bound.no_messages(grid)
+        trellis, joint = trellis_of(toy, moves), toy.joint_states()
+        messages = bound.no_messages(trellis)
         cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
         for sweeps in (1, 3):
-            bound.tighten(grid, messages, np.zeros((moves + 1) * grid.lanes, np.int64), sweeps, np.inf)
-            for i, (first, last) in enumerate(pairwise(grid.dom_ptr)):
+            bound.tighten(trellis, messages, np.zeros((moves + 1) * trellis.chains, np.int64), sweeps, np.inf)
+            for i, (first, last) in enumerate(pairwise(trellis.dom_ptr)):
                 for p in range(first, last):
-                    here = cheapest[i // grid.lanes, joint[:, i % grid.lanes] == grid.dom[p]].min()
+                    here = cheapest[i // trellis.chains, joint[:, i % trellis.chains] == trellis.dom[p]].min()
                     assert messages.through[p] <= here + ROUNDING, (seed, i)
 
 
 @pytest.mark.parametrize("spare", [1e-6, 0.1, 1.0])
-def test_a_narrowed_grid_keeps_every_path_that_is_cheaper(spare: float) -> None:
+def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> None:
     taken_out = 0
     for seed in range(100):
         toy = random_toy(seed, frustrated=True)
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if optimum == np.inf:
             continue
-        grid = grid_of(toy, MOVES)
-        messages, path = bound.no_messages(grid), np.zeros((MOVES + 1) * grid.lanes, np.int64)
+        trellis = trellis_of(toy, MOVES)
+        messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         for _ in range(3):
-            bound.tighten(grid, messages, path, 1, np.inf)
-            smaller, messages = bound.narrow(grid, messages, optimum + spare)
-            taken_out += len(grid.dom) - len(smaller.dom)
-            grid = smaller
-        if grid.lanes == 1:
+            bound.tighten(trellis, messages, path, 1, np.inf)
+            smaller, messages = bound.prune(trellis, messages, optimum + spare)
+            taken_out += len(trellis.dom) - len(smaller.dom)
+            trellis = smaller
+        if trellis.chains == 1:
             continue
-        cut = strips.cut(grid, messages)
-        cost, lower, _, _ = astar.search(grid, cut, strips.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        cut = pair_chains.cut(trellis, messages)
+        cost, lower, _, _ = astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -330,13 +334,13 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if optimum == np.inf:
             continue
-        grid = grid_of(toy, MOVES)
-        messages, path = noisy_messages(grid, seed, 5.0), np.zeros((MOVES + 1) * grid.lanes, np.int64)
-        path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
-        before = bound.backward(grid, messages) + bound.descend(grid, messages, path, grid.lanes)
-        assert before == pytest.approx(path_cost(grid, path), abs=ROUNDING), seed
-        after = polish(grid, path)
-        states = grid.dom[path].reshape(MOVES + 1, grid.lanes)
+        trellis = trellis_of(toy, MOVES)
+        messages, path = noisy_messages(trellis, seed, 5.0), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
+        before = bound.backward(trellis, messages) + bound.descend(trellis, messages, path, trellis.chains)
+        assert before == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
+        after = polish(trellis, path)
+        states = trellis.dom[path].reshape(MOVES + 1, trellis.chains)
         assert after == pytest.approx(toy.cost(states) - MOVES * toy.per_move, abs=ROUNDING), seed
         assert optimum - ROUNDING <= after <= before + ROUNDING, seed
         better += after < before - ROUNDING
@@ -344,14 +348,14 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
 
 
 def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solve, "STRIP_SWEEPS", 0)
+    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
     expansions = {"apart": 0, "at once": 0}
     for seed in range(60):
         toy = random_toy(seed, most=3, frustrated=True)
         one, two = answer(toy, toy.rules(MOVES, MOVES)), twice(toy)
         if one is None or len(toy.sizes) == 1:
             continue
-        for how, parts in (("apart", solve._parts), ("at once", lambda grid: np.zeros(grid.lanes, np.int64))):
+        for how, parts in (("apart", solve._parts), ("at once", lambda trellis: np.zeros(trellis.chains, np.int64))):
             with monkeypatch.context() as patch:
                 patch.setattr(solve, "_parts", parts)
                 found = answer(two, two.rules(MOVES, MOVES, sweeps=1))
@@ -363,7 +367,7 @@ def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch:
     assert 0 < expansions["apart"] < 0.8 * expansions["at once"]
 
 
-def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
+def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
     toy = Toy(
         parents=(-1, 0, 1, 1),
         edges=tuple(np.ones((size, size)) for size in (2, 1, 2, 2)),
@@ -375,8 +379,8 @@ def test_a_lane_with_one_state_parts_those_below_it_from_those_above() -> None:
         wait=1.0,
         per_move=0.5,
     )
-    assert solve._parts(grid_of(toy, 3)).tolist() == [0, 1, 2, 3]
-    assert solve._parts(grid_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
+    assert solve._parts(trellis_of(toy, 3)).tolist() == [0, 1, 2, 3]
+    assert solve._parts(trellis_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
 
 
 # --- edges of the problem --------------------------------------------------------------------------------------------
@@ -391,7 +395,7 @@ def test_without_any_edge_a_body_can_only_wait_where_it_is() -> None:
     assert staying.cost == pytest.approx(2.5)
 
 
-def test_one_lane_of_one_state_is_a_body() -> None:
+def test_one_chain_of_one_state_is_a_body() -> None:
     still = Toy((-1,), (np.zeros((1, 1)),), (np.zeros(1),), (np.zeros(0),), (np.zeros((0, 1)),), (0,), (0,), 1.0, 1.0)
     found = answer(still, still.rules(3, 5))
     assert found is not None
@@ -411,7 +415,7 @@ def test_no_path_is_found_where_the_least_number_of_moves_exceeds_the_greatest()
     assert answer(a_body(), Rules(1.0, 0.5, 4, 3, 100)) is None
 
 
-def test_a_lane_waits_at_its_goal_for_beta_or_holds_there_if_that_is_cheaper() -> None:
+def test_a_chain_waits_at_its_goal_for_beta_or_holds_there_if_that_is_cheaper() -> None:
     dear, cheap = np.array([[9.0, 1.0], [1.0, 9.0]]), np.array([[9.0, 1.0], [1.0, 0.25]])
     for edges, held in ((dear, 2.0), (cheap, 0.25)):
         found = answer(a_body(edges=(edges, edges)), Rules(2.0, 0.0, 2, 2, 100))
@@ -419,7 +423,7 @@ def test_a_lane_waits_at_its_goal_for_beta_or_holds_there_if_that_is_cheaper() -
         assert found.cost == pytest.approx(2 * (1.0 + held))
 
 
-def test_a_body_without_a_tree_is_as_many_bodies_as_lanes() -> None:
+def test_a_body_without_a_tree_is_as_many_bodies_as_chains() -> None:
     for seed in range(50):
         toy = random_toy(seed)
         free = Toy(**{**vars(toy), "parents": (-1,) * len(toy.sizes)})
@@ -474,9 +478,9 @@ def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> No
         found = answer(toy, toy.rules(1, MOVES))
         if found is None:
             continue
-        moves, lanes = len(found.path) - 1, [f"lane{lane}" for lane in range(len(toy.sizes))]
-        text = cfn(toy.model(), *toy.ends(), toy.rules(1, MOVES), moves, lanes)
-        assert evaluate(text, found.path, lanes) == pytest.approx(found.cost, abs=1e-4), seed
+        moves, chains = len(found.path) - 1, [f"chain{chain}" for chain in range(len(toy.sizes))]
+        text = cfn(toy.model(), *toy.ends(), toy.rules(1, MOVES), moves, chains)
+        assert evaluate(text, found.path, chains) == pytest.approx(found.cost, abs=1e-4), seed
 
 
 def test_the_written_problem_forbids_what_the_model_forbids() -> None:
@@ -499,59 +503,59 @@ def twice(toy: Toy) -> Toy:
 
 
 def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:
-    """Tables of couplings of two states each, for the last two lanes."""
+    """Tables of couplings of two states each, for the last two chains."""
     return {
         "above": (*toy.above[:2], np.zeros(2), np.zeros(2)),
         "corrections": (*toy.corrections[:2], np.zeros((2, 2)), np.zeros((2, 2))),
     }
 
 
-def bodies(seeds: int, kind: dict[str, bool]) -> Iterator[tuple[Grid, float, int]]:
-    """Grids of MOVES moves of toys with at least two lanes, and their optima without tau."""
+def bodies(seeds: int, kind: dict[str, bool]) -> Iterator[tuple[Trellis, float, int]]:
+    """Grids of MOVES moves of toys with at least two chains, and their optima without tau."""
     for seed in range(seeds):
         toy = random_toy(seed, **kind)
         optimum = float(toy.optima(MOVES)[MOVES] - MOVES * toy.per_move)
         if len(toy.sizes) > 1 and optimum < np.inf:
-            yield grid_of(toy, MOVES), optimum, seed
+            yield trellis_of(toy, MOVES), optimum, seed
 
 
-def some_path(grid: Grid, seed: int) -> np.ndarray:
+def some_path(trellis: Trellis, seed: int) -> np.ndarray:
     """A path of positions [n], each edge drawn at random."""
-    rng, path = np.random.default_rng(seed), np.zeros(len(grid.dom_ptr) - 1, np.int64)
-    path[: grid.lanes] = grid.dom_ptr[: grid.lanes]
-    for i in range(grid.lanes, len(path)):
-        before = path[i - grid.lanes]
-        path[i] = rng.choice(grid.row_to[grid.row_ptr[before] : grid.row_ptr[before + 1]])
+    rng, path = np.random.default_rng(seed), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
+    path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
+    for i in range(trellis.chains, len(path)):
+        before = path[i - trellis.chains]
+        path[i] = rng.choice(trellis.row_to[trellis.row_ptr[before] : trellis.row_ptr[before + 1]])
     return path
 
 
-def shares(grid: Grid, cut: strips.Strips, path: np.ndarray) -> float:
-    """What the strips cost on a path [n], each by its own shares."""
+def shares(trellis: Trellis, cut: pair_chains.PairChains, path: np.ndarray) -> float:
+    """What the pair chains cost on a path [n], each by its own shares."""
     total = 0.0
     for i, p in enumerate(path):
-        lane = i % grid.lanes
-        if lane == 0:
+        chain = i % trellis.chains
+        if chain == 0:
             continue
-        a = i - lane + cut.above[lane]
-        size = grid.dom_ptr[i + 1] - grid.dom_ptr[i]
-        total += cut.stand[cut.pair_ptr[i] + (path[a] - grid.dom_ptr[a]) * size + p - grid.dom_ptr[i]]
-        if i + grid.lanes < len(path):
-            total += cut.own[edge_between(grid, p, path[i + grid.lanes])]
-            e = edge_between(grid, path[a], path[a + grid.lanes])
-            total += cut.led[cut.led_ptr[i] + e - grid.row_ptr[grid.dom_ptr[a]]]
+        a = i - chain + cut.above[chain]
+        size = trellis.dom_ptr[i + 1] - trellis.dom_ptr[i]
+        total += cut.stand[cut.pair_ptr[i] + (path[a] - trellis.dom_ptr[a]) * size + p - trellis.dom_ptr[i]]
+        if i + trellis.chains < len(path):
+            total += cut.own[edge_between(trellis, p, path[i + trellis.chains])]
+            e = edge_between(trellis, path[a], path[a + trellis.chains])
+            total += cut.led[cut.led_ptr[i] + e - trellis.row_ptr[trellis.dom_ptr[a]]]
     return float(total)
 
 
-def positions(grid: object, states: np.ndarray) -> np.ndarray:
+def positions(trellis: object, states: np.ndarray) -> np.ndarray:
     """Positions [n] of a path of states [T + 1, L]."""
     return np.array(
         [
-            first + np.flatnonzero(grid.dom[first:last] == state)[0]
-            for (first, last), state in zip(pairwise(grid.dom_ptr), states.ravel(), strict=True)
+            first + np.flatnonzero(trellis.dom[first:last] == state)[0]
+            for (first, last), state in zip(pairwise(trellis.dom_ptr), states.ravel(), strict=True)
         ]
     )
 
 
-def edge_between(grid: object, before: int, after: int) -> int:
-    row = range(grid.row_ptr[before], grid.row_ptr[before + 1])
-    return next(e for e in row if grid.row_to[e] == after)
+def edge_between(trellis: object, before: int, after: int) -> int:
+    row = range(trellis.row_ptr[before], trellis.row_ptr[before + 1])
+    return next(e for e in row if trellis.row_to[e] == after)

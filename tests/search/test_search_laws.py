@@ -30,7 +30,7 @@ from motionmind.tween.result import Tween
 
 MOVES = 4
 SAME = 2 * PROVEN
-BODY = Skeleton("body", ("trunk", "arm", "leg"), (-1, 0, 0), np.zeros((3, 3)))
+BODY = Skeleton("body", ("trunk", "arm", "segment"), (-1, 0, 0), np.zeros((3, 3)))
 
 Ends = tuple[Posture, Posture]
 seeds = st.integers(0, 10_000)
@@ -77,19 +77,19 @@ class Book:
         self.start, self.goal = engine.space.assign(np.stack([end.rotations for end in ends]))
         self.sizes = states.max(axis=0) + 1
         self.moves, self.stands = [], []
-        for lane, size in enumerate(self.sizes):
+        for chain, size in enumerate(self.sizes):
             count = np.zeros((size, size))
-            for piece in np.split(states[:, lane], breaks):
+            for piece in np.split(states[:, chain], breaks):
                 np.add.at(count, (piece[:-1], piece[1:]), 1)
             leaving = count.sum(axis=1, keepdims=True)
             kinds = (count > 0).sum(axis=1, keepdims=True)
             with np.errstate(divide="ignore", invalid="ignore"):
                 cost = np.where(count > 0, (1 - novelty) * np.log(leaving / count) + novelty * np.log(kinds), np.inf)
-            cost[self.goal[lane], self.goal[lane]] = min(cost[self.goal[lane], self.goal[lane]], 1.0)  # beta
+            cost[self.goal[chain], self.goal[chain]] = min(cost[self.goal[chain], self.goal[chain]], 1.0)  # beta
             self.moves.append(cost)
-            if lane > 0:
+            if chain > 0:
                 seen = np.zeros((self.sizes[0], size))
-                np.add.at(seen, (states[:, 0], states[:, lane]), 1)
+                np.add.at(seen, (states[:, 0], states[:, chain]), 1)
                 share = seen.sum(axis=0) / len(states)  # of the pseudo-count, which is 1
                 self.stands.append(-np.log((seen + share) / (seen.sum(axis=1, keepdims=True) + 1.0)))
 
@@ -103,10 +103,10 @@ class Book:
 
     def costs(self, paths: Ints) -> Floats:
         total = np.full(len(paths), float(paths.shape[1] - 1))  # tau
-        for lane in range(3):
-            total += self.moves[lane][paths[:, :-1, lane], paths[:, 1:, lane]].sum(axis=1)
-            if lane > 0:
-                total += self.stands[lane - 1][paths[:, 1:, 0], paths[:, 1:, lane]].sum(axis=1)
+        for chain in range(3):
+            total += self.moves[chain][paths[:, :-1, chain], paths[:, 1:, chain]].sum(axis=1)
+            if chain > 0:
+                total += self.stands[chain - 1][paths[:, 1:, 0], paths[:, 1:, chain]].sum(axis=1)
         return total
 
     def best(
@@ -126,17 +126,17 @@ class Book:
             if pin:
                 wanted = (self.start if pin[1] == "A" else self.goal)[pin[0]]
                 cost[(inner[:, :, pin[0]] != wanted).any(axis=1)] = np.inf
-            for lane, state in avoid:
-                cost[(inner[:, :, lane] == state).any(axis=1)] = np.inf
+            for chain, state in avoid:
+                cost[(inner[:, :, chain] == state).any(axis=1)] = np.inf
             if via:
                 there = (inner == via[0]).all(axis=2)
                 if via[1] is not None:
                     there &= np.arange(1, count) == via[1]
                 cost[~there.any(axis=1)] = np.inf
-            for other, lane in product(unlike, range(3)):
-                for a, b in set(pairwise(other[:, lane].tolist())):
+            for other, chain in product(unlike, range(3)):
+                for a, b in set(pairwise(other[:, chain].tolist())):
                     if a != b:
-                        cost += diversity * ((paths[:, :-1, lane] == a) & (paths[:, 1:, lane] == b)).sum(axis=1)
+                        cost += diversity * ((paths[:, :-1, chain] == a) & (paths[:, 1:, chain] == b)).sum(axis=1)
             every.append(cost)
         costs = np.concatenate(every)
         least = float(costs.min())
@@ -159,12 +159,12 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
     asked: dict[str, Any] = {"moves": moves, "novelty": novelty, "diversity": 0.75}
     listed: dict[str, Any] = {"moves": range(moves[0], MOVES + 1), "diversity": 0.75}
     if pinned:
-        lane, end = int(rng.integers(3)), str(rng.choice(["A", "B"]))
-        asked["pin"], listed["pin"] = {names[lane]: end}, (lane, end)
+        chain, end = int(rng.integers(3)), str(rng.choice(["A", "B"]))
+        asked["pin"], listed["pin"] = {names[chain]: end}, (chain, end)
     if avoided:
-        lanes = rng.integers(3, size=avoided)
-        listed["avoid"] = [(int(lane), int(rng.integers(book.sizes[lane]))) for lane in lanes]
-        asked["avoid"] = [(names[lane], state) for lane, state in listed["avoid"]]
+        chains = rng.integers(3, size=avoided)
+        listed["avoid"] = [(int(chain), int(rng.integers(book.sizes[chain]))) for chain in chains]
+        asked["avoid"] = [(names[chain], state) for chain, state in listed["avoid"]]
     if passed:
         frame, move = int(rng.integers(len(movement[0]))), int(rng.integers(1, MOVES)) if rng.random() < 0.5 else None
         through = movement[0].posture(frame)
@@ -236,9 +236,9 @@ def test_an_avoided_state_that_the_best_path_does_not_visit_changes_nothing(seed
     assert free is not None
     elsewhere = [
         (name, state)
-        for lane, name in enumerate(BODY.names)
-        for state in range(engine.space.sizes[lane])
-        if state not in free.path[1:-1, lane]
+        for chain, name in enumerate(BODY.names)
+        for state in range(engine.space.sizes[chain])
+        if state not in free.path[1:-1, chain]
     ]
     kept = join(engine, ends, avoid=elsewhere)
     assert kept is not None
@@ -277,8 +277,8 @@ def test_where_moves_cost_the_same_both_ways_the_way_back_costs_what_the_way_the
     back = replace(there, start=there.goal, goal=there.start)
 
     def stand(states: tuple[int, ...]) -> float:
-        coupled = [lane for lane, parent in enumerate(toy.parents) if parent >= 0]
-        return sum(toy.coupling(lane)[states[toy.parents[lane]], states[lane]] for lane in coupled)
+        coupled = [chain for chain, parent in enumerate(toy.parents) if parent >= 0]
+        return sum(toy.coupling(chain)[states[toy.parents[chain]], states[chain]] for chain in coupled)
 
     first, second = (solve(body.model(), *body.ends(), body.rules(2, 5)) for body in (there, back))
     assert (first is None) == (second is None)

@@ -16,7 +16,7 @@ import pytest
 from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toys import Toy, evaluate, grid_of, random_toy
+from toys import Toy, evaluate, random_toy, trellis_of
 
 from motionmind._typing import Bools, Int32s
 from motionmind.body.motion import Posture
@@ -28,11 +28,11 @@ from motionmind.geometry import rotations as rot
 from motionmind.search import astar
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Via
-from motionmind.search.sample import sample
+from motionmind.search.sample import gibbs_sample
 from motionmind.search.solve import PROVEN, Certificate, Progress, solve
-from motionmind.search.trellis import Grid
+from motionmind.search.trellis import Trellis
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import dearer, shared_moves
+from motionmind.tween.problem import penalise, shared_moves
 from motionmind.tween.result import Tween
 
 MOVES = 5
@@ -189,13 +189,13 @@ def test_moves_shared_with_others_cost_as_much_more_as_is_said(seed: int, divers
         dear = toy.edges
         for path in others:
             tables = [table.copy() for table in dear]
-            made = {(lane, a[lane], b[lane]) for a, b in pairwise(path) for lane in range(len(tables))}
-            for lane, state, target in made:
+            made = {(chain, a[chain], b[chain]) for a, b in pairwise(path) for chain in range(len(tables))}
+            for chain, state, target in made:
                 if state != target:
-                    tables[lane][state, target] += diversity
+                    tables[chain][state, target] += diversity
             dear = tuple(tables)
         expected = replace(toy, edges=dear).optima(MOVES)[1:].min()
-        found = solve(dearer(toy.model(), others, diversity), *toy.ends(), toy.rules(1, MOVES))
+        found = solve(penalise(toy.model(), others, diversity), *toy.ends(), toy.rules(1, MOVES))
         if found is None:
             assert expected == np.inf
             return
@@ -210,7 +210,7 @@ def test_moves_shared_with_others_cost_as_much_more_as_is_said(seed: int, divers
 def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
     toy = random_toy(seed)
     rng = np.random.default_rng(seed)
-    new = [rng.permutation(size) for size in toy.sizes]  # what was state new[lane][s] is s
+    new = [rng.permutation(size) for size in toy.sizes]  # what was state new[chain][s] is s
     other = replace(
         toy,
         edges=tuple(table[np.ix_(p, p)] for table, p in zip(toy.edges, new, strict=True)),
@@ -244,25 +244,25 @@ def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
 
 @settings(max_examples=60)
 @given(st.integers(0, 10_000))
-def test_lanes_in_another_order_cost_the_same(seed: int) -> None:
+def test_chains_in_another_order_cost_the_same(seed: int) -> None:
     toy = random_toy(seed)
     rng = np.random.default_rng(seed)
     order: list[int] = []  # any in which parents come first
     while len(order) < len(toy.sizes):
-        ready = [lane for lane, parent in enumerate(toy.parents) if lane not in order and parent in (-1, *order)]
+        ready = [chain for chain, parent in enumerate(toy.parents) if chain not in order and parent in (-1, *order)]
         order.append(int(rng.choice(ready)))
     moved = {
-        name: tuple(getattr(toy, name)[lane] for lane in order)
+        name: tuple(getattr(toy, name)[chain] for chain in order)
         for name in ("edges", "children", "above", "corrections", "start", "goal")
     }
-    parents = tuple(order.index(toy.parents[lane]) if toy.parents[lane] >= 0 else -1 for lane in order)
+    parents = tuple(order.index(toy.parents[chain]) if toy.parents[chain] >= 0 else -1 for chain in order)
     other = replace(toy, parents=parents, **moved)
     allowed = [rng.random(size) > 0.2 for size in toy.sizes]
     via = rng.integers(toy.sizes)
     costs = []
-    for body, lanes in ((toy, range(len(order))), (other, order)):
-        model = body.model()._replace(allowed=np.concatenate([allowed[lane] for lane in lanes]))
-        found = solve(model, *body.ends(), body.rules(1, MOVES), [Via(via[list(lanes)])])
+    for body, chains in ((toy, range(len(order))), (other, order)):
+        model = body.model()._replace(allowed=np.concatenate([allowed[chain] for chain in chains]))
+        found = solve(model, *body.ends(), body.rules(1, MOVES), [Via(via[list(chains)])])
         costs.append(np.inf if found is None else found.cost)
     assert costs[0] == pytest.approx(costs[1], abs=2 * PROVEN)
 
@@ -274,14 +274,16 @@ def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:
         toy = random_toy(seed, frustrated=seed % 2 == 0)
         rng = np.random.default_rng(seed)
         allowed = rng.random(sum(toy.sizes)) >= 0.15
-        model = dearer(toy.model()._replace(allowed=allowed), [rng.integers(toy.sizes, size=(9, len(toy.sizes)))], 1.5)
+        model = penalise(
+            toy.model()._replace(allowed=allowed), [rng.integers(toy.sizes, size=(9, len(toy.sizes)))], 1.5
+        )
         vias = [Via(rng.integers(toy.sizes)) for _ in range(seed % 3)]
         found = solve(model, *toy.ends(), toy.rules(2, MOVES), vias)
         if found is None:
             continue
         at = [Via(via.states, move) for via, move in zip(vias, found.passed, strict=True)]
-        lanes = [f"lane{lane}" for lane in range(len(toy.sizes))]
-        text = cfn(model, *toy.ends(), toy.rules(2, MOVES), len(found.path) - 1, lanes, at)
+        chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
+        text = cfn(model, *toy.ends(), toy.rules(2, MOVES), len(found.path) - 1, chains, at)
         (tmp_path / "problem.cfn").write_text(text)
         network = pytoulbar2.CFN(verbose=-1)
         network.Read(str(tmp_path / "problem.cfn"))
@@ -323,14 +325,14 @@ def test_an_interrupted_search_knows_a_path_and_a_bound_wherever_it_is_ended() -
 # --- memory -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("lanes", [1, 24, 45])
+@pytest.mark.parametrize("chains", [1, 24, 45])
 @pytest.mark.parametrize("memory", [10_000, 1_000_000, 33_554_432])
-def test_nodes_take_no_more_memory_than_is_said(memory: int, lanes: int) -> None:
-    parents = np.full(lanes, -1, np.int64)
+def test_nodes_take_no_more_memory_than_is_said(memory: int, chains: int) -> None:
+    parents = np.full(chains, -1, np.int64)
     empty, none = np.zeros(0), np.zeros(0, np.int64)
-    grid = Grid(lanes, 0, parents, none, none, empty, none, none, empty, none, none, none, empty)
-    budget = astar.nodes_in(memory, lanes)
-    held = sum(array.nbytes for array in astar._root.py_func(grid, 0.0, budget))
+    trellis = Trellis(chains, 0, parents, none, none, empty, none, none, empty, none, none, none, empty)
+    budget = astar.nodes_in(memory, chains)
+    held = sum(array.nbytes for array in astar._root.py_func(trellis, 0.0, budget))
     forgetting = budget
     assert 0.8 * memory < held + forgetting <= memory + 100
 
@@ -357,15 +359,18 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         likely = paths_of(toy, 3)
         if not 4 <= len(likely) <= 400:
             continue
-        grid = grid_of(toy, 3)
+        trellis = trellis_of(toy, 3)
         first = np.frombuffer(next(iter(likely)), dtype=np.int32)
         path = np.array(
-            [a + np.flatnonzero(grid.dom[a:b] == s)[0] for (a, b), s in zip(pairwise(grid.dom_ptr), first, strict=True)]
+            [
+                a + np.flatnonzero(trellis.dom[a:b] == s)[0]
+                for (a, b), s in zip(pairwise(trellis.dom_ptr), first, strict=True)
+            ]
         )
         rng, draws, seen = np.random.default_rng(seed), 4000, dict.fromkeys(likely, 0)
         for _ in range(draws):
-            cost = sample(grid, path, 1, rng)
-            states = grid.dom[path].reshape(4, -1)
+            cost = gibbs_sample(trellis, path, 1, rng)
+            states = trellis.dom[path].reshape(4, -1)
             seen[states.tobytes()] += 1
         assert cost + 3 * toy.per_move == pytest.approx(toy.cost(states), abs=1e-9)
         apart = 0.5 * sum(abs(seen[path] / draws - p) for path, p in likely.items())
@@ -397,7 +402,7 @@ def plain(engine: Engine) -> Tween:
     return join(engine)
 
 
-def lane_of(tween: Tween, joint: str) -> Int32s:
+def chain_of(tween: Tween, joint: str) -> Int32s:
     return tween.path[:, tween.joints.index(joint)]
 
 
@@ -423,27 +428,27 @@ def test_a_motion_lasts_as_long_as_is_asked_for(engine: Engine, duration: float)
 def test_a_pinned_joint_is_in_the_state_of_its_end(engine: Engine, plain: Tween) -> None:
     for joint in ("left_wrist", "right_elbow"):
         at_a, at_b = join(engine, pin={joint: "A"}), join(engine, pin={joint: "B"})
-        assert set(lane_of(at_a, joint)[:-1]) == {lane_of(plain, joint)[0]}
-        assert set(lane_of(at_b, joint)[1:]) == {lane_of(plain, joint)[-1]}
+        assert set(chain_of(at_a, joint)[:-1]) == {chain_of(plain, joint)[0]}
+        assert set(chain_of(at_b, joint)[1:]) == {chain_of(plain, joint)[-1]}
         assert min(at_a.cost, at_b.cost) >= plain.cost - 1e-6
         assert {at_a.status, at_b.status} == {"optimal"}
 
 
 def test_a_held_joint_stays_and_one_that_cannot_is_refused(engine: Engine, plain: Tween) -> None:
-    alike = [joint for joint in plain.joints if lane_of(plain, joint)[0] == lane_of(plain, joint)[-1]]
+    alike = [joint for joint in plain.joints if chain_of(plain, joint)[0] == chain_of(plain, joint)[-1]]
     found = join(engine, hold=alike[:3])
-    assert all(len(set(lane_of(found, joint))) == 1 for joint in alike[:3])
+    assert all(len(set(chain_of(found, joint))) == 1 for joint in alike[:3])
     assert found.cost >= plain.cost - 1e-6
     with pytest.raises(NoPathError, match=r"hold left_ankle: A and B differ there, .* cannot be held"):
         join(engine, hold=["left_ankle"])
 
 
 def test_an_avoided_state_is_not_on_the_way_by_number_or_by_name(engine: Engine, plain: Tween) -> None:
-    lane = plain.joints.index("left_knee")
-    state = int(plain.path[1, lane])
-    name = engine.space.label(lane, state)
+    chain = plain.joints.index("left_knee")
+    state = int(plain.path[1, chain])
+    name = engine.space.label(chain, state)
     by_number, by_name = (join(engine, avoid=[("left_knee", wanted)], moves=plain.moves) for wanted in (state, name))
-    assert state not in by_number.path[1:-1, lane]
+    assert state not in by_number.path[1:-1, chain]
     np.testing.assert_array_equal(by_number.path, by_name.path)
     assert by_number.cost > plain.cost
 
@@ -452,7 +457,7 @@ def test_postures_are_passed_in_order_and_shown_as_they_are(engine: Engine, plai
     passe, plie = posture("passe"), posture("plie")
     found = join(engine, via=[passe, plie])
     assert 0 < found.passed[0] < found.passed[1] < found.moves
-    states = engine.space.assign(engine.corpus.to_lanes(np.stack([passe.rotations, plie.rotations])))
+    states = engine.space.assign(engine.corpus.to_chains(np.stack([passe.rotations, plie.rotations])))
     np.testing.assert_array_equal(found.path[list(found.passed)], states)
     again = join(engine, via=[(passe, found.passed[0]), (plie, found.passed[1])], moves=found.moves)
     assert again.cost == pytest.approx(found.cost, abs=1e-6)
@@ -498,7 +503,7 @@ def test_a_path_is_drawn_by_its_seed_under_all_that_was_asked(engine: Engine, pl
         assert tween.status == "sampled"
         assert tween.lower_bound == best.lower_bound < tween.cost
         assert tween.passed == best.passed
-        assert set(lane_of(tween, "left_wrist")[:-1]) == {lane_of(plain, "left_wrist")[0]}
+        assert set(chain_of(tween, "left_wrist")[:-1]) == {chain_of(plain, "left_wrist")[0]}
         np.testing.assert_array_equal(tween.path[tween.passed[0]], best.path[best.passed[0]])
         assert evaluate(tween.problem(), tween.path, tween.joints) == pytest.approx(tween.cost, abs=1e-3)
 
@@ -532,8 +537,8 @@ def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:
 
 def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(engine: Engine) -> None:
     plain = join(engine)
-    lane = plain.joints.index("right_elbow")
-    every = [("right_elbow", state) for state in range(engine.space.sizes[lane])]
+    chain = plain.joints.index("right_elbow")
+    every = [("right_elbow", state) for state in range(engine.space.sizes[chain])]
     with pytest.raises(NoPathError, match=r"in 4 moves(.|\n)*right_elbow") as fault:
         join(engine, avoid=[("left_hip", 1), *every], pin={"right_elbow": "B", "left_knee": "A"}, moves=4, strict=True)
     assert "left_" not in str(fault.value)

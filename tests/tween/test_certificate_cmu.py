@@ -16,8 +16,8 @@ from motionmind.search.cfn import cfn
 from motionmind.search.problem import Rules, with_waits
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import price
-from motionmind.tween.progression import of_moves
+from motionmind.tween.problem import build_model
+from motionmind.tween.progression import lift_to_moves
 
 pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver to compare with")
 
@@ -46,7 +46,7 @@ def toulbar2(path: Path) -> float:
 
 
 def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
-    model = price(cmu05.grammar, "conditional", 1.0, 1.0)
+    model = build_model(cmu05.grammar, "conditional", 1.0, 1.0)
     rules = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
     rng = np.random.default_rng(7)
     optimal = 0
@@ -55,7 +55,7 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
         ours = solve(model, start, goal, rules)
         assert ours is not None
         moves = len(ours.path) - 1
-        (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.lanes))
+        (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.chains))
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
         assert ours.lower_bound <= ours.cost
         optimal += ours.status == "optimal"
@@ -64,7 +64,7 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
 
 def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_path: Path) -> None:
     """Between postures that lie close in time, for toulbar2 takes minutes for others."""
-    model, moves = price(cmu05.grammar, "conditional", 0.0, 1.0), cmu05.corpus.moves
+    model, moves = build_model(cmu05.grammar, "conditional", 0.0, 1.0), cmu05.corpus.moves
     rng = np.random.default_rng(11)
     for pair in range(FEW):
         begin = int(rng.integers(len(cmu05.states) - 4))
@@ -72,12 +72,12 @@ def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_pa
         held = with_waits(model, goal, 1.0)
         lists, seen = (held.starts, held.indptr, held.targets), (moves.begins, moves.ends, moves.weights)
         net = fit_progression(cmu05.grammar.coordination.parents, *lists, np.asarray(cmu05.states), *seen)
-        of_these = of_moves(held, net, 1.0)
+        of_these = lift_to_moves(held, net, 1.0)
         rules = Rules(wait=np.inf, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
         ours = solve(of_these, start, goal, rules)
         assert ours is not None
         assert ours.status == "optimal"
-        text = cfn(of_these, start, goal, rules, len(ours.path) - 1, cmu05.grammar.lanes)
+        text = cfn(of_these, start, goal, rules, len(ours.path) - 1, cmu05.grammar.chains)
         (tmp_path / "problem.cfn").write_text(text)
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
 
@@ -85,10 +85,10 @@ def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_pa
 def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_path: Path) -> None:
     for seed in range(25):
         toy = random_toy(seed, frustrated=seed % 2 == 0)
-        lanes = [f"lane{lane}" for lane in range(len(toy.sizes))]
+        chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
         for moves in (1, 3, 5):
             ours = solve(toy.model(), *toy.ends(), toy.rules(moves, moves))
             if ours is not None:
-                text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, lanes)
+                text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, chains)
                 (tmp_path / "problem.cfn").write_text(text)
                 assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), (seed, moves)

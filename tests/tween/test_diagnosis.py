@@ -65,16 +65,16 @@ def at_fault(engine: Engine, a: Posture, b: Posture) -> set[str]:
 def test_the_joints_at_fault_are_those_without_a_way(few: Engine, found: Found) -> None:
     for a, b, diagnosis in found:
         faults = {fault["joint"]: fault for fault in diagnosis["faults"]}
-        states = few.space.assign(few.corpus.to_lanes(np.stack([a.rotations, b.rotations])))
-        for lane, joint in enumerate(few.corpus.lanes):
-            graph, (start, goal) = few.joint_graph(joint), map(int, states[:, lane])
+        states = few.space.assign(few.corpus.to_chains(np.stack([a.rotations, b.rotations])))
+        for chain, joint in enumerate(few.corpus.chains):
+            graph, (start, goal) = few.joint_graph(joint), map(int, states[:, chain])
             assert (joint in faults) == (not nx.has_path(graph, start, goal))
             if joint in faults:
                 fault = faults[joint]
                 assert fault["needs"] is None
                 ahead, behind = nx.descendants(graph, start) | {start}, nx.ancestors(graph, goal) | {goal}
                 assert (fault["ahead"], fault["behind"]) == (len(ahead), len(behind))
-                centres = few.space.of(lane)
+                centres = few.space.of(chain)
                 cosine = np.abs(centres[sorted(ahead)] @ centres[sorted(behind)].T).max()
                 assert fault["gap"]["degrees"] == pytest.approx(np.degrees(2.0 * np.arccos(min(1.0, cosine))))
                 assert (fault["start"], fault["goal"]) == (f"state {start}", f"state {goal}")

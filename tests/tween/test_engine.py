@@ -1,4 +1,4 @@
-"""The engine end to end: on a body of six legs, on human23, and on recorded ballet."""
+"""The engine end to end: on a body of six segments, on human23, and on recorded ballet."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def scurry(name: str, seed: int, frames: int = 40) -> Motion:
     t = np.arange(frames) * 0.1
     phase = np.cumsum(np.where((np.arange(frames) % 20) < 5, 0.0, 0.9)) + rng.uniform(0.0, 6.0)
     q = np.tile(rot.IDENTITY, (frames, len(body), 1))
-    for leg in range(6):
-        beat = phase + np.pi * (leg % 2)
-        q[:, 2 + 2 * leg] = rot.about_vertical(0.5 * np.sin(beat))
-        q[:, 3 + 2 * leg] = rot.from_axis_angle([0.0, 0.0, 1.0], 0.4 * np.maximum(np.cos(beat), 0.0))
+    for segment in range(6):
+        beat = phase + np.pi * (segment % 2)
+        q[:, 2 + 2 * segment] = rot.about_vertical(0.5 * np.sin(beat))
+        q[:, 3 + 2 * segment] = rot.from_axis_angle([0.0, 0.0, 1.0], 0.4 * np.maximum(np.cos(beat), 0.0))
     q[:, 1] = rot.from_axis_angle([1.0, 0.0, 0.0], 0.5 * np.sin(0.7 * t))
     q[:, 0] = rot.about_vertical(rng.uniform(-0.5, 0.5) * t)
     root = np.stack([0.0 * t, 0.0 * t, 0.01 * phase], axis=1)
@@ -62,7 +62,7 @@ CLIPS = [scurry("scurry", 0), scurry("hurry", 1)]
 
 
 @pytest.fixture(scope="module")
-def six_legs() -> Engine:
+def six_segments() -> Engine:
     return Engine.fit(CLIPS, name="insects", discretization=Codebook(15.0), licence="CC0-1.0")
 
 
@@ -72,8 +72,8 @@ def person() -> Engine:
 
 
 @pytest.fixture(scope="module")
-def joined(six_legs: Engine) -> Tween:
-    return six_legs.tween(CLIPS[0].posture(3), CLIPS[1].posture(30))
+def joined(six_segments: Engine) -> Tween:
+    return six_segments.tween(CLIPS[0].posture(3), CLIPS[1].posture(30))
 
 
 def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
@@ -96,7 +96,7 @@ def assert_sound(tween: Tween, a: Posture, b: Posture) -> None:
 # --- tweens -----------------------------------------------------------------------------------------------------------
 
 
-def test_six_legs_are_joined_from_a_to_b(joined: Tween) -> None:
+def test_six_segments_are_joined_from_a_to_b(joined: Tween) -> None:
     assert_sound(joined, CLIPS[0].posture(3), CLIPS[1].posture(30))
     assert joined.joints == (*insect().names, "facing")
     assert joined.moves >= 1
@@ -111,16 +111,16 @@ def test_people_are_joined_from_a_to_b(person: Engine, pair: tuple[int, int]) ->
     assert tween.joints == human23().names
 
 
-def test_a_clip_is_found_again_between_two_of_its_postures(six_legs: Engine) -> None:
-    tween = six_legs.tween(CLIPS[0].posture(6), CLIPS[0].posture(10), strict=True, moves=4)
+def test_a_clip_is_found_again_between_two_of_its_postures(six_segments: Engine) -> None:
+    tween = six_segments.tween(CLIPS[0].posture(6), CLIPS[0].posture(10), strict=True, moves=4)
     assert tween.attested == 1.0
     assert tween.bridges == ()
     assert tween.moves == 4
 
 
-def test_a_equal_to_b_is_no_move_at_no_cost(six_legs: Engine) -> None:
+def test_a_equal_to_b_is_no_move_at_no_cost(six_segments: Engine) -> None:
     a = CLIPS[0].posture(7)
-    tween = six_legs.tween(a, Posture(a.skeleton, -a.rotations, a.root))
+    tween = six_segments.tween(a, Posture(a.skeleton, -a.rotations, a.root))
     assert (tween.moves, tween.cost, tween.lower_bound, tween.gap, tween.status) == (0, 0.0, 0.0, 0.0, "optimal")
     assert len(tween.motion) == 1
     np.testing.assert_array_equal(tween.motion.rotations[0], a.rotations)
@@ -129,29 +129,29 @@ def test_a_equal_to_b_is_no_move_at_no_cost(six_legs: Engine) -> None:
     assert json.loads(json.dumps(tween.report()))["path"] == tween.path.tolist()
 
 
-def test_the_same_posture_elsewhere_is_a_move(six_legs: Engine) -> None:
+def test_the_same_posture_elsewhere_is_a_move(six_segments: Engine) -> None:
     a = CLIPS[0].posture(7)
     b = replace(a, root=a.root + np.array([0.1, 0.0, 0.0]))
-    tween = six_legs.tween(a, b)
+    tween = six_segments.tween(a, b)
     assert tween.moves >= 1
     assert_sound(tween, a, b)
 
 
 @pytest.mark.parametrize("moves", [2, 5, 9])
-def test_as_many_moves_as_are_asked_for(six_legs: Engine, moves: int) -> None:
+def test_as_many_moves_as_are_asked_for(six_segments: Engine, moves: int) -> None:
     a, b = CLIPS[0].posture(6), CLIPS[0].posture(7)
-    tween = six_legs.tween(a, b, moves=moves)
+    tween = six_segments.tween(a, b, moves=moves)
     assert tween.moves == moves
     assert_sound(tween, a, b)
-    still = six_legs.tween(a, a, moves=moves)
+    still = six_segments.tween(a, a, moves=moves)
     assert still.moves == moves
 
 
-def test_no_number_of_moves_is_cheaper_than_the_best(six_legs: Engine, joined: Tween) -> None:
+def test_no_number_of_moves_is_cheaper_than_the_best(six_segments: Engine, joined: Tween) -> None:
     a, b = CLIPS[0].posture(3), CLIPS[1].posture(30)
     for moves in range(max(1, joined.moves - 2), joined.moves + 3):
         try:
-            assert six_legs.tween(a, b, moves=moves).cost >= joined.lower_bound - 1e-6
+            assert six_segments.tween(a, b, moves=moves).cost >= joined.lower_bound - 1e-6
         except NoPathError:
             assert moves < joined.moves
 
@@ -186,16 +186,16 @@ def test_without_a_way_through_the_joint_is_named() -> None:
         ("bridge_price", (-1.0, np.nan), "bridge_price must be"),
     ],
 )
-def test_options_out_of_range_are_named(six_legs: Engine, option: str, values: tuple[Any, ...], words: str) -> None:
+def test_options_out_of_range_are_named(six_segments: Engine, option: str, values: tuple[Any, ...], words: str) -> None:
     for value in values:
         with pytest.raises(MotionMindError, match=words):
-            six_legs.tween(CLIPS[0].posture(3), CLIPS[0].posture(9), **{option: value})
+            six_segments.tween(CLIPS[0].posture(3), CLIPS[0].posture(9), **{option: value})
 
 
-def test_another_skeleton_is_refused_and_the_difference_named(six_legs: Engine, person: Engine) -> None:
+def test_another_skeleton_is_refused_and_the_difference_named(six_segments: Engine, person: Engine) -> None:
     fly, man = CLIPS[0].posture(3), dance("one", 1).posture(3)
     with pytest.raises(SkeletonError, match="posture B is on another skeleton than corpus 'insects': human23 lacks"):
-        six_legs.tween(fly, man)
+        six_segments.tween(fly, man)
     with pytest.raises(SkeletonError, match="posture A is on another skeleton than corpus 'people': insect lacks"):
         person.tween(fly, man)
     with pytest.raises(CorpusError, match="one is on another skeleton than scurry"):
@@ -203,7 +203,7 @@ def test_another_skeleton_is_refused_and_the_difference_named(six_legs: Engine, 
 
 
 def test_more_states_than_can_be_held_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.learned.model.MOST_STATES", 12)
+    monkeypatch.setattr("motionmind.learned.model.MOST_STATES_LEARNED", 12)
     with pytest.raises(CorpusError, match=r"'many': \w+ has \d+ states within 0.5 degrees, and a joint can have 12"):
         Engine.fit(CLIPS, name="many", discretization=Codebook(0.5))
     Engine.fit(CLIPS, name="few", discretization=Codebook(25.0))
@@ -260,97 +260,99 @@ def test_a_report_has_the_documented_keys_and_is_json(joined: Tween) -> None:
     assert max(report["snap_degrees"]["A"].values()) <= 15.0 + 1e-6
 
 
-def test_sources_attest_what_they_are_said_to(six_legs: Engine, joined: Tween) -> None:
-    starts = {clip.name: clip for clip in six_legs.corpus.clips}
+def test_sources_attest_what_they_are_said_to(six_segments: Engine, joined: Tween) -> None:
+    starts = {clip.name: clip for clip in six_segments.corpus.clips}
     attested = 0
     for move, (before, after) in enumerate(pairwise(joined.path)):
-        for lane, source in enumerate(joined.sources[move]):
-            edge = six_legs.grammar.transitions.edge(lane, before[lane], after[lane])
+        for chain, source in enumerate(joined.sources[move]):
+            edge = six_segments.grammar.transitions.edge(chain, before[chain], after[chain])
             assert (source is None) == (edge < 0)
             if source is None:
                 continue
             attested += 1
             clip = starts[source.clip]
             assert 0 <= source.posture < clip.stop - clip.start - 1
-            seen = six_legs.states[clip.start + source.posture : clip.start + source.posture + 2, lane].astype(int)
-            if joined.joints[lane] == "facing":  # pooled: by how many steps it turns
-                assert (seen[1] - seen[0] - (int(after[lane]) - int(before[lane]))) % six_legs.space.sizes[lane] == 0
+            seen = six_segments.states[clip.start + source.posture : clip.start + source.posture + 2, chain].astype(int)
+            if joined.joints[chain] == "facing":  # pooled: by how many steps it turns
+                assert (seen[1] - seen[0] - (int(after[chain]) - int(before[chain]))) % six_segments.space.sizes[
+                    chain
+                ] == 0
             else:
-                assert seen.tolist() == [before[lane], after[lane]]
+                assert seen.tolist() == [before[chain], after[chain]]
     assert joined.attested == attested / (joined.moves * len(joined.joints))
 
 
-def test_bridges_and_waits_are_what_is_not_attested(six_legs: Engine, joined: Tween) -> None:
+def test_bridges_and_waits_are_what_is_not_attested(six_segments: Engine, joined: Tween) -> None:
     goal = joined.path[-1]
     for wait in joined.waits:
-        lane = joined.joints.index(wait.joint)
-        assert joined.path[wait.move, lane] == joined.path[wait.move + 1, lane] == goal[lane]
+        chain = joined.joints.index(wait.joint)
+        assert joined.path[wait.move, chain] == joined.path[wait.move + 1, chain] == goal[chain]
     unattested = {
-        (joined.joints[lane], move)
+        (joined.joints[chain], move)
         for move, row in enumerate(joined.sources)
-        for lane, source in enumerate(row)
+        for chain, source in enumerate(row)
         if source is None
     }
     flagged = {(thing.joint, thing.move) for thing in (*joined.bridges, *joined.waits)}
     assert unattested <= flagged
     for bridge in joined.bridges:
-        lane = joined.joints.index(bridge.joint)
-        before, after = six_legs.space.of(lane)[joined.path[bridge.move : bridge.move + 2, lane]]
+        chain = joined.joints.index(bridge.joint)
+        before, after = six_segments.space.of(chain)[joined.path[bridge.move : bridge.move + 2, chain]]
         assert bridge.degrees == pytest.approx(np.degrees(rot.angle(before, after)), abs=1e-4)
 
 
-def test_a_joint_graph_is_the_counts(six_legs: Engine) -> None:
-    states = six_legs.states[:, six_legs.space.index("head")]
-    graph = six_legs.joint_graph("head")
-    pairs = [(int(states[i]), int(states[i + 1])) for i in six_legs.corpus.begins]
+def test_a_joint_graph_is_the_counts(six_segments: Engine) -> None:
+    states = six_segments.states[:, six_segments.space.index("head")]
+    graph = six_segments.joint_graph("head")
+    pairs = [(int(states[i]), int(states[i + 1])) for i in six_segments.corpus.begins]
     assert {(s, t): data["count"] for s, t, data in graph.edges(data=True)} == {
         pair: float(pairs.count(pair)) for pair in set(pairs)
     }
     for state, data in graph.nodes(data=True):
         assert data["visits"] == np.sum(states == state)
-        assert rot.angle(np.array(data["orientation"]), six_legs.space.of("head")[state]) < 1e-12
+        assert rot.angle(np.array(data["orientation"]), six_segments.space.of("head")[state]) < 1e-12
         leaving = [np.exp(-edge["weight"]) for _, _, edge in graph.out_edges(state, data=True)]
         assert sum(leaving) == pytest.approx(1.0) or not leaving
     with pytest.raises(SkeletonError, match="no joint 'wing'"):
-        six_legs.joint_graph("wing")
-    ring = six_legs.joint_graph("facing")
+        six_segments.joint_graph("wing")
+    ring = six_segments.joint_graph("facing")
     assert len({ring.out_degree(state) for state in ring}) == 1
 
 
-def test_what_is_searched_is_the_network_entry_by_entry(six_legs: Engine, person: Engine) -> None:
-    for engine in (six_legs, person):
+def test_what_is_searched_is_the_network_entry_by_entry(six_segments: Engine, person: Engine) -> None:
+    for engine in (six_segments, person):
         network, skeleton = engine.network(), engine.corpus.skeleton
         assert network.check_model()
         assert set(network.nodes) == set(skeleton.names)
-        for lane, (joint, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
+        for chain, (joint, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
             if parent < 0:
                 assert network.get_parents(joint) == []
                 continue
             cpd = network.get_cpds(joint)
             assert cpd.variables == [joint, skeleton.names[parent]]
-            table = engine.grammar.coordination.table(lane, engine.grammar.transitions.starts)
+            table = engine.grammar.coordination.table(chain, engine.grammar.transitions.starts)
             np.testing.assert_allclose(np.exp(-table).T, cpd.get_values(), rtol=1e-9)
 
 
-def test_what_the_corpus_holds_is_said(six_legs: Engine) -> None:
-    info = json.loads(json.dumps(six_legs.info(), allow_nan=False))
+def test_what_the_corpus_holds_is_said(six_segments: Engine) -> None:
+    info = json.loads(json.dumps(six_segments.info(), allow_nan=False))
     assert (info["name"], info["licence"], info["postures"], info["moves"]) == ("insects", "CC0-1.0", 80, 78)
     assert info["joints"] == list(insect().names)
-    assert info["states"]["head"] == six_legs.space.sizes[1]
-    check = json.loads(json.dumps(six_legs.check(pairs=50, seed=3), allow_nan=False))
+    assert info["states"]["head"] == six_segments.space.sizes[1]
+    check = json.loads(json.dumps(six_segments.check(pairs=50, seed=3), allow_nan=False))
     assert {key: check[key] for key in info} == info
     assert 0.0 <= check["joinable"] <= 1.0
-    assert check == six_legs.check(pairs=50, seed=3)
+    assert check == six_segments.check(pairs=50, seed=3)
     for options in ({"pairs": 0}, {"seed": -1}):
         with pytest.raises(MotionMindError, match="must be"):
-            six_legs.check(**options)
+            six_segments.check(**options)
 
 
 # --- on disk ----------------------------------------------------------------------------------------------------------
 
 
-def test_what_is_loaded_answers_as_what_was_saved(six_legs: Engine, joined: Tween, tmp_path: Path) -> None:
-    six_legs.save(tmp_path / "corpora" / "insects")
+def test_what_is_loaded_answers_as_what_was_saved(six_segments: Engine, joined: Tween, tmp_path: Path) -> None:
+    six_segments.save(tmp_path / "corpora" / "insects")
     loaded = Engine.load("insects", tmp_path)
     a, b = CLIPS[0].posture(3), CLIPS[1].posture(30)
     again = loaded.tween(a, b)
@@ -361,18 +363,18 @@ def test_what_is_loaded_answers_as_what_was_saved(six_legs: Engine, joined: Twee
     assert [again.report()[key] for key in REPORT if key != "seconds"] == [
         joined.report()[key] for key in REPORT if key != "seconds"
     ]
-    assert loaded.info() == six_legs.info()
-    assert loaded.check(20) == six_legs.check(20)
-    assert loaded.corpus.skeleton == six_legs.corpus.skeleton
+    assert loaded.info() == six_segments.info()
+    assert loaded.check(20) == six_segments.check(20)
+    assert loaded.corpus.skeleton == six_segments.corpus.skeleton
     assert loaded.load_seconds > 0.0
     loaded.save(tmp_path / "again")
     for path in (tmp_path / "corpora" / "insects").iterdir():
         assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes()
 
 
-def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_legs: Engine, tmp_path: Path) -> None:
+def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, tmp_path: Path) -> None:
     good = tmp_path / "good"
-    six_legs.save(good)
+    six_segments.save(good)
     manifest = json.loads((good / "manifest.json").read_text("utf-8"))
 
     def refused(change: Callable[[dict[str, Any]], object], words: str) -> None:
@@ -411,7 +413,7 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "version": store.VERSION,
         **{"name": "mine", "title": "Insects", "author": "us", "source": "here", "licence": "CC0-1.0"},
         **{"facing": "free", "rate": None, "discretization": {"kind": "codebook", "tolerance": 15}},
-        "clips": [{"name": f"the {c.name}", "file": f"clips/{c.name}.json", "about": "legs"} for c in CLIPS],
+        "clips": [{"name": f"the {c.name}", "file": f"clips/{c.name}.json", "about": "segments"} for c in CLIPS],
     }
     (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
     return folder
@@ -419,7 +421,7 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_written_corpus_is_learned_once_and_again_when_it_changes(written: Path, tmp_path: Path) -> None:
     first = Engine.load("mine", tmp_path)
-    assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "legs"}
+    assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "segments"}
     (built,) = (tmp_path / "cache").iterdir()
     before = {path.name: path.stat().st_mtime_ns for path in built.iterdir()}
     assert Engine.load("mine", tmp_path).info() == first.info()
@@ -483,10 +485,10 @@ assert not heavy, heavy
 """
 
 
-def test_fresh_processes_write_the_same_bytes_and_import_nothing_heavy(six_legs: Engine, tmp_path: Path) -> None:
+def test_fresh_processes_write_the_same_bytes_and_import_nothing_heavy(six_segments: Engine, tmp_path: Path) -> None:
     from motionmind.formats import write_posture
 
-    six_legs.save(tmp_path / "insects")
+    six_segments.save(tmp_path / "insects")
     write_posture(tmp_path / "a.json", CLIPS[0].posture(3))
     write_posture(tmp_path / "b.json", CLIPS[1].posture(30))
     for seed in ("1", "2"):

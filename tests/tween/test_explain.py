@@ -26,8 +26,8 @@ ENDS = [Path(__file__).parents[2] / "corpora/ballet/postures" / name for name in
 
 @pytest.fixture(scope="module")
 def insects() -> Engine:
-    """Six legs, with a lane for the facing, learned backwards too; the head of one clip is never as in the others, so
-    that it must be bridged."""
+    """Six segments, with a chain for the facing, learned backwards too; the head of one clip is never as in the others,
+    so that it must be bridged."""
     clips = [replace(motion, name=clip.name) for clip, motion in _clips(Engine.load("walk-hexapod"))]
     turned = clips[1].rotations.copy()
     turned[:, 1] = rot.mul(rot.from_axis_angle([0.0, 0.0, 1.0], 1.2), turned[:, 1])
@@ -89,26 +89,26 @@ def test_what_is_charged_adds_up_to_the_cost(insects: Engine, options: dict[str,
 def test_likelihoods_are_what_was_counted(insects: Engine, bridged: Tween) -> None:
     moves, states = insects.corpus.moves, insects.states
     for t, (before, after) in enumerate(pairwise(bridged.path)):
-        for lane, joint in enumerate(bridged.joints):
+        for chain, joint in enumerate(bridged.joints):
             if joint == "facing":
-                size = insects.space.sizes[lane]
-                turned = (states[moves.ends, lane] - states[moves.begins, lane]) % size
-                left, made = np.ones(len(turned), dtype=bool), turned == (after[lane] - before[lane]) % size
+                size = insects.space.sizes[chain]
+                turned = (states[moves.ends, chain] - states[moves.begins, chain]) % size
+                left, made = np.ones(len(turned), dtype=bool), turned == (after[chain] - before[chain]) % size
             else:
-                left = states[moves.begins, lane] == before[lane]
-                made = left & (states[moves.ends, lane] == after[lane])
+                left = states[moves.begins, chain] == before[chain]
+                made = left & (states[moves.ends, chain] == after[chain])
             counted = moves.weights[made].sum() / moves.weights[left].sum() if left.any() else 0.0
-            assert bridged.account.likelihood[t, lane] == pytest.approx(counted)
-            assert (bridged.sources[t][lane] is None) == (counted == 0.0)
+            assert bridged.account.likelihood[t, chain] == pytest.approx(counted)
+            assert (bridged.sources[t][chain] is None) == (counted == 0.0)
 
 
 def test_coordination_is_what_the_network_says(insects: Engine, bridged: Tween) -> None:
     network, skeleton = insects.network(), insects.corpus.skeleton
     for t, row in enumerate(bridged.path[1:]):
-        for lane, joint in enumerate(bridged.joints):
-            parent = skeleton.parents[lane] if joint != "facing" else -1
-            cost = -np.log(network.get_cpds(joint).get_values()[row[lane], row[parent]]) if parent >= 0 else 0.0
-            assert bridged.account.coordination[t, lane] == pytest.approx(cost, abs=1e-9)
+        for chain, joint in enumerate(bridged.joints):
+            parent = skeleton.parents[chain] if joint != "facing" else -1
+            cost = -np.log(network.get_cpds(joint).get_values()[row[chain], row[parent]]) if parent >= 0 else 0.0
+            assert bridged.account.coordination[t, chain] == pytest.approx(cost, abs=1e-9)
 
 
 def test_a_source_says_when_it_was(insects: Engine, bridged: Tween) -> None:
@@ -141,9 +141,9 @@ def test_people_read_who_moves_how_likely_and_where_it_was_seen(bridged: Tween, 
         line = next(line for line in part.splitlines() if line.split()[:1] == [bridge.joint])
         assert f"{bridge.degrees:.0f} degrees  never seen, {bridge.price:.2f} nats" in line
         assert line.endswith("bridge")
-    move, lane = next((t, j) for t, row in enumerate(bridged.sources) for j, source in enumerate(row)
+    move, chain = next((t, j) for t, row in enumerate(bridged.sources) for j, source in enumerate(row)
                       if source and bridged.path[t, j] != bridged.path[t + 1, j])  # fmt: skip
-    source = bridged.sources[move][lane]
+    source = bridged.sources[move][chain]
     assert source is not None
     assert f"{source.clip}" in text.split("\nmove ")[move + 1]
     assert f"posture {source.posture} ({source.seconds:.2f} s)" in text.split("\nmove ")[move + 1]

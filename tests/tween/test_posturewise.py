@@ -42,7 +42,7 @@ def insects() -> Engine:
 
 def walk(toy: Any, rng: np.random.Generator, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """States [N, L] of a walk through a toy's joint states that begins at its start, in clips, and where moves begin;
-    every move is one that every lane has an edge for, and every pair of states one with a discount or none."""
+    every move is one that every chain has an edge for, and every pair of states one with a discount or none."""
     states, begins = [np.array(toy.start)], []
     while len(states) < steps:
         nexts = [np.flatnonzero(np.isfinite(table[s])) for table, s in zip(toy.edges, states[-1], strict=True)]
@@ -60,10 +60,10 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
     states, begins = walk(toy, rng, 60)
     # Every pair of states that stands together is listed, as in what is learned from these postures.
     listed = [table.copy() for table in toy.corrections]
-    for lane, parent in enumerate(toy.parents):
+    for chain, parent in enumerate(toy.parents):
         for body in states:
-            if parent >= 0 and listed[lane][body[parent], body[lane]] == 0.0:
-                listed[lane][body[parent], body[lane]] = -1e-3
+            if parent >= 0 and listed[chain][body[parent], body[chain]] == 0.0:
+                listed[chain][body[parent], body[chain]] = -1e-3
     toy = replace(toy, corrections=tuple(listed), goal=tuple(map(int, states[rng.integers(60)])))
     start, goal = toy.ends()
     bodies = find_bodies(states, begins, begins + 1)
@@ -136,7 +136,7 @@ def test_a_posture_goes_to_the_nearest_one(insects: Engine) -> None:
     for index in (0, 40, 200):
         found = nearest_posture(corpus, corpus.rotations[index])
         np.testing.assert_allclose(
-            corpus.to_lanes(corpus.rotations[found])[:-1], corpus.to_lanes(corpus.rotations[index])[:-1], atol=1e-9
+            corpus.to_chains(corpus.rotations[found])[:-1], corpus.to_chains(corpus.rotations[index])[:-1], atol=1e-9
         )
 
 

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from motionmind.body.motion import Insertion, Motion
 from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
-from motionmind.formats import lost, read_motion, write_motion
+from motionmind.formats import lossy_fields, read_motion, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress
 from motionmind.tween.engine import Engine
@@ -242,10 +242,10 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
     pairs = [(int(i), int(k)) for i, k in rng.integers(0, len(piece), (150, 2))]
     corpus, states = macarena.corpus, macarena.states
     begins, ends = corpus.moves.begins, corpus.moves.ends
-    lanes = corpus.to_lanes(corpus.rotations)
+    chains = corpus.to_chains(corpus.rotations)
     angles = np.degrees(
         [
-            (Rotation.from_quat(lanes[b]).inv() * Rotation.from_quat(lanes[e])).magnitude()
+            (Rotation.from_quat(chains[b]).inv() * Rotation.from_quat(chains[e])).magnitude()
             for b, e in zip(begins, ends, strict=True)
         ]
     )
@@ -256,13 +256,13 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
     for join, body in zip(joined, whole, strict=True):
         i, k = join.start, join.end
         expected = {}
-        for lane, name in enumerate(corpus.lanes[:-1]):  # at a seam the body goes on facing as it did
-            seen = {(states[b, lane], states[e, lane]) for b, e in zip(begins, ends, strict=True)}
+        for chain, name in enumerate(corpus.chains[:-1]):  # at a seam the body goes on facing as it did
+            seen = {(states[b, chain], states[e, chain]) for b, e in zip(begins, ends, strict=True)}
             turned = np.degrees(
-                (Rotation.from_quat(lanes[i, lane]).inv() * Rotation.from_quat(lanes[k, lane])).magnitude()
+                (Rotation.from_quat(chains[i, chain]).inv() * Rotation.from_quat(chains[k, chain])).magnitude()
             )
-            unknown = states[i, lane] != states[k, lane] and (states[i, lane], states[k, lane]) not in seen
-            limit = 1.000001 * max(macarena.space.tolerances[lane], fastest[lane] * piece.lasting[i])
+            unknown = states[i, chain] != states[k, chain] and (states[i, chain], states[k, chain]) not in seen
+            limit = 1.000001 * max(macarena.space.tolerances[chain], fastest[chain] * piece.lasting[i])
             if unknown or turned > limit:
                 expected[name] = (not unknown, turned > limit)
         assert {one.joint: (one.attested, one.fast) for one in join.breaks} == expected
@@ -295,9 +295,9 @@ def unattested(join: Join, engine: Engine, which: int) -> set[tuple[str, int]]:
     states, moves = engine.states, engine.corpus.moves
     way, found = join.candidates[which], set()
     for move, (before, after) in enumerate(pairwise(way.path)):
-        for lane, name in enumerate(engine.corpus.lanes[:-1]):
-            seen = ((states[moves.begins, lane] == before[lane]) & (states[moves.ends, lane] == after[lane])).any()
-            if not seen and before[lane] != after[lane]:
+        for chain, name in enumerate(engine.corpus.chains[:-1]):
+            seen = ((states[moves.begins, chain] == before[chain]) & (states[moves.ends, chain] == after[chain])).any()
+            if not seen and before[chain] != after[chain]:
                 found.add((name, move))
     return found
 
@@ -525,11 +525,11 @@ def test_a_course_holds_the_nudge_that_was_asked(kata: Piece, nudge: float | tup
 def test_what_a_conversion_loses_is_said(smoothed: Variation, tmp_path: Path) -> None:
     path = tmp_path / "variation.json"
     write_variation(path, smoothed)
-    assert lost(read_motion(path), tmp_path / "out.json", source=path) == [
+    assert lossy_fields(read_motion(path), tmp_path / "out.json", source=path) == [
         "the variation's original, alternatives and decisions"
     ]
     write_motion(tmp_path / "plain.json", smoothed.motion())
-    assert lost(smoothed.motion(), tmp_path / "out.json", source=tmp_path / "plain.json") == []
+    assert lossy_fields(smoothed.motion(), tmp_path / "out.json", source=tmp_path / "plain.json") == []
 
 
 # --- the command line -----------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy_file import body
+from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.body.skeleton import Skeleton
@@ -69,7 +69,7 @@ class Ball:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyShape:
     """The volume of a skeleton's body: first the cones, then the balls.
 
     Attributes:
@@ -142,7 +142,7 @@ class Body:
         return np.asarray((volumes[..., None] * centres).sum(axis=-2) / volumes.sum(axis=-1)[..., None])
 
 
-def body_of(skeleton: Skeleton) -> Body:
+def shape_of(skeleton: Skeleton) -> BodyShape:
     """The volume of any skeleton: a person's where human23's tree is in it, whatever joints are between and beyond."""
     return _Person(skeleton).body() if _is_person(skeleton) else _creature(skeleton)
 
@@ -160,7 +160,7 @@ def _is_person(skeleton: Skeleton) -> bool:
     return set(human.names) <= set(skeleton.names)
 
 
-def _creature(skeleton: Skeleton) -> Body:
+def _creature(skeleton: Skeleton) -> BodyShape:
     """A tapered limb from each joint to its children and to its tip, the thinner the nearer to the limb's end."""
     span = _span(skeleton)
     levels = np.zeros(len(skeleton), dtype=int)  # of joints below
@@ -180,7 +180,7 @@ def _creature(skeleton: Skeleton) -> Body:
         for joint, tip in enumerate(skeleton.tips)
         if tip.any() or len(skeleton) == 1
     ]
-    return Body(skeleton, _own_frames(skeleton), tuple(cones), (), span / human23().height)
+    return BodyShape(skeleton, _own_frames(skeleton), tuple(cones), (), span / human23().height)
 
 
 class _Person:
@@ -194,7 +194,7 @@ class _Person:
         self.drawn: set[int] = set()
         self.thumbs = any("thumb" in name.lower() for name in skeleton.names)
 
-    def body(self) -> Body:
+    def body(self) -> BodyShape:
         """All of it."""
         solids = [*self._trunk(), *self._head()]
         for paint, outward in ((LEFT, 1.0), (RIGHT, -1.0)):
@@ -203,12 +203,12 @@ class _Person:
         solids += self._others()
         cones = tuple(solid for solid in solids if isinstance(solid, Cone))
         balls = tuple(solid for solid in solids if isinstance(solid, Ball))
-        known = body("human23").joints
+        known = anatomy_named("human23").joints
         masses = {
             part: sum(known[joint].mass for joint in _SEGMENTS.get(re.sub("^(left|right)_", "", part), ()))
             for part in (solid.part for solid in solids)
         }
-        return Body(self.skeleton, tuple(self.frames), cones, balls, self.size, masses)
+        return BodyShape(self.skeleton, tuple(self.frames), cones, balls, self.size, masses)
 
     def _trunk(self) -> Iterator[Cone | Ball]:
         lumbar, thorax = self._joint("lumbar"), self._joint("thorax")

@@ -15,7 +15,7 @@ from motionmind.files import FilePath
 _TINY = 1e-6  # seconds and metres
 
 
-def lost(motion: Motion, path: FilePath, source: FilePath | None = None) -> list[str]:
+def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None) -> list[str]:
     """What of `motion` a file at `path` has no place for, as phrases: "times", "the body's proportions".
 
     Where it was read from the file `source`, also what that held beside the movement.
