@@ -1,4 +1,4 @@
-"""What a path is charged for, joint by joint and move by move."""
+"""The certificate in detail: what each joint's move costs, where it was seen, and which moves no clip attests."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Floats, Int32s
 from motionmind.corpus.corpus import Corpus
 from motionmind.discretize import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
-from motionmind.search.problem import Model, Rules, places, with_waits
-from motionmind.search.solve import Certificate
+from motionmind.search.problem import Problem, places, with_waits
 
 
 @dataclass(frozen=True, eq=False)
 class CostBreakdown:
-    """The cost of a path of T moves of L chains, taken apart: `moves`, `coordination` and `per_move` for each move add
-    up to it.
+    """The cost of a path of T moves of L chains, taken apart: moves, coordination and the price per move add up to it.
 
     Attributes:
         moves: nats for each chain's move, bridge or wait [T, L].
@@ -29,7 +27,7 @@ class CostBreakdown:
         per_move: tau, nats for each move.
         likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move [T, L].
         degrees: the angle between the two states [T, L].
-        names: what people call the states of each posture, [T + 1][L].
+        names: names of the states of each posture [T + 1][L].
     """
 
     moves: Floats
@@ -47,37 +45,52 @@ class CostBreakdown:
 
 def break_down_cost(
     path: Int32s,
-    model: Model,
-    goal: Ints,
-    rules: Rules,
+    problem: Problem,
     grammar: Grammar,
     space: StateSpace,
-    net: Coordination,
-    lambda_: float,
+    network: Coordination,
+    factor: float,
 ) -> CostBreakdown:
-    """What `path` [T + 1, L] costs in a model that was made of a grammar, with the factor `lambda_` of `net`."""
-    held, graph, at = with_waits(model, goal, rules.wait), grammar.transitions, places(model, path)
+    """Return the cost of a path, taken apart.
+
+    Args:
+        path: states of the problem [T + 1, L].
+        problem: the problem that was searched, whose costs come from the grammar.
+        grammar: what was learned.
+        space: the states of each chain.
+        network: how the chains' states of the problem coordinate.
+        factor: factor of the network's -log P in the problem's costs.
+    """
+    held, graph = with_waits(problem.model, problem.goal, problem.rules.wait), grammar.transitions
+    at = places(problem.model, path)
     probability = np.exp(-graph.weights("conditional"))
     shape = (len(path) - 1, len(grammar.chains))
     moves, together, likelihood = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     for t, chain in np.ndindex(*shape):
-        before, after, parent = int(path[t, chain]), int(path[t + 1, chain]), int(net.parents[chain])
+        before, after, parent = int(path[t, chain]), int(path[t + 1, chain]), int(network.parents[chain])
         row = held.starts[chain] + before
         first, last = held.indptr[row], held.indptr[row + 1]
         moves[t, chain] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
         if parent >= 0:
-            together[t, chain] = lambda_ * net.cost(chain, int(path[t + 1, parent]), after, held.starts)
+            together[t, chain] = factor * network.cost(chain, int(path[t + 1, parent]), after, held.starts)
         edge = graph.edge(chain, int(at[t, chain]), int(at[t + 1, chain]))
         likelihood[t, chain] = probability[edge] if edge >= 0 else 0.0
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
     names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)
-    return CostBreakdown(moves, together, rules.per_move, likelihood, degrees, names)
+    return CostBreakdown(moves, together, problem.rules.per_move, likelihood, degrees, names)
 
 
 @dataclass(frozen=True)
 class Bridge:
-    """A move of a joint that the corpus does not attest: `move` counts from 0, `price` is in nats."""
+    """A move of a joint that the corpus does not attest.
+
+    Attributes:
+        joint: the joint's name.
+        move: number of the move, from 0.
+        degrees: angle between the two states.
+        price: nats.
+    """
 
     joint: str
     move: int
@@ -87,7 +100,13 @@ class Bridge:
 
 @dataclass(frozen=True)
 class Wait:
-    """A move that a joint spends waiting at its goal for the others, at `price` nats."""
+    """A move that a joint spends waiting at its goal for the others.
+
+    Attributes:
+        joint: the joint's name.
+        move: number of the move, from 0.
+        price: nats.
+    """
 
     joint: str
     move: int
@@ -96,14 +115,14 @@ class Wait:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a move of a joint was seen.
+    """A place in a corpus that attests a joint's move.
 
     Attributes:
         clip: the clip's name.
-        posture: the number of the posture there from which it was made.
+        posture: number of the posture in the clip from which the move starts.
         corpus: the corpus that the clip comes from.
-        mirrored: whether it was seen with left and right exchanged.
-        reversed: whether it was seen played backwards: it leads to the posture before.
+        mirrored: whether the clip was learned with left and right exchanged.
+        reversed: whether the clip was learned backwards: the move leads to the posture before.
         seconds: that posture's time in its recording.
     """
 
@@ -116,13 +135,22 @@ class Source:
 
 
 def trace_path(
-    certificate: Certificate, grammar: Grammar, corpus: Corpus, weights: Floats, wait: float, bridge_price: float
+    path: Int32s, grammar: Grammar, corpus: Corpus, weights: Floats, wait: float, bridge_price: float
 ) -> tuple[float, tuple[Bridge, ...], tuple[Wait, ...], tuple[tuple[Source | None, ...], ...]]:
-    """What a path is made of: the share attested, bridges, waits, and sources, as in Tween.
+    """Trace each move of a path to the corpus.
 
-    `weights` [E] are those of the grammar's transitions in the scheme that was searched.
+    Args:
+        path: states of the grammar's chains [T + 1, L].
+        grammar: what was learned.
+        corpus: what it was learned from.
+        weights: of the grammar's transitions, in the scheme that was searched [E], nats.
+        wait: nats for each move that a chain waits at its goal.
+        bridge_price: nats for each degree of a bridge.
+
+    Returns:
+        The share of moves that are attested, the bridges, the waits, and the sources [T][L], as in `Tween`.
     """
-    graph, path = grammar.transitions, certificate.path
+    graph = grammar.transitions
     bridges, waits, sources = [], [], []
     for move, (before, after) in enumerate(pairwise(path)):
         row: list[Source | None] = []
@@ -141,7 +169,7 @@ def trace_path(
 
 
 def source_of(corpus: Corpus, posture: int, to: int) -> Source:
-    """The place in a corpus where a move leads from one of its postures `to` another."""
+    """Return the place in a corpus where a move leads from posture `posture` to posture `to`, by their numbers."""
     clip = corpus.clip_of(posture)
     return Source(
         clip.name,
@@ -151,3 +179,8 @@ def source_of(corpus: Corpus, posture: int, to: int) -> Source:
         to < posture,
         float(corpus.times[posture]),
     )
+
+
+def gap_of(cost: float, lower_bound: float) -> float:
+    """Return the share of a cost that is not proven to be needed: 0 where the bound meets it. Both in nats."""
+    return 0.0 if cost <= lower_bound else (cost - lower_bound) / abs(cost)

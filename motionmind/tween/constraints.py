@@ -1,9 +1,9 @@
-"""Restrictions in the words of joints: where a joint is pinned, what it holds, which states it avoids."""
+"""Constraints on the way: joints that are pinned or held, states to avoid, and which of them leave no path."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import islice
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ FARTHEST = 60  # moves by which a via is moved to see whether that helps
 
 
 class Constraint(NamedTuple):
-    """What was asked, such as "pin left_wrist=B", and whether each state may then be on the way [G]."""
+    """A constraint by its name, such as "pin left_wrist=B", and whether it allows each state on the way [G]."""
 
     name: str
     allowed: Bools
@@ -32,15 +32,15 @@ def constraints_of(
     hold: Sequence[str],
     avoid: Sequence[tuple[str, int | str]],
 ) -> list[Constraint]:
-    """Which states each joint may be in on the way, after posture A and before posture B.
+    """Return the constraints on the states of joints on the way, after posture A and before posture B.
 
     Args:
         space: the states of each joint.
         start: A's states [L].
         goal: B's states [L].
-        pin: joints that are in A's state until the last move, or in B's from the first on: "A" or "B".
-        hold: joints that stay in the state that A and B share.
-        avoid: joints, each with a state, by its number or its name, that it is not in.
+        pin: joints that keep A's state until the last move ("A"), or have B's from the first move on ("B").
+        hold: joints that keep the state that A and B share.
+        avoid: joints, each with a state to avoid, by number or name.
 
     Raises:
         MotionMindError: no such joint or state.
@@ -66,27 +66,30 @@ def constraints_of(
     return out
 
 
-def restrict(model: Model, asked: Sequence[Constraint]) -> Model:
-    """The model with those states on the way that all restrictions allow."""
-    return model._replace(allowed=np.logical_and.reduce([model.allowed, *(one.allowed for one in asked)]))
+def restrict(model: Model, constraints: Sequence[Constraint]) -> Model:
+    """Return the model with those states on the way that all constraints allow."""
+    return model._replace(allowed=np.logical_and.reduce([model.allowed, *(one.allowed for one in constraints)]))
 
 
-def find_conflicts(chains: Sequence[str], model: Model, posed: Problem, asked: Sequence[Constraint]) -> str:
-    """What was asked that leaves no path, one line each; nothing where without all of it there is none either.
+def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constraints: Sequence[Constraint]) -> str:
+    """Find the constraints and vias that leave a problem without a path.
 
     Args:
-        chains: names [L].
-        model: the costs before any restriction.
-        posed: the problem that has no path.
-        asked: the restrictions in it.
+        chains: names of the joint chains [L].
+        model: the costs before any constraint.
+        problem: the problem that has no path.
+        constraints: the constraints in it.
+
+    Returns:
+        A message, one line for each conflict and remedy; empty where there is no path without the constraints either.
     """
-    ends, rules, vias = (posed.start, posed.goal), posed.rules, posed.vias
-    names = [*(one.name for one in asked), *(_via(posed, i) for i in range(len(vias)))]
+    vias, rules = problem.vias, problem.rules
+    names = [*(one.name for one in constraints), *(_via_name(problem, i) for i in range(len(vias)))]
 
     def possible(kept: Sequence[int]) -> bool:
-        constraints_of = [one for i, one in enumerate(asked) if i in kept]
-        through = [via for i, via in enumerate(vias, start=len(asked)) if i in kept]
-        return feasible(restrict(model, constraints_of), *ends, rules, through)
+        some = [one for i, one in enumerate(constraints) if i in kept]
+        through = tuple(via for i, via in enumerate(vias, start=len(constraints)) if i in kept)
+        return feasible(replace(problem, model=restrict(model, some), vias=through))
 
     if not possible([]):
         return ""
@@ -98,30 +101,41 @@ def find_conflicts(chains: Sequence[str], model: Model, posed: Problem, asked: S
             if not possible(others := [k for k in guilty if k != i]):
                 guilty = others
         lines.append(f"{' and '.join(names[i] for i in guilty)} leave{'s' * (len(guilty) == 1)} none")
-    for i, (states, wanted) in enumerate(vias):
-        if wanted is not None:
-            near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
-            nearest = sorted(near, key=lambda move: abs(move - wanted))
-            moved = ((move, [*vias[:i], Via(states, move), *vias[i + 1 :]]) for move in nearest)
-            helps = (move for move, others in moved if feasible(posed.model, *ends, rules, others))
-            lines += [f"with via {i + 1} at move {move} there is one" for move in islice(helps, 1)]
+    lines += [f"with via {i + 1} at move {move} there is one" for i, move in _feasible_moves(problem)]
+    lines += _blocked_segments(chains, problem)
+    number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
+    first = f"no path from A to B in {number} move{'s' * (rules.longest != 1)} under these constraints:"
+    return "\n  ".join([first, *lines])
 
-    held = with_waits(posed.model, posed.goal, rules.wait)
-    stops = [posed.start, *(via.states for via in vias), posed.goal]
+
+def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:
+    """Yield each via, by its place, that a path could pass at another move, and the nearest such move."""
+    for i, (states, wanted) in enumerate(problem.vias):
+        if wanted is None:
+            continue
+        near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
+        for move in sorted(near, key=lambda move: abs(move - wanted)):
+            moved = (*problem.vias[:i], Via(states, move), *problem.vias[i + 1 :])
+            if feasible(replace(problem, vias=moved)):
+                yield i, move
+                break
+
+
+def _blocked_segments(chains: Sequence[str], problem: Problem) -> Iterator[str]:
+    """Yield a line for each segment between A, the vias and B that some joints cannot make in any number of moves."""
+    held = with_waits(problem.model, problem.goal, problem.rules.wait)
+    stops = [problem.start, *(via.states for via in problem.vias), problem.goal]
+    stop_names = ["A", *(_via_name(problem, i) for i in range(len(problem.vias))), "B"]
     for segment in range(len(stops) - 1):
-        costs = costs_to_go(held, stops[segment + 1], rules.longest)[1:, held.starts[:-1] + stops[segment]]
+        longest = problem.rules.longest
+        costs = costs_to_go(held, stops[segment + 1], longest)[1:, held.starts[:-1] + stops[segment]]
         stuck = [joint for chain, joint in enumerate(chains) if not np.isfinite(costs[:, chain]).any()]
         if stuck:
-            here, there = ("A", *(_via(posed, i) for i in range(len(vias))), "B")[segment : segment + 2]
-            lines.append(f"{', '.join(stuck)}: no way from {here} to {there}")
-    number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
-    return "\n  ".join(
-        [f"no path from A to B in {number} move{'s' * (rules.longest != 1)} under what was asked:", *lines]
-    )
+            yield f"{', '.join(stuck)}: no way from {stop_names[segment]} to {stop_names[segment + 1]}"
 
 
-def _via(posed: Problem, i: int) -> str:
-    move = posed.vias[i].move
+def _via_name(problem: Problem, i: int) -> str:
+    move = problem.vias[i].move
     return f"via {i + 1}" + ("" if move is None else f" at move {move}")
 
 
@@ -133,7 +147,7 @@ def _only(space: StateSpace, chain: int, state: int) -> Bools:
 
 
 def _state(space: StateSpace, chain: int, wanted: int | str) -> int:
-    """The state that a number or a name stands for."""
+    """Return the state that a number or a name stands for."""
     word = str(wanted)
     if word in space.labels[chain]:
         return space.labels[chain].index(word)

@@ -1,4 +1,4 @@
-"""Why nothing joins A and B: which joints cannot get through, from where to where, and what would let them."""
+"""Diagnosis of a request without a path: the joints that have no way, from where to where, and what would help."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _COARSER = (1.25, 1.5, 2.0, 3.0)  # times the tolerance that are tried
 
 @dataclass(frozen=True)
 class Remedy:
-    """Something that would let a joint through: what, and how many moves it then needs at least."""
+    """A change that would give a joint a path, and the least number of moves that it then needs."""
 
     what: str
     moves: int
@@ -35,7 +35,7 @@ class Remedy:
 
 @dataclass(frozen=True)
 class Gap:
-    """A pair of states that come nearest to joining, and the angle between them."""
+    """The two states that come nearest to joining, by name, and the angle between them."""
 
     before: str
     after: str
@@ -44,17 +44,17 @@ class Gap:
 
 @dataclass(frozen=True)
 class BlockedJoint:
-    """A joint that does not get from its state in A to that in B.
+    """A joint without a path from its state in A to its state in B.
 
     Attributes:
         joint: its name.
-        start: what its state in A is called.
-        goal: what its state in B is called.
-        needs: moves that it needs at least; None where no number is enough.
-        ahead: states that its state in A leads to, itself among them.
-        behind: states that lead to its state in B.
-        gap: where `needs` is None, of these the two that lie nearest.
-        remedies: what would let it through.
+        start: name of its state in A.
+        goal: name of its state in B.
+        needs: least number of moves that it needs; None where no number is enough.
+        ahead: number of states that its state in A leads to, itself among them.
+        behind: number of states that lead to its state in B.
+        gap: where `needs` is None, the two nearest of these.
+        remedies: what would give it a path.
     """
 
     joint: str
@@ -69,9 +69,13 @@ class BlockedJoint:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Why there is no path: the greatest number of moves allowed, whether bridges were not, and the joints at fault.
+    """The reason why there is no path.
 
-    `helps` is what lets all of them through.
+    Attributes:
+        max_moves: greatest number of moves that was allowed.
+        strict: whether bridges were forbidden.
+        faults: the joints without a path.
+        helps: what would give all of them a path.
     """
 
     max_moves: int
@@ -80,7 +84,7 @@ class Diagnosis:
     helps: tuple[str, ...]
 
     def plain(self) -> dict[str, Any]:
-        """As plain values for JSON."""
+        """Return the diagnosis as plain values for JSON."""
         return asdict(self)
 
     def __str__(self) -> str:
@@ -117,11 +121,11 @@ def diagnose(
     rules: Rules,
     strict: bool,
 ) -> Diagnosis:
-    """What is wrong where no path leads from states `start` [L] to `goal` [L] under `rules`, and what would help.
+    """Find the joints without a path from states `start` [L] to `goal` [L] under `rules`, and what would help them.
 
-    Remedies are tried joint by joint: bridges, if `strict` forbade them; the corpus played backwards too, and seen in a
-    mirror too, as far as it has states for what is there; and coarser states. A joint that has arrived may wait, so
-    where all have a way of few enough moves, there is a path.
+    Remedies are tried joint by joint: bridges, if `strict` forbade them; the corpus learned backwards as well, and
+    mirrored as well, as far as it has states for that; and coarser states. A joint that has arrived may wait, so there
+    is a path wherever each joint has one of few enough moves.
     """
     faults = []
     for chain in range(len(grammar.chains)):
@@ -140,8 +144,12 @@ def diagnose(
         cosines = np.abs(centres[ahead] @ centres[behind].T)
         i, k = np.unravel_index(int(cosines.argmax()), cosines.shape)
         degrees = float(np.degrees(2.0 * np.arccos(min(1.0, cosines[i, k]))))
-        gap = Gap(_called(space, chain, ahead[i]), _called(space, chain, behind[k]), degrees) if needs is None else None
-        ends = _called(space, chain, a), _called(space, chain, b)
+        gap = (
+            Gap(_state_name(space, chain, ahead[i]), _state_name(space, chain, behind[k]), degrees)
+            if needs is None
+            else None
+        )
+        ends = _state_name(space, chain, a), _state_name(space, chain, b)
         faults.append(BlockedJoint(grammar.chains[chain], *ends, needs, len(ahead), len(behind), gap, remedies))
     every = [{remedy.what for remedy in fault.remedies} for fault in faults]
     helps = tuple(sorted(set.intersection(*every))) if every else ()
@@ -151,7 +159,7 @@ def diagnose(
 def _remedies(
     graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int, a: int, b: int, strict: bool
 ) -> Iterator[tuple[str, int | None]]:
-    """Moves that a chain needs from state `a` to `b`, None where none suffice, with each thing that might help."""
+    """Yield each change that might help a chain from state `a` to `b`, and the moves it then needs, None for no path."""
     if strict:
         first, last = grammar.transitions.starts[chain], grammar.transitions.starts[chain + 1]
         indptr = grammar.bridges.indptr[first : last + 1]
@@ -172,8 +180,8 @@ def _remedies(
 
 
 def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -> csr_array | None:
-    """The moves that a chain's partner makes, seen in a mirror, between the chain's own states; None where the body has
-    no mirror image, or the chain's image is more than its partner's reflection."""
+    """Return the moves of a chain's partner, mirrored, between the chain's own states; None where the body has no
+    mirror image, or the chain's image is more than its partner's reflection."""
     graph = grammar.transitions
     if grammar.chains[chain] == FACING:
         partner, image = chain, space.of(chain) * np.array([-1.0, -1.0, -1.0, 1.0])
@@ -197,7 +205,7 @@ def _mirrored(grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int) -
 
 
 def _coarser(corpus: Corpus, ends: Floats, chain: int, degrees: float) -> int | None:
-    """Moves that a joint needs between two orientations [2, 4], if its states are learned anew, `degrees` wide."""
+    """Return the moves that a joint needs between two orientations [2, 4] with states learned anew, `degrees` wide."""
     orientations = corpus.to_chains(corpus.rotations)[:, chain]
     centres = codebook(orientations, degrees)
     states, (a, b) = nearest(orientations, centres)[0], nearest(ends, centres)[0]
@@ -209,12 +217,12 @@ def _graph(sources: NDArray[Any], targets: NDArray[Any], size: int) -> csr_array
 
 
 def _moves(graph: csr_array, a: int, b: int) -> int | None:
-    """The least number of moves from one state to another; None where there is no way."""
+    """Return the least number of moves from one state to another; None where there is no path."""
     hops = shortest_path(graph, unweighted=True, indices=a)[b]
     return int(hops) if np.isfinite(hops) else None
 
 
-def _called(space: StateSpace, chain: int, state: int) -> str:
-    """A state by its number, and its name where it has one."""
+def _state_name(space: StateSpace, chain: int, state: int) -> str:
+    """Return a state by its number, and its name where it has one."""
     number, name = f"state {state}", space.label(chain, int(state))
     return number if name == number else f"{number} ({name})"

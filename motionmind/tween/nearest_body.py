@@ -1,4 +1,4 @@
-"""Tweens through whole postures of a corpus: which posture is nearest, and why there may be no way."""
+"""Tweens through whole postures of a corpus: the nearest posture, and the diagnosis where there is no path."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _COMPARED = 4000  # postures that are compared with as many others at most, to s
 
 
 def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
-    """The posture of the corpus with the least sum of squared angles between its joints' rotations and `rotations`
-    [J, 4], but for where it faces, if that is free."""
+    """Return the number of the corpus's posture nearest to `rotations` [J, 4]: the one with the least sum of squared
+    angles between joints, wherever it faces if the facing is free."""
     count = len(corpus.skeleton)
     angles = rot.angle(corpus.to_chains(corpus.rotations)[:, :count], corpus.to_chains(rotations)[:count])
     return int(np.argmin(np.sum(angles**2, axis=1)))
 
 
 def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], rules: Rules) -> str:
-    """Why no whole postures lead from one posture of the corpus to another, `near` A and B, and which come nearest."""
+    """Return in words why no whole postures lead between the corpus's postures nearest to A and B, and which come nearest."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import shortest_path
 

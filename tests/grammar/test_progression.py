@@ -385,7 +385,7 @@ def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine) -> No
         {"moves": 7, "pin": {"left_wrist": "B"}},
     ):
         found = join(engine, **asked)
-        assert found.account.total == pytest.approx(found.cost, abs=1e-6)
+        assert found.costs.total == pytest.approx(found.cost, abs=1e-6)
         assert found.path.shape == (found.moves + 1, len(found.joints))
         assert found.asked["coordination"] == "progression"
 

@@ -428,7 +428,7 @@ def test_a_tween_is_measured_by_the_states_that_it_passes(engine: Engine) -> Non
     assert found["moves"].value == tween.moves
     assert found["attested"].value == pytest.approx(tween.attested)
     assert found["log_likelihood"].value == pytest.approx(
-        np.log(tween.account.likelihood[tween.account.likelihood > 0.0]).mean()
+        np.log(tween.costs.likelihood[tween.costs.likelihood > 0.0]).mean()
     )
     for figure in found.values():
         assert not figure.low > figure.high

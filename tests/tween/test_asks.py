@@ -523,7 +523,7 @@ def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine, plain
         {"coordination": "none"},
     ):
         found = join(engine, **asked)
-        assert found.account.total == pytest.approx(found.cost, abs=1e-6)
+        assert found.costs.total == pytest.approx(found.cost, abs=1e-6)
 
 
 def test_a_restriction_that_leaves_no_path_is_named(engine: Engine) -> None:

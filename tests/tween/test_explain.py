@@ -18,7 +18,8 @@ from motionmind.body.motion import Posture
 from motionmind.errors import FormatError
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
-from motionmind.tween.narrative import explain, lines, plain, read_report
+from motionmind.tween.narrative import explain
+from motionmind.tween.report import read_report
 from motionmind.tween.result import Tween
 
 ENDS = [Path(__file__).parents[2] / "corpora/ballet/postures" / name for name in ("arabesque.json", "fifth.json")]
@@ -76,13 +77,13 @@ def test_what_is_charged_adds_up_to_the_cost(insects: Engine, options: dict[str,
     rng = np.random.default_rng(1)
     for a, b in rng.integers(len(insects.corpus), size=(4, 2)):
         tween = between(insects, a, b, **options)
-        assert tween.account.total == pytest.approx(tween.cost, abs=1e-6)
+        assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)
         report = tween.report()
         costs = report["costs"]
         told = sum(map(sum, costs["moves"])) + sum(map(sum, costs["coordination"])) + costs["per_move"] * tween.moves
         assert told == pytest.approx(report["cost"], abs=1e-6)
         for thing in (*tween.bridges, *tween.waits):
-            charged = tween.account.moves[thing.move, tween.joints.index(thing.joint)]
+            charged = tween.costs.moves[thing.move, tween.joints.index(thing.joint)]
             assert charged == pytest.approx(thing.price)
 
 
@@ -98,7 +99,7 @@ def test_likelihoods_are_what_was_counted(insects: Engine, bridged: Tween) -> No
                 left = states[moves.begins, chain] == before[chain]
                 made = left & (states[moves.ends, chain] == after[chain])
             counted = moves.weights[made].sum() / moves.weights[left].sum() if left.any() else 0.0
-            assert bridged.account.likelihood[t, chain] == pytest.approx(counted)
+            assert bridged.costs.likelihood[t, chain] == pytest.approx(counted)
             assert (bridged.sources[t][chain] is None) == (counted == 0.0)
 
 
@@ -108,7 +109,7 @@ def test_coordination_is_what_the_network_says(insects: Engine, bridged: Tween) 
         for chain, joint in enumerate(bridged.joints):
             parent = skeleton.parents[chain] if joint != "facing" else -1
             cost = -np.log(network.get_cpds(joint).get_values()[row[chain], row[parent]]) if parent >= 0 else 0.0
-            assert bridged.account.coordination[t, chain] == pytest.approx(cost, abs=1e-9)
+            assert bridged.costs.coordination[t, chain] == pytest.approx(cost, abs=1e-9)
 
 
 def test_a_source_says_when_it_was(insects: Engine, bridged: Tween) -> None:
@@ -130,11 +131,11 @@ def test_the_explanation_adds_up_move_by_move(bridged: Tween, tmp_path: Path) ->
         assert found == {(thing.joint, thing.move) for thing in things}
     for t, move in enumerate(told.moves):
         assert [step.moved for step in move.joints] == (bridged.path[t] != bridged.path[t + 1]).tolist()
-    assert json.loads(json.dumps(plain(told), allow_nan=False))["moves"][0]["joints"][0]["joint"] == "thorax"
+    assert json.loads(json.dumps(told.plain(), allow_nan=False))["moves"][0]["joints"][0]["joint"] == "thorax"
 
 
 def test_people_read_who_moves_how_likely_and_where_it_was_seen(bridged: Tween, tmp_path: Path) -> None:
-    text = "\n".join(lines(explain(read_report(report_of(bridged, tmp_path)))))
+    text = str(explain(read_report(report_of(bridged, tmp_path))))
     assert text.count("\nmove ") == bridged.moves
     for bridge in bridged.bridges:
         part = text.split("\nmove ")[bridge.move + 1]
@@ -153,7 +154,7 @@ def test_no_move_is_told_too(insects: Engine, tmp_path: Path) -> None:
     still = between(insects, 3, 3)
     told = explain(read_report(report_of(still, tmp_path)))
     assert told.moves == []
-    assert next(lines(told)) == "0 moves in 0.00 s, optimal, gap 0.00%"
+    assert str(told).splitlines()[0] == "0 moves in 0.00 s, optimal, gap 0.00%"
 
 
 def test_the_command_names_states_by_their_names(run: Run) -> None:
@@ -201,7 +202,7 @@ def test_damaged_reports_are_told_or_refused(
     for _ in range(150):
         path.write_bytes(mutate(text, rng))
         try:
-            list(lines(explain(read_report(path))))
+            str(explain(read_report(path)))
         except FormatError:
             refused += 1
     assert refused > 50

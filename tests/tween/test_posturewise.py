@@ -113,7 +113,7 @@ def test_it_goes_through_whole_postures_in_their_order_and_is_never_cheaper(inse
         joined += 1
         path = np.ascontiguousarray(tween.path[:, :joints])
         assert all((before.tobytes(), after.tobytes()) in made for before, after in pairwise(path))
-        assert tween.account.total == pytest.approx(tween.cost, abs=1e-6)
+        assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)
         assert (tween.status, tween.lower_bound) == ("optimal", tween.cost)
         assert {bridge.joint for bridge in tween.bridges} <= {"facing"}
         free = insects.tween(posture(insects, a), posture(insects, b))

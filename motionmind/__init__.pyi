@@ -1,0 +1,72 @@
+"""The public names, each listed once."""
+
+from .body.human import human23 as human23, human44 as human44
+from .body.motion import Insertion as Insertion, Motion as Motion, Posture as Posture
+from .body.skeleton import Skeleton as Skeleton
+from .chaos.flows import Flow as Flow, flow_of as flow_of
+from .discretize import make_discretization as make_discretization
+from .errors import (
+    CorpusError as CorpusError,
+    FormatError as FormatError,
+    MotionMindError as MotionMindError,
+    MotionMindWarning as MotionMindWarning,
+    NoPathError as NoPathError,
+    SkeletonError as SkeletonError,
+)
+from .formats import (
+    read_motion as read_motion,
+    read_posture as read_posture,
+    write_motion as write_motion,
+    write_posture as write_posture,
+)
+from .notation.compose import compose as compose
+from .render.pictures import write_picture as write_picture
+from .render.sheet import contact_sheet as contact_sheet
+from .retarget.retarget import own_skeleton as own_skeleton, to_human23 as to_human23
+from .tween.certificate import Bridge as Bridge, Source as Source, Wait as Wait
+from .tween.engine import Engine as Engine
+from .tween.result import Tween as Tween
+from .variation.piece import Piece as Piece
+from .variation.review import Seam as Seam
+from .variation.variation import Variation as Variation, vary as vary
+from .variation.variation_json import read_variation as read_variation, write_variation as write_variation
+
+__version__: str
+
+__all__ = [
+    "Bridge",
+    "CorpusError",
+    "Engine",
+    "Flow",
+    "FormatError",
+    "Insertion",
+    "Motion",
+    "MotionMindError",
+    "MotionMindWarning",
+    "NoPathError",
+    "Piece",
+    "Posture",
+    "Seam",
+    "Skeleton",
+    "SkeletonError",
+    "Source",
+    "Tween",
+    "Variation",
+    "Wait",
+    "compose",
+    "contact_sheet",
+    "flow_of",
+    "human23",
+    "human44",
+    "make_discretization",
+    "own_skeleton",
+    "read_motion",
+    "read_posture",
+    "read_variation",
+    "to_human23",
+    "vary",
+    "write_motion",
+    "write_picture",
+    "write_posture",
+    "write_variation",
+]

@@ -1,0 +1,78 @@
+"""A learned corpus as graphs for other programs: a joint's graph for networkx, the coordination for pgmpy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from motionmind.grammar.coordination import fit_network
+from motionmind.learned.model import LearnedCorpus
+
+if TYPE_CHECKING:
+    import networkx as nx
+    from pgmpy.models import DiscreteBayesianNetwork
+
+LIKELIEST_PARENTS = 3  # states of the parent that a joint graph names beside a state
+
+
+def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
+    """Return the joint graph of a joint (or "facing") as a networkx graph.
+
+    Nodes are states, with `orientation` (x, y, z, w), `visits`, `label` and `given`: the states of the parent joint
+    that make it likeliest, each with P(state | parent's state), of those seen with it. Edges are attested transitions,
+    with `count`, `weight` (-log P(next | state), nats) and `seconds`. The graph knows its `corpus`, `joint` and
+    `parent`, None where it has none.
+
+    Raises:
+        SkeletonError: the corpus has no such joint.
+    """
+    import networkx as nx
+
+    graph, chain = learned.grammar.transitions, learned.space.index(joint)
+    first, last = graph.starts[chain], graph.starts[chain + 1]
+    weights = graph.weights("conditional")
+    parent = int(learned.grammar.coordination.parents[chain])
+    above = learned.corpus.chains[parent] if parent >= 0 else None
+    out = nx.DiGraph(corpus=learned.corpus.name, joint=joint, parent=above)
+    given = _likeliest_parents(learned, chain, parent)
+    for state, row in enumerate(range(first, last)):
+        out.add_node(
+            state,
+            orientation=tuple(map(float, learned.space.centres[row])),
+            visits=float(graph.visits[row]),
+            label=learned.space.label(chain, state),
+            given=given[state],
+        )
+    for row in range(first, last):
+        for edge in range(graph.indptr[row], graph.indptr[row + 1]):
+            out.add_edge(
+                row - int(first),
+                int(graph.targets[edge]),
+                count=float(graph.counts[edge]),
+                weight=float(weights[edge]),
+                seconds=float(graph.seconds[edge]),
+            )
+    return out
+
+
+def network(learned: LearnedCorpus) -> DiscreteBayesianNetwork:
+    """Return the coordination network as a pgmpy network over the joints, from which the search's costs were compiled."""
+    joints = len(learned.corpus.skeleton)
+    parents, sizes = learned.corpus.chain_parents[:joints], learned.space.sizes[:joints]
+    states, weights = np.asarray(learned.states[:, :joints]), learned.corpus.weights
+    return fit_network(learned.corpus.skeleton.names, parents, states, sizes, weights)
+
+
+def _likeliest_parents(learned: LearnedCorpus, chain: int, parent: int) -> list[tuple[tuple[str, float], ...]]:
+    """Return for each state of a chain the parent's states that it goes with best, each with P(state | parent's)."""
+    if parent < 0:
+        return [()] * int(learned.space.sizes[chain])
+    likely = np.exp(-learned.grammar.coordination.table(chain, learned.grammar.transitions.starts))
+    seen = np.zeros(likely.shape, dtype=bool)
+    seen[learned.states[:, parent], learned.states[:, chain]] = True
+    best = np.argsort(-np.where(seen, likely, 0.0), axis=0, kind="stable")[:LIKELIEST_PARENTS]
+    return [
+        tuple((learned.space.label(parent, int(p)), float(likely[p, state])) for p in column if seen[p, state])
+        for state, column in enumerate(best.T)
+    ]

@@ -1,0 +1,179 @@
+"""Formulating a request: two postures and their request, as states and costs that the search reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.human import human23
+from motionmind.body.motion import Posture
+from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.geometry import rotations as rot
+from motionmind.grammar.coordination import Coordination
+from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.progression import fit_progression
+from motionmind.grammar.transitions import Weights
+from motionmind.learned.model import LearnedCorpus
+from motionmind.realise.timeline import usual
+from motionmind.retarget.joint_mapping import joint_mapping
+from motionmind.retarget.retarget import to_human23
+from motionmind.search.problem import Model, Problem, Rules, Via, with_waits
+from motionmind.search.solve import MOST_STATES_OF_CHAIN
+from motionmind.tween.constraints import Constraint, constraints_of, restrict
+from motionmind.tween.nearest_body import nearest_posture
+from motionmind.tween.problem import build_model, penalise
+from motionmind.tween.progression import lift_to_moves
+from motionmind.tween.request import MOST_MOVES, TweenRequest
+
+
+@dataclass(frozen=True, eq=False)
+class Formulation:
+    """A request in the search's terms.
+
+    Attributes:
+        a: posture A on the corpus's skeleton.
+        b: posture B on the corpus's skeleton.
+        through: postures to pass through on the corpus's skeleton, in order.
+        request: what is asked.
+        snap_degrees: angle between the orientations of A, the postures to pass through and B, and their states
+            [2 + K, L].
+        nearest: the corpus's postures nearest to A and B, for a search of whole postures; None for one of joints.
+        constraints: what pins, holds and avoided states allow.
+        model: the costs before any constraint.
+        problem: the constrained problem over states of joints.
+        searched: the problem to search: `problem`, or the same with moves in place of states, where joints coordinate
+            by their moves.
+        coordination: the network in the costs of `searched`.
+    """
+
+    a: Posture
+    b: Posture
+    through: tuple[Posture, ...]
+    request: TweenRequest
+    snap_degrees: Floats
+    nearest: tuple[int, int] | None
+    constraints: Sequence[Constraint]
+    model: Model
+    problem: Problem
+    searched: Problem
+    coordination: Coordination
+
+    @property
+    def stays(self) -> bool:
+        """Whether no move at all is best: A is B to within rounding, and nothing is asked of the way."""
+        return not self.request.fixes_length and not self.request.via and _same(self.a, self.b)
+
+
+def formulate(learned: LearnedCorpus, a: Posture, b: Posture, request: TweenRequest) -> Formulation:
+    """Bring the postures onto the corpus's skeleton and states, and build the constrained problem from its grammar.
+
+    Raises:
+        SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
+        NoPathError: a joint to be held has different states in A and B.
+        MotionMindError: the request does not fit the corpus, such as a duration that is too long for it.
+    """
+    shortest, longest = _move_range(learned, request)
+    rules = Rules(request.beta, request.tau, shortest, longest, request.nodes(len(learned.space)))
+    a, b = _on_skeleton(learned, a, "posture A"), _on_skeleton(learned, b, "posture B")
+    vias = [(_on_skeleton(learned, via, f"via {n}"), move) for n, (via, move) in enumerate(request.vias, start=1)]
+    through = tuple(via for via, _ in vias)
+    joints = len(a.skeleton)
+    orientations = learned.corpus.to_chains(np.stack([posture.rotations for posture in (a, *through, b)]))
+    states, nearest = learned.space.assign(orientations), None
+    if request.posturewise:
+        nearest = nearest_posture(learned.corpus, a.rotations), nearest_posture(learned.corpus, b.rotations)
+        states[:, :joints] = learned.states[list(nearest), :joints]
+    snap_degrees = learned.space.distance(orientations, states)
+    start, *passing, goal = states.astype(np.int64)
+
+    constraints = constraints_of(learned.space, start, goal, request.pin, request.hold, request.avoid)
+    by_moves = request.coordination == "progression"
+    factor = request.coordination_factor
+    bridge_price = None if request.strict else request.bridge_price
+    model = _grammar_model(learned.grammar, request.weights, 0.0 if by_moves else factor, bridge_price, request.novelty)
+    if request.unlike:
+        model = penalise(model, [other.path for other in request.unlike], request.diversity)
+    problem = Problem(
+        restrict(model, constraints),
+        start,
+        goal,
+        rules,
+        tuple(Via(state, None if move is None else int(move)) for state, (_, move) in zip(passing, vias, strict=True)),
+    )
+    searched, coordination = problem, learned.grammar.coordination
+    if by_moves:
+        searched, coordination = _lifted(learned, problem, factor)
+    return Formulation(
+        a, b, through, request, snap_degrees, nearest, constraints, model, problem, searched, coordination
+    )
+
+
+@lru_cache(maxsize=1)
+def _grammar_model(
+    grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float
+) -> Model:
+    """Return `build_model` of the same arguments: it is kept while one request after another asks for the same."""
+    return build_model(grammar, weights, coordination, bridge_price, novelty)
+
+
+def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int]:
+    """Return the least and the greatest number of moves: what is asked, or the nearest number of moves of the corpus's
+    usual length that a duration holds."""
+    if request.duration is None:
+        return request.move_range
+    seconds = usual(learned.grammar.transitions)
+    longest = MOST_MOVES * seconds
+    if not 1.0 / request.fps <= request.duration <= longest:
+        raise MotionMindError(
+            f"duration must be a number of seconds from a frame's {1.0 / request.fps:g} to {longest:g}, not "
+            f"{request.duration}"
+        )
+    if request.moves is not None:
+        return request.move_range
+    nearest = max(1, round(request.duration / seconds))
+    return nearest, nearest
+
+
+def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Problem, Coordination]:
+    """Return the same problem with moves in place of states, and the network over moves."""
+    held = with_waits(problem.model, problem.goal, problem.rules.wait)
+    count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each chain's states
+    if count.max() > MOST_STATES_OF_CHAIN:
+        joint = learned.grammar.chains[int(count.argmax())]
+        raise MotionMindError(
+            f"coordination progression: {joint} has {count.max()} states and moves, and the search takes up to "
+            f"{MOST_STATES_OF_CHAIN}; build the corpus with a coarser tolerance for it, or ask for strict"
+        )
+    moves = learned.corpus.moves
+    network = fit_progression(
+        learned.grammar.coordination.parents,
+        held.starts,
+        held.indptr,
+        held.targets,
+        learned.states,
+        moves.begins,
+        moves.ends,
+        moves.weights,
+    )
+    rules = replace(problem.rules, wait=np.inf)  # waits at the goal are moves by now
+    return replace(problem, model=lift_to_moves(held, network, factor), rules=rules), network
+
+
+def _on_skeleton(learned: LearnedCorpus, posture: Posture, which: str) -> Posture:
+    """Return the posture on the corpus's joints; SkeletonError names the difference."""
+    skeleton = learned.corpus.skeleton
+    if human23().difference(skeleton) is None and joint_mapping(posture.skeleton) is not None:
+        posture = to_human23(posture)
+    difference = skeleton.difference(posture.skeleton)
+    if difference is not None:
+        raise SkeletonError(f"{which} is on another skeleton than corpus {learned.corpus.name!r}: {difference}")
+    return posture
+
+
+def _same(a: Posture, b: Posture) -> bool:
+    """Return whether two postures are one, to within rounding."""
+    return bool(np.all(rot.angle(a.rotations, b.rotations) < 1e-6) and np.all(np.abs(a.root - b.root) < 1e-6))

@@ -1,0 +1,162 @@
+"""The report of a tween: one schema, by which it is written and read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from motionmind.errors import FormatError
+from motionmind.files import FilePath, read_bytes
+from motionmind.tween.certificate import Bridge, Source, Wait
+from motionmind.tween.result import Tween
+
+
+class PassedPosture(msgspec.Struct, frozen=True):
+    """A posture to pass through: the move at which it is passed, and the angle of each joint to its state, degrees."""
+
+    move: int
+    snap_degrees: dict[str, float]
+
+
+class ReportedCosts(msgspec.Struct, frozen=True):
+    """The cost taken apart, nats: of each joint's move [T][L], of its coordination [T][L], and of each move."""
+
+    moves: list[list[float]]
+    coordination: list[list[float]]
+    per_move: float
+
+
+class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
+    """All of a tween but its movement. Rows are by move or posture, then by joint.
+
+    Attributes:
+        asked: the request, see `TweenRequest`.
+        status: "optimal", "bounded", "interrupted" or "sampled".
+        cost: of the path, nats; the `costs` add up to it.
+        lower_bound: no path that fulfils the request costs less, nats.
+        gap: (cost - lower bound) / cost.
+        moves: number of moves T.
+        expansions: nodes that A* expanded.
+        peak_nodes: greatest number of nodes that A* held.
+        node_budget: number of nodes that it might hold.
+        seconds: seconds spent on each step; measured.
+        joints: names of the joint chains [L].
+        path: states [T + 1][L].
+        attested: share of the joints' moves that the corpus attests.
+        bridges: moves that it does not attest.
+        waits: moves spent waiting at the goal.
+        shared: state changes shared with the tweens to differ from.
+        vias: postures to pass through.
+        snap_degrees: angle of each joint to its state in A and in B.
+        path_degrees: "mean" and "most" angle between the motion and the path's states on the way; empty without a way.
+        sources: a place in the corpus that attests each move of each joint, or null [T][L].
+        detail: where the fine detail was recorded.
+        times: of the moves [T + 1], seconds.
+        names: of the states [T + 1][L].
+        degrees: angle of each joint's move [T][L].
+        likelihood: P(state arrived in | state left) of each joint's move; 0 where it is not attested [T][L].
+        costs: the cost taken apart.
+    """
+
+    asked: dict[str, Any] = {}
+    status: str
+    cost: float
+    lower_bound: float
+    gap: float
+    moves: int = 0
+    expansions: int = 0
+    peak_nodes: int = 0
+    node_budget: int = 0
+    seconds: dict[str, float] = {}
+    joints: list[str]
+    path: list[list[int]]
+    attested: float = 0.0
+    bridges: list[Bridge]
+    waits: list[Wait]
+    shared: int = 0
+    vias: list[PassedPosture] = []
+    snap_degrees: dict[str, dict[str, float]] = {}
+    path_degrees: dict[str, float] = {}
+    sources: list[list[Source | None]]
+    detail: list[Source] = []
+    times: list[float]
+    names: list[list[str]]
+    degrees: list[list[float]]
+    likelihood: list[list[float]]
+    costs: ReportedCosts
+
+    def __post_init__(self) -> None:
+        """Check that every table has a row a move or a posture, and every row an entry a joint."""
+        moves, joints = len(self.path) - 1, len(self.joints)
+        tables: list[tuple[Sequence[Sequence[object]], int]] = [(self.path, moves + 1), (self.names, moves + 1)]
+        costs = (self.costs.moves, self.costs.coordination)
+        tables += [(table, moves) for table in (self.sources, self.degrees, self.likelihood, *costs)]
+        if any(len(table) != rows or any(len(row) != joints for row in table) for table, rows in tables):
+            raise ValueError(f"its tables are not of {moves} moves of {joints} joints")
+        if moves < 0 or len(self.times) != moves + 1:
+            raise ValueError(f"it has {len(self.path)} postures and {len(self.times)} times")
+
+
+def report_of(tween: Tween) -> TweenReport:
+    """Return the report of a tween."""
+    costs, inner = tween.costs, tween.path_degrees[1:-1]
+
+    def by_joint(row: Sequence[float]) -> dict[str, float]:
+        return dict(zip(tween.joints, map(float, row), strict=True))
+
+    return TweenReport(
+        asked=tween.asked,
+        status=tween.status,
+        cost=tween.cost,
+        lower_bound=tween.lower_bound,
+        gap=tween.gap,
+        moves=tween.moves,
+        expansions=tween.expansions,
+        peak_nodes=tween.peak_nodes,
+        node_budget=tween.node_budget,
+        seconds=tween.seconds,
+        joints=list(tween.joints),
+        path=tween.path.tolist(),
+        attested=tween.attested,
+        bridges=list(tween.bridges),
+        waits=list(tween.waits),
+        shared=tween.shared,
+        vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
+        snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
+        path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},
+        sources=[list(row) for row in tween.sources],
+        detail=list(tween.detail),
+        times=tween.motion.insertions[0].times.tolist(),
+        names=[list(row) for row in costs.names],
+        degrees=costs.degrees.tolist(),
+        likelihood=costs.likelihood.tolist(),
+        costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move),
+    )
+
+
+def plain(report: TweenReport) -> dict[str, Any]:
+    """Return a report as plain values for JSON, in the order of its fields."""
+    values: dict[str, Any] = msgspec.to_builtins(report, enc_hook=np.generic.item)
+    return values
+
+
+def encode_report(report: TweenReport) -> bytes:
+    """Return a report as the JSON of its file."""
+    return f"{json.dumps(plain(report))}\n".encode()
+
+
+def read_report(path: FilePath) -> TweenReport:
+    """Read the report of a tween.
+
+    Raises:
+        FormatError: there is no such file, or it is no report of a tween; the message says what is wrong.
+    """
+    try:
+        return msgspec.json.decode(read_bytes(path), type=TweenReport)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        fault = str(error).replace("Object missing required field", "there is no key")
+        raise FormatError(f"is no report of a tween: {fault}", path=path) from error

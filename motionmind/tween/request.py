@@ -1,0 +1,222 @@
+"""The request: everything that can be asked of a tween beside its two postures, in one validated description.
+
+The command line's options, the report's `asked` and the options that `vary` accepts are derived from its fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from motionmind.body.motion import FASTEST, Posture
+from motionmind.errors import MotionMindError
+from motionmind.grammar.transitions import Weights
+from motionmind.search.astar import nodes_in
+
+if TYPE_CHECKING:
+    from motionmind.tween.result import Tween
+
+Scheme = Literal["posture", "progression", "none"]
+
+MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory holds
+MOST_NODES = 1_000_000_000
+MOST_MEMORY = 1 << 50  # bytes
+SLOWEST = 0.01  # frames a second
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TweenRequest:
+    """What is asked of a tween from posture A to posture B.
+
+    Attributes:
+        moves: number of moves, or the least and the greatest number; None lets the search find the best number.
+        max_moves: greatest number of moves that the search may find.
+        duration: length of the motion in seconds, exact; where `moves` is None it also fixes the number of moves, each
+            as long as the corpus's usual.
+        pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
+        hold: joints that keep their state all the way, such as a standing leg; A and B must agree there.
+        avoid: joints, each with a state to avoid on the way, by number or name.
+        via: postures to pass through, in this order; each at any move, or as (posture, move) at that one.
+        unlike: tweens to differ from.
+        diversity: nats that each change of a joint's state costs for every tween of `unlike` that makes it too.
+        sample: sample a path with probability proportional to exp(-cost), instead of finding the best one; it has as
+            many moves as the best. `motionmind.search.sample` says how close to that distribution it comes.
+        seed: seed of the sample, at least 0.
+        strict: forbid bridges: every move of every joint is attested, or a wait at its goal.
+        posturewise: use whole postures of the corpus in their recorded order alone, from the one nearest to A to the
+            one nearest to B: the search of 1998, as a baseline.
+        node_budget: nodes that the search may hold at once; it stops after as many expansions.
+        memory: bytes that these nodes may take, instead of `node_budget`.
+        weights: cost of a transition: "conditional", -log P(next state | state), or "printed", as the papers print it.
+        novelty: from 0, where frequent moves are cheap, to 1, where all moves attested from a state cost the same.
+        coordination: what a joint coordinates with: "posture", P(joint's state | parent's state); "progression",
+            P(joint's next state | its state, parent's state and next state), as in [C98]; or "none".
+        lambda_: factor of the coordination's -log P.
+        beta: nats for each move that a joint waits at its goal.
+        tau: nats for each move.
+        bridge_price: nats for each degree of an unattested move.
+        fps: frames a second of the motion.
+        follow: keep the motion to the path, each joint in its state at each move (True), or let it be the mean of the
+            corpus's walks from A to B, which is nearer to held-out movement (False). None chooses the mean, unless more
+            than a length is asked of the path.
+
+    Raises:
+        MotionMindError: a value is out of its range, or two of them contradict each other.
+
+    >>> TweenRequest(duration=2.0, hold=["left_ankle"]).duration
+    2.0
+    >>> TweenRequest(novelty=2.0)
+    Traceback (most recent call last):
+    motionmind.errors.MotionMindError: novelty must be a number from 0 to 1, not 2.0
+    """
+
+    moves: int | tuple[int, int] | None = None
+    max_moves: int = 60
+    duration: float | None = None
+    pin: Mapping[str, str] = MappingProxyType({})
+    hold: Sequence[str] = ()
+    avoid: Sequence[tuple[str, int | str]] = ()
+    via: Sequence[Posture | tuple[Posture, int]] = ()
+    unlike: Sequence[Tween] = ()
+    diversity: float = 2.0
+    sample: bool = False
+    seed: int = 0
+    strict: bool = False
+    posturewise: bool = False
+    node_budget: int = 200_000
+    memory: int | None = None
+    weights: Weights = "conditional"
+    novelty: float = 0.0
+    coordination: Scheme = "posture"
+    lambda_: float = 1.0
+    beta: float = 1.0
+    tau: float = 1.0
+    bridge_price: float = 1.0
+    fps: float = 30.0
+    follow: bool | None = None
+
+    def __post_init__(self) -> None:
+        self._check_combinations()
+        _check_count("max_moves", self.max_moves, MOST_MOVES)
+        least, most = self.move_range
+        _check_count("moves", least, MOST_MOVES)
+        _check_count("moves", most, MOST_MOVES)
+        if least > most:
+            raise MotionMindError(f"moves must be a range from the least to the greatest, not from {least} to {most}")
+        _check_count("node_budget", self.node_budget, MOST_NODES)
+        if self.memory is not None:
+            _check_count("memory", self.memory, MOST_MEMORY)
+        _check_choice("coordination", self.coordination, get_args(Scheme))
+        _check_choice("weights", self.weights, get_args(Weights))
+        if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
+            raise MotionMindError(f"seed must be a whole number of at least 0, not {self.seed}")
+        if not SLOWEST <= self.fps <= FASTEST:
+            raise MotionMindError(
+                f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {self.fps}"
+            )
+        if not 0.0 <= self.novelty <= 1.0:
+            raise MotionMindError(f"novelty must be a number from 0 to 1, not {self.novelty}")
+        for name in ("lambda_", "beta", "tau", "bridge_price", "diversity"):
+            nats = getattr(self, name)
+            if not (np.isfinite(nats) and nats >= 0.0):
+                raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
+        for number, (_, move) in enumerate(self.vias, start=1):
+            if move is not None and not (isinstance(move, int | np.integer) and 1 <= move < MOST_MOVES):
+                raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
+
+    def _check_combinations(self) -> None:
+        if not self.posturewise:
+            return
+        if self.pin or self.hold or self.avoid or self.via or self.unlike or self.sample:
+            raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
+        if self.coordination == "progression":
+            raise MotionMindError("posturewise: coordination can be posture or none, not progression")
+
+    @classmethod
+    def of(cls, request: TweenRequest | None = None, **options: Any) -> TweenRequest:
+        """Return `request` (the default one if None) with some options changed.
+
+        Raises:
+            TypeError: there is no such option.
+            MotionMindError: as for the constructor.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in options:
+            if name not in known:
+                near = get_close_matches(name, known, n=1)
+                raise TypeError(f"a tween has no option {name!r}" + (f"; did you mean {near[0]}?" if near else ""))
+        return replace(request, **options) if request is not None else cls(**options)
+
+    @property
+    def move_range(self) -> tuple[int, int]:
+        """Least and greatest number of moves, before a duration narrows them."""
+        if self.moves is None:
+            return 1, self.max_moves
+        return self.moves if isinstance(self.moves, tuple) else (self.moves, self.moves)
+
+    @property
+    def fixes_length(self) -> bool:
+        """Whether the number of moves or the duration is given, so that even equal postures are to be moved between."""
+        return self.moves is not None or self.duration is not None
+
+    @property
+    def vias(self) -> list[tuple[Posture, int | None]]:
+        """Postures to pass through, each with its move or None."""
+        return [given if isinstance(given, tuple) else (given, None) for given in self.via]
+
+    @property
+    def follows_path(self) -> bool:
+        """Whether the motion keeps to the path: as asked, else where more than a length is asked of the path."""
+        if self.follow is not None:
+            return self.follow
+        constraints = (self.pin, self.hold, self.avoid, self.via, self.unlike, self.sample)
+        return any((*constraints, self.posturewise, self.novelty))
+
+    @property
+    def coordination_factor(self) -> float:
+        """Factor of the coordination's -log P: lambda, or 0 where joints move each on its own."""
+        return 0.0 if self.coordination == "none" else self.lambda_
+
+    def nodes(self, chains: int) -> int:
+        """Return how many nodes the search may hold, for a body of so many joint chains."""
+        if self.memory is None:
+            return self.node_budget
+        nodes = nodes_in(int(self.memory), chains)
+        if nodes < 1:
+            raise MotionMindError(f"memory of {self.memory} bytes holds not one node; give some megabytes")
+        return min(nodes, MOST_NODES)
+
+    def plain(self, chains: int) -> dict[str, Any]:
+        """Return the request as plain values for JSON, as a report's `asked` has it.
+
+        What a default depends on is filled in: the node budget for a body of so many joint chains, and whether the
+        motion follows the path. Postures to pass through are told by their moves, tweens to differ from by their number.
+        """
+        values = {field.name.rstrip("_"): getattr(self, field.name) for field in fields(self)}
+        del values["posturewise"]
+        return values | {
+            "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
+            "pin": dict(self.pin),
+            "hold": list(self.hold),
+            "avoid": [list(pair) for pair in self.avoid],
+            "via": [None if move is None else int(move) for _, move in self.vias],
+            "unlike": len(self.unlike),
+            "node_budget": self.nodes(chains),
+            "follow": self.follows_path,
+        }
+
+
+def _check_count(name: str, value: object, most: int) -> None:
+    if not (isinstance(value, int | np.integer) and 1 <= value <= most):
+        raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
+
+
+def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
+    if value not in choices:
+        listed = f"{', '.join(map(repr, choices[:-1]))} or {choices[-1]!r}"
+        raise MotionMindError(f"{name} must be {listed}, not {value!r}")
