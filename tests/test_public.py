@@ -1,6 +1,7 @@
-"""The public interface: small, documented, quick to import."""
+"""The public interface: small, documented, with examples that run, quick to import."""
 
 import ast
+import doctest
 import inspect
 import subprocess
 import sys
@@ -25,30 +26,50 @@ def test_every_public_name_exists_and_is_documented(name: str) -> None:
         assert not undocumented
 
 
-def test_every_public_name_is_listed_once_and_typed() -> None:
-    source = (PACKAGE / "__init__.py").read_text()
-    typed = [
-        alias.asname or alias.name
-        for block in ast.parse(source).body
-        if isinstance(block, ast.If)
-        for statement in block.body
-        if isinstance(statement, ast.ImportFrom)
-        for alias in statement.names
-    ]
-    assert sorted(typed) == sorted(motionmind.__all__)
+@pytest.mark.parametrize("name", motionmind.__all__)
+def test_every_public_name_has_an_example_that_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    thing = getattr(motionmind, name)
+    found = doctest.DocTestFinder(recurse=False).find(thing, name, globs={})
+    assert found, f"{name} has no docstring of its own"
+    assert found[0].examples, f"{name} shows no example"
+    # Nothing is at hand but what the example itself imports, as for a reader who types it.
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.IGNORE_EXCEPTION_DETAIL)
+    runner.run(found[0])
+    assert runner.failures == 0
+
+
+def test_the_names_are_those_of_the_stub_and_each_is_found_by_tab() -> None:
+    stub = ast.parse((PACKAGE / "__init__.pyi").read_text("utf-8"))
+    imported = [alias.name for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names]
+    assert sorted(imported) == sorted(set(imported)) == sorted(motionmind.__all__)
+    listed = next(node for node in stub.body if isinstance(node, ast.Assign))
+    assert ast.literal_eval(listed.value) == sorted(imported)
+    assert set(motionmind.__all__) <= set(dir(motionmind))
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'Motor'"):
+    with pytest.raises(AttributeError, match="Motor"):
         motionmind.Motor  # noqa: B018
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_everything_that_is_not_private_has_a_docstring(path: Path) -> None:
-    tree = ast.parse(path.read_text())
-    assert ast.get_docstring(tree)
+    tree = ast.parse(path.read_text("utf-8"))
+    assert len(ast.get_docstring(tree) or "") > 3
     undocumented = [node.name for node in _public(tree) if not ast.get_docstring(node)]
     assert not undocumented
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_docstrings_begin_with_a_verb_or_a_noun(path: Path) -> None:
+    tree = ast.parse(path.read_text("utf-8"))
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    nodes = [node for node in ast.walk(tree) if isinstance(node, documented)]
+    first = {getattr(node, "name", path.stem): (ast.get_docstring(node) or "").split(" ")[0] for node in nodes}
+    assert {name: word for name, word in first.items() if word in ("What", "How", "Whose", "Why")} == {}
 
 
 def _public(node: ast.Module | ast.ClassDef) -> Iterator[ast.FunctionDef | ast.ClassDef]:
@@ -67,3 +88,26 @@ def test_importing_motionmind_imports_nothing_heavy() -> None:
     assert (
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
     )
+
+
+# --- names of 0.1 ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("old", "new"), sorted(motionmind._moved.MOVED.items()))
+def test_a_module_that_moved_is_found_under_its_old_name_with_a_warning(old: str, new: str) -> None:
+    code = (
+        "import importlib, warnings\n"
+        "with warnings.catch_warnings(record=True) as seen:\n"
+        "    warnings.simplefilter('always')\n"
+        f"    module = importlib.import_module('motionmind.{old}')\n"
+        f"assert module is importlib.import_module('motionmind.{new}')\n"
+        "said = [str(w.message) for w in seen if w.category is DeprecationWarning and 'old name' in str(w.message)]\n"
+        f"assert len(said) == 1 and 'motionmind.{new};' in said[0], said\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_module_that_never_was_is_not_found() -> None:
+    with pytest.raises(ModuleNotFoundError):
+        __import__("motionmind.motor")

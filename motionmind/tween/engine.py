@@ -36,13 +36,6 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class Engine(LearnedCorpus):
     """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus).
-
-    >>> from motionmind import Engine, read_posture
-    >>> engine = Engine.load("ballet")
-    >>> a, b = (engine.corpus.motion(engine.corpus.clips[0]).posture(n) for n in (0, 3))
-    >>> tween = engine.tween(a, b, moves=3)
-    >>> tween.status, tween.moves
-    ('optimal', 3)
     """
 
     def tween(

@@ -16,7 +16,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.progression import fit_progression
-from motionmind.grammar.transitions import Weights
+from motionmind.grammar.schemes import Weights
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.timeline import usual
 from motionmind.retarget.joint_mapping import joint_mapping

@@ -96,13 +96,6 @@ class Explanation(msgspec.Struct, frozen=True):
 
 def explain(tween: Tween | TweenReport) -> Explanation:
     """Explain a tween, or its report, move by move.
-
-    >>> from motionmind import Engine
-    >>> engine = Engine.load("ballet")
-    >>> a, b = (engine.corpus.motion(engine.corpus.clips[0]).posture(n) for n in (0, 3))
-    >>> explanation = explain(engine.tween(a, b, moves=3))
-    >>> len(explanation.moves), explanation.moves[0].joints[0].joint
-    (3, 'pelvis')
     """
     report = tween if isinstance(tween, TweenReport) else report_of(tween)
     costs = report.costs

@@ -5,23 +5,20 @@ The command line's options, the report's `asked` and the options that `vary` acc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
+from numbers import Integral
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-import numpy as np
-
-from motionmind.body.motion import FASTEST, Posture
-from motionmind.errors import MotionMindError
-from motionmind.grammar.transitions import Weights
-from motionmind.search.astar import nodes_in
+from motionmind.body.rates import FASTEST
+from motionmind.errors import MotionMindError, did_you_mean
+from motionmind.grammar.schemes import Scheme, Weights
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Posture
     from motionmind.tween.result import Tween
-
-Scheme = Literal["posture", "progression", "none"]
 
 MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory holds
 MOST_NODES = 1_000_000_000
@@ -67,12 +64,6 @@ class TweenRequest:
 
     Raises:
         MotionMindError: a value is out of its range, or two of them contradict each other.
-
-    >>> TweenRequest(duration=2.0, hold=["left_ankle"]).duration
-    2.0
-    >>> TweenRequest(novelty=2.0)
-    Traceback (most recent call last):
-    motionmind.errors.MotionMindError: novelty must be a number from 0 to 1, not 2.0
     """
 
     moves: int | tuple[int, int] | None = None
@@ -113,7 +104,7 @@ class TweenRequest:
             _check_count("memory", self.memory, MOST_MEMORY)
         _check_choice("coordination", self.coordination, get_args(Scheme))
         _check_choice("weights", self.weights, get_args(Weights))
-        if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
+        if not (isinstance(self.seed, Integral) and self.seed >= 0):
             raise MotionMindError(f"seed must be a whole number of at least 0, not {self.seed}")
         if not SLOWEST <= self.fps <= FASTEST:
             raise MotionMindError(
@@ -123,10 +114,10 @@ class TweenRequest:
             raise MotionMindError(f"novelty must be a number from 0 to 1, not {self.novelty}")
         for name in ("lambda_", "beta", "tau", "bridge_price", "diversity"):
             nats = getattr(self, name)
-            if not (np.isfinite(nats) and nats >= 0.0):
+            if not (math.isfinite(nats) and nats >= 0.0):
                 raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
         for number, (_, move) in enumerate(self.vias, start=1):
-            if move is not None and not (isinstance(move, int | np.integer) and 1 <= move < MOST_MOVES):
+            if move is not None and not (isinstance(move, Integral) and 1 <= move < MOST_MOVES):
                 raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
 
     def _check_combinations(self) -> None:
@@ -148,8 +139,7 @@ class TweenRequest:
         known = [field.name for field in fields(cls)]
         for name in options:
             if name not in known:
-                near = get_close_matches(name, known, n=1)
-                raise TypeError(f"a tween has no option {name!r}" + (f"; did you mean {near[0]}?" if near else ""))
+                raise TypeError(f"a tween has no option {name!r}{did_you_mean(name, known)}")
         return replace(request, **options) if request is not None else cls(**options)
 
     @property
@@ -186,6 +176,8 @@ class TweenRequest:
         """Return how many nodes the search may hold, for a body of so many joint chains."""
         if self.memory is None:
             return self.node_budget
+        from motionmind.search.astar import nodes_in  # numba is slow to import
+
         nodes = nodes_in(int(self.memory), chains)
         if nodes < 1:
             raise MotionMindError(f"memory of {self.memory} bytes holds not one node; give some megabytes")
@@ -212,7 +204,7 @@ class TweenRequest:
 
 
 def _check_count(name: str, value: object, most: int) -> None:
-    if not (isinstance(value, int | np.integer) and 1 <= value <= most):
+    if not (isinstance(value, Integral) and 1 <= value <= most):
         raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
 
 
