@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -80,13 +81,13 @@ def find_conflicts(chains: Sequence[str], model: Model, posed: Problem, asked: S
         posed: the problem that has no path.
         asked: the restrictions in it.
     """
-    ends, rules, vias = (posed.start, posed.goal), posed.rules, posed.vias
+    rules, vias = posed.rules, posed.vias
     names = [*(one.name for one in asked), *(_via(posed, i) for i in range(len(vias)))]
 
     def possible(kept: Sequence[int]) -> bool:
         constraints_of = [one for i, one in enumerate(asked) if i in kept]
         through = [via for i, via in enumerate(vias, start=len(asked)) if i in kept]
-        return feasible(restrict(model, constraints_of), *ends, rules, through)
+        return feasible(replace(posed, model=restrict(model, constraints_of), vias=through))
 
     if not possible([]):
         return ""
@@ -103,7 +104,7 @@ def find_conflicts(chains: Sequence[str], model: Model, posed: Problem, asked: S
             near = range(max(1, wanted - FARTHEST), wanted + FARTHEST)
             nearest = sorted(near, key=lambda move: abs(move - wanted))
             moved = ((move, [*vias[:i], Via(states, move), *vias[i + 1 :]]) for move in nearest)
-            helps = (move for move, others in moved if feasible(posed.model, *ends, rules, others))
+            helps = (move for move, others in moved if feasible(replace(posed, vias=others)))
             lines += [f"with via {i + 1} at move {move} there is one" for move in islice(helps, 1)]
 
     held = with_waits(posed.model, posed.goal, rules.wait)

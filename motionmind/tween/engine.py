@@ -15,7 +15,7 @@ from motionmind._typing import Floats, States
 from motionmind.body.human import human23
 from motionmind.body.motion import FASTEST, Motion, Posture
 from motionmind.corpus.corpus import FACING
-from motionmind.errors import MotionMindError, NoPathError, SkeletonError
+from motionmind.errors import InfeasibleError, MotionMindError, NoPathError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination, fit_network
 from motionmind.grammar.progression import fit_progression
@@ -183,7 +183,7 @@ class Engine(LearnedCorpus):
         else:
             certificate = self._answer(model, posed, searched, near, asked, strict, watch)
         if sample and len(certificate.path) > 1:
-            certificate = sample_path(searched.model, start, goal, searched.rules, posed.vias, certificate, seed)
+            certificate = sample_path(searched, certificate, seed)
         spent = break_down_cost(
             certificate.path, searched.model, goal, searched.rules, self.grammar, self.space, net, factor
         )
@@ -295,20 +295,20 @@ class Engine(LearnedCorpus):
         """
         start, goal, rules = posed.start, posed.goal, posed.rules
         if near is not None:
-            whole = solve_posturewise(model, self._bodies, start, goal, rules)
-            if whole is None:
-                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, rules))
-            return whole
-        certificate = solve(searched.model, start, goal, searched.rules, posed.vias, watch)
-        if certificate is None:
+            try:
+                return solve_posturewise(posed, self._bodies)
+            except InfeasibleError:
+                raise NoPathError(diagnose_posturewise(self.corpus, self._bodies, near, rules)) from None
+        try:
+            return solve(searched, watch)
+        except InfeasibleError:
             if faults := find_conflicts(self.grammar.chains, model, posed, asked):
-                raise NoPathError(faults, {"restrictions": faults})
+                raise NoPathError(faults, {"restrictions": faults}) from None
             # Imported here, for SciPy's graphs are slow to import.
             from motionmind.tween.diagnosis import diagnose
 
             found = diagnose(model, self.grammar, self.corpus, self.space, start, goal, rules, strict)
-            raise NoPathError(str(found), found.plain())
-        return certificate
+            raise NoPathError(str(found), found.plain()) from None
 
     def _vias(self, via: Sequence[Posture | tuple[Posture, int]]) -> tuple[list[Posture], list[int | None]]:
         """The postures to pass through, and the move at which each is, or None."""

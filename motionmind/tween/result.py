@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from motionmind._typing import Floats, Int32s
@@ -134,7 +134,7 @@ class Tween:
         """
         posed = self.posed
         vias = [Via(via.states, move) for via, move in zip(posed.vias, self.passed, strict=True)]
-        return cfn(posed.model, posed.start, posed.goal, posed.rules, self.moves, self.joints, vias)
+        return cfn(replace(posed, vias=vias), self.moves, self.joints)
 
 
 def gap_of(cost: float, lower_bound: float) -> float:
