@@ -1,35 +1,60 @@
 """The public names, each listed once."""
 
-from .body.human import human23 as human23, human44 as human44
-from .body.motion import Insertion as Insertion, Motion as Motion, Posture as Posture
+from .body.human import human23 as human23
+from .body.human import human44 as human44
+from .body.motion import Insertion as Insertion
+from .body.motion import Motion as Motion
+from .body.motion import Posture as Posture
 from .body.skeleton import Skeleton as Skeleton
-from .chaos.flows import Flow as Flow, flow_of as flow_of
+from .chaos.flows import Flow as Flow
+from .chaos.flows import flow_of as flow_of
 from .discretize import make_discretization as make_discretization
 from .errors import (
     CorpusError as CorpusError,
+)
+from .errors import (
     FormatError as FormatError,
+)
+from .errors import (
     MotionMindError as MotionMindError,
+)
+from .errors import (
     MotionMindWarning as MotionMindWarning,
+)
+from .errors import (
     NoPathError as NoPathError,
+)
+from .errors import (
     SkeletonError as SkeletonError,
 )
 from .formats import (
     read_motion as read_motion,
+)
+from .formats import (
     read_posture as read_posture,
+)
+from .formats import (
     write_motion as write_motion,
+)
+from .formats import (
     write_posture as write_posture,
 )
 from .notation.compose import compose as compose
 from .render.pictures import write_picture as write_picture
 from .render.sheet import contact_sheet as contact_sheet
-from .retarget.retarget import own_skeleton as own_skeleton, to_human23 as to_human23
-from .tween.certificate import Bridge as Bridge, Source as Source, Wait as Wait
+from .retarget.retarget import own_skeleton as own_skeleton
+from .retarget.retarget import to_human23 as to_human23
+from .tween.certificate import Bridge as Bridge
+from .tween.certificate import Source as Source
+from .tween.certificate import Wait as Wait
 from .tween.engine import Engine as Engine
 from .tween.result import Tween as Tween
 from .variation.piece import Piece as Piece
 from .variation.review import Seam as Seam
-from .variation.variation import Variation as Variation, vary as vary
-from .variation.variation_json import read_variation as read_variation, write_variation as write_variation
+from .variation.variation import Variation as Variation
+from .variation.variation import vary as vary
+from .variation.variation_json import read_variation as read_variation
+from .variation.variation_json import write_variation as write_variation
 
 __version__: str
 

@@ -41,6 +41,10 @@ class NoPathError(MotionMindError):
         self.diagnosis = diagnosis
 
 
+class InfeasibleError(MotionMindError):
+    """No path satisfies the problem that the search was given."""
+
+
 class MotionMindWarning(UserWarning):
     """Something was mended while reading (a quaternion normalised, a header count corrected): says what, where."""
 

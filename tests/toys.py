@@ -7,13 +7,17 @@ products that the model's definition prints, not from the search's trellis.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.errors import InfeasibleError
+from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go
+from motionmind.search.solve import Certificate, Watch, solve
 from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.search.trws import Messages, no_messages
 
@@ -92,6 +96,10 @@ class Toy:
 
     def rules(self, shortest: int, longest: int, node_budget: int = 100_000, sweeps: int = 60) -> Rules:
         return Rules(self.wait, self.per_move, shortest, longest, node_budget, sweeps)
+
+    def problem(self, rules: Rules, vias: Sequence[Via] = (), **changes: Any) -> Problem:
+        """The problem from start to goal; `changes` are made to the model, such as in what is allowed."""
+        return Problem(self.model()._replace(**changes), *self.ends(), rules, vias)
 
     def cost(self, path: Int32s) -> float:
         """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule."""
@@ -220,9 +228,17 @@ def noisy_messages(trellis: Trellis, seed: int, noise: float) -> Messages:
 
 def trellis_of(toy: Toy, moves: int, below: float = np.inf) -> Trellis:
     """The trellis of exactly `moves` moves."""
-    start, goal = toy.ends()
-    held = with_waits(toy.model(), goal, toy.wait)
-    return build_trellis(held, start, moves, costs_to_go(held, goal, moves), below)
+    problem = toy.problem(toy.rules(moves, moves))
+    model = problem.model_with_waits()
+    return build_trellis(model, problem.start, moves, costs_to_go(model, problem.goal, moves), below)
+
+
+def solution(problem: Problem, watch: Watch | None = None) -> Certificate | None:
+    """The certificate of a problem; None where it is infeasible."""
+    try:
+        return solve(problem, watch)
+    except InfeasibleError:
+        return None
 
 
 def _pointer(rows: list[Ints]) -> Ints:

@@ -1,4 +1,4 @@
-"""What the search proves, how fast, and what each bound is reachable, on random pairs of postures of one corpus.
+"""What the search proves, how fast, and what each bound is worth, on random pairs of postures of one corpus.
 
 python experiments/search/bench.py PATH/TO/cmu-05 --pairs 100 --setting 10,5 [--seed 0] [--few 8] [--plot gap.svg]
 
@@ -20,10 +20,10 @@ import pytoulbar2
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.progression import fit_progression
-from motionmind.search import astar, pair_chains, solve
-from motionmind.search import trws as bound
+from motionmind.search import astar, pair_chains, solve, trws
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.pair_chain_tables import PairChains
+from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.tween.problem import build_model
@@ -95,12 +95,12 @@ def warm_up(model: Model, states: Int32s) -> None:
         assert answer is not None
         moves = len(answer.path) - 1
         trellis = pose(model, (start, goal), moves)
-        cut, path = pair_chains.cut(trellis, bound.no_messages(trellis)), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
+        tables, path = pair_chains.build(trellis, trws.no_messages(trellis)), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
         through = np.zeros(len(trellis.dom))
-        pair_chains.sweep(trellis, cut, through)
-        pair_chains.descend(trellis, cut, path)
-        pair_chains.prune(trellis, cut, through, np.inf)
-        astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 100, 100, ON)
+        pair_chains.sweep(trellis, tables, through)
+        pair_chains.descend(trellis, tables, path)
+        pair_chains.prune(trellis, tables, through, np.inf)
+        astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 100, 100, ON)
 
 
 # --- all pairs -------------------------------------------------------------------------------------------------------
@@ -135,9 +135,8 @@ def prove_each(problems: Iterator[tuple[Model, Rules, Ends]]) -> list[Certificat
     found, seconds = [], []
     for model, rules, (start, goal) in problems:
         began = perf_counter()
-        answer = solve.solve(model, start, goal, rules)
+        answer = solve.solve(Problem(model, start, goal, rules))
         seconds.append(perf_counter() - began)
-        assert answer is not None
         found.append(answer)
     gaps = [gap(answer) for answer in found if answer.status != "optimal"]
     rest = f"; gap of the rest: median {np.median(gaps):.2%}, worst {max(gaps):.2%}" if gaps else ""
@@ -171,7 +170,7 @@ def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
         cost = answer.cost - RULES.per_move * trellis.moves
         for name, estimate in estimates(trellis):
             path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
-            root = pair_chains.proven(estimate)
+            root = pair_chains.lower_bound(estimate)
             best, lower, expanded, _ = astar.search(trellis, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS, ON)
             rows.setdefault(name, []).append((max(1.0 - root / cost, 0.0), expanded, lower > best - solve.PROVEN))
     print(f"A* alone, {len(few)} pairs:                   short of the best   expansions, median and most     proven")
@@ -180,7 +179,7 @@ def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
         print(f"{name:45}{np.median(short):14.2%}{np.median(expanded):19.0f}{max(expanded):12}{sum(proved):13}")
 
 
-def estimates(trellis: Trellis) -> Iterator[tuple[str, pair_chains.PairChains]]:
+def estimates(trellis: Trellis) -> Iterator[tuple[str, PairChains]]:
     """Bounds of the cost to go, each as tables of pair chains that A* reads."""
     back = np.zeros(trellis.up_ptr[-1])  # the most that a position can save in the coupling to a kid
     for u in range(len(back)):
@@ -190,12 +189,12 @@ def estimates(trellis: Trellis) -> Iterator[tuple[str, pair_chains.PairChains]]:
         "each joint alone, in the moves that are left",
         tables(trellis, alone(trellis, back, ends_at_goal=False), back),
     )
-    messages = bound.no_messages(trellis)
-    bound.tighten(trellis, messages, np.zeros(len(trellis.dom_ptr) - 1, np.int64), 160, np.inf)
+    messages = trws.no_messages(trellis)
+    trws.tighten(trellis, messages, np.zeros(len(trellis.dom_ptr) - 1, np.int64), 160, np.inf)
     yield "messages", tables(trellis, messages.up_row, messages.up_col, messages.constants)
-    cut, through = pair_chains.cut(trellis, messages), np.zeros(len(trellis.dom))
+    tables, through = pair_chains.build(trellis, messages), np.zeros(len(trellis.dom))
     for _ in range(10):
-        pair_chains.sweep(trellis, cut, through)
+        pair_chains.sweep(trellis, tables, through)
     yield "pair_chains, 10 sweeps", cut
 
 
@@ -226,20 +225,20 @@ def alone(trellis: Trellis, back: Floats, ends_at_goal: bool) -> Floats:
     return rest
 
 
-def tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> pair_chains.PairChains:
+def tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> PairChains:
     """The estimate `rest` by position [P] plus `back` by coupling row where only the parent has moved, in A*'s form.
 
     `constants` [n] is what it counts besides for each variable to come.
     """
     taken = np.zeros(len(trellis.dom_ptr) - 1) if constants is None else constants
     stand = trellis.unary - np.repeat(taken, np.diff(trellis.dom_ptr))
-    s = pair_chains.cut(trellis, bound.no_messages(trellis))
-    s.own[:], s.led[:] = trellis.row_cost, 0.0
+    s = pair_chains.build(trellis, trws.no_messages(trellis))
+    s.edge_share[:], s.partner_share[:] = trellis.row_cost, 0.0
     for i in range(len(taken)):
         chain = i % trellis.chains
         if chain == 0:
             continue
-        a = i - chain + s.above[chain]
+        a = i - chain + s.partner[chain]
         here, above = (slice(trellis.dom_ptr[k], trellis.dom_ptr[k + 1]) for k in (i, a))
         paid = np.zeros((above.stop - above.start, here.stop - here.start)) + stand[here]
         to_go = np.zeros(paid.shape) + rest[here]
@@ -250,16 +249,16 @@ def tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | Non
             pending[k] = back[u]
         if chain == 1:  # whose pair chain bears all that the first chain costs
             edges = slice(trellis.row_ptr[above.start], trellis.row_ptr[above.stop])
-            s.led[s.led_ptr[i] : s.led_ptr[i + 1]] = trellis.row_cost[edges]
+            s.partner_share[s.partner_ptr[i] : s.partner_ptr[i + 1]] = trellis.row_cost[edges]
             paid += stand[above, None]
             to_go += rest[above, None]
             pending += stand[above] + rest[above]
-        s.stand[s.pair_ptr[i] : s.pair_ptr[i + 1]] = paid.ravel()
+        s.pair_cost[s.pair_ptr[i] : s.pair_ptr[i + 1]] = paid.ravel()
         s.to_go[s.pair_ptr[i] : s.pair_ptr[i + 1]] = to_go.ravel()
         if i >= trellis.chains:
             before = slice(trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1])
             s.half[s.half_ptr[i] : s.half_ptr[i + 1]] = (pending[:, None] + rest[before]).ravel()
-    s.stand[s.pair_ptr[1]] += taken.sum()  # which f begins with
+    s.pair_cost[s.pair_ptr[1]] += taken.sum()  # which f begins with
     return s
 
 
@@ -294,9 +293,8 @@ def spend(
     rules = Rules(RULES.wait, RULES.per_move, RULES.shortest, RULES.longest, node_budget, sweeps)
     for start, goal in few:
         began = perf_counter()
-        answer = solve.solve(model, start, goal, rules)
+        answer = solve.solve(Problem(model, start, goal, rules))
         seconds.append(perf_counter() - began)
-        assert answer is not None
         gaps.append(gap(answer))
     solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS = most
     return seconds, gaps
@@ -345,10 +343,10 @@ def compare_solvers(model: Model, few: list[tuple[Ends, Certificate]], chains: t
         moves = moves_of(answer)
         rules = Rules(RULES.wait, RULES.per_move, moves, moves, RULES.node_budget)
         began = perf_counter()
-        again = solve.solve(model, start, goal, rules)
+        problem = Problem(model, start, goal, rules)
+        again = solve.solve(problem)
         ours.append(perf_counter() - began)
-        assert again is not None
-        seconds, optimum, short = toulbar2(cfn(model, start, goal, rules, moves, chains))
+        seconds, optimum, short = toulbar2(cfn(problem, moves, chains))
         theirs.append(seconds)
         if optimum is None:
             left.append(short)

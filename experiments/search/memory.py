@@ -17,8 +17,7 @@ from time import process_time
 import numpy as np
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
-from motionmind.search import astar, pair_chains
-from motionmind.search import trws as bound
+from motionmind.search import astar, pair_chains, trws
 from motionmind.search.problem import costs_to_go, with_waits
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.problem import build_model
@@ -35,11 +34,11 @@ def grown(folder: Path, budget: int) -> tuple[int, int, int]:
     start, goal = engine.states[[100, 900]].astype(np.int64)
     held = with_waits(model, goal, 1.0)
     trellis = build_trellis(held, start, MOVES, costs_to_go(held, goal, MOVES), np.inf)
-    cut = pair_chains.cut(trellis, bound.no_messages(trellis))  # shares as they come, with nothing evened out
+    tables = pair_chains.build(trellis, trws.no_messages(trellis))  # shares as they come, with nothing evened out
 
     def search(nodes: int) -> int:
         path, on = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, nodes, nodes // 2, on)[3]
+        return astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, nodes, nodes // 2, on)[3]
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -23,7 +23,7 @@ from bench import RULES, Ends, joinable, moves_of, toulbar2
 from motionmind import Engine, Motion, Skeleton, make_discretization, own_skeleton, read_motion
 from motionmind.search import solve
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.tween.problem import build_model
 
 JOINTS = ("pelvis", "left_hip", "left_knee", "left_ankle")  # beside them the facing is a chain
@@ -130,19 +130,17 @@ class Compared(NamedTuple):
 def compare(model: Model, pairs: list[Ends], limit: int, chains: tuple[str, ...]) -> Iterator[Compared]:
     """Each pair's problem in the number of moves that is best."""
     for ends in pairs:
-        answer = solve.solve(model, *ends, RULES)
-        assert answer is not None
-        moves = moves_of(answer)
+        moves = moves_of(solve.solve(Problem(model, *ends, RULES)))
         rules = Rules(RULES.wait, RULES.per_move, moves, moves, RULES.node_budget)
+        problem = Problem(model, *ends, rules)
         began = perf_counter()
-        ours = solve.solve(model, *ends, rules)
+        ours = solve.solve(problem)
         seconds = perf_counter() - began
-        assert ours is not None
         assert ours.status == "optimal"
         began = perf_counter()
         cost, expanded, made = best(model, ends, moves, limit)
         theirs = perf_counter() - began
-        outside = toulbar2(cfn(model, *ends, rules, moves, chains))[1]
+        outside = toulbar2(cfn(problem, moves, chains))[1]
         by_networkx = None if cost is None else abs(cost + RULES.per_move * moves - ours.cost) < SAME
         by_toulbar2 = None if outside is None else abs(outside - ours.cost) < WRITTEN
         yield Compared(seconds, theirs, expanded, made, by_networkx, by_toulbar2)

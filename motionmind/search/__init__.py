@@ -1,1 +1,4 @@
-"""The search for the best sequence of states, and the proof of how good it is."""
+"""The search for the cheapest path through a problem of coupled chains, and the proof of how good it is.
+
+It knows no bodies and no grammar.
+"""

@@ -1,11 +1,11 @@
 """Memory-bounded A* over the variables of a trellis, one at a time (operator decomposition).
 
-A node fixes the variables up to one; its *frontier* is the last position chosen in each chain, which is all that the
-rest depends on, so nodes with the same variable and frontier are the same node. f grows by `pair_chains.step`.
+A node fixes the variables up to one; its *frontier* is the last position chosen in each chain. The rest depends on
+nothing else, so nodes with the same variable and frontier are the same node. f grows by `pair_chains.step`.
 
-When the budget of nodes is full the worst leaves are forgotten, and the least f among a node's forgotten children is
-backed up into it; it is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
-forgotten at a time, which keeps the cost of forgetting that of a few operations on the open list for each node.
+When the node budget is full the worst leaves are forgotten, and the least f among a node's forgotten children is backed
+up into it; the node is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
+forgotten at a time, which keeps the cost of forgetting to a few operations on the open list for each node.
 
 Sources: Standley, "Finding optimal solutions to cooperative pathfinding problems", AAAI 2010 (the decomposition);
 Russell, "Efficient memory-bounded search methods", ECAI 1992 (SMA*); Lovinger and Zhang, "Enhanced simplified
@@ -21,23 +21,24 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.pair_chains import PairChains, step
+from motionmind.search.pair_chain_tables import PairChains
+from motionmind.search.pair_chains import step
 from motionmind.search.trellis import Trellis
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
-KEPT = 0.75  # of the memory, when it is full and the rest is forgotten; more costs time, and less what is made again
+KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
 
-_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # what is tallied
+_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # entries of the tally
 
 
 class _Nodes(NamedTuple):
-    """Up to N nodes and what finds them. `tally` holds the counters above."""
+    """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above."""
 
     var: Int32s  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each chain, as an index into its domain [N, L]
     f: Floats  # cost so far + bound on the cost to go [N]
-    key: Floats  # what orders the open list: f, or the greater f backed up from forgotten children [N]
+    key: Floats  # order of the open list: f, or the greater f backed up from forgotten children [N]
     parent: Int32s  # [N]
     children: Int32s  # number of children in memory [N]
     slot: Int32s  # place in the heap, -1 where closed [N]
@@ -51,7 +52,7 @@ class _Nodes(NamedTuple):
 @jit
 def search(
     trellis: Trellis,
-    s: PairChains,
+    tables: PairChains,
     bound: float,
     cost: float,
     path: Ints,
@@ -59,11 +60,21 @@ def search(
     expansions: int,
     ended: Bools,
 ) -> tuple[float, float, int, int]:
-    """Search for a path that costs less than `cost`; write the best to `path` [n] (positions).
+    """Search for a path that costs less than `cost`.
 
-    Returns its cost (or `cost`), a lower bound on the cost of every path, the number of expansions (at most
-    `expansions`) and the greatest number of nodes held (at most `budget`). `bound` is what `s` proves from the start.
-    It stops when `ended` [1] is set, from another thread.
+    Args:
+        trellis: the problem.
+        tables: its pair chains.
+        bound: their lower bound from the start, nats.
+        cost: cost of a path already known, nats.
+        path: receives the best path of positions, if one is found [n].
+        budget: nodes held at most.
+        expansions: nodes expanded at most.
+        ended: set from another thread to stop the search [1].
+
+    Returns:
+        The cost of the best path found, or `cost`; a lower bound on the cost of every path; the number of expansions;
+        and the greatest number of nodes held.
     """
     nodes = _root(trellis, bound, budget)
     lower = cost
@@ -76,7 +87,7 @@ def search(
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(trellis, s, nodes, node, cost, path)
+        cost, complete = _expand(trellis, tables, nodes, node, cost, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -85,8 +96,13 @@ def search(
 
 
 @jit
-def _expand(trellis: Trellis, s: PairChains, nodes: _Nodes, node: int, cost: float, path: Ints) -> tuple[float, bool]:
-    """Generate the children of a node that may lead below `cost`; the cost then known, and whether all found room."""
+def _expand(
+    trellis: Trellis, tables: PairChains, nodes: _Nodes, node: int, cost: float, path: Ints
+) -> tuple[float, bool]:
+    """Generate the children of a node that may lead below `cost`.
+
+    Returns the cost then known, and whether there was room for all.
+    """
     chains = trellis.chains
     i = nodes.var[node] + 1
     chain = i % chains
@@ -94,7 +110,7 @@ def _expand(trellis: Trellis, s: PairChains, nodes: _Nodes, node: int, cost: flo
     floor = nodes.key[node]  # forgetting may back a greater key up into the node before its last child has come
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
-        f = nodes.f[node] + step(trellis, s, i, nodes.frontier[node], e)
+        f = nodes.f[node] + step(trellis, tables, i, nodes.frontier[node], e)
         key = max(f, floor)
         if key >= cost - SAME:
             continue
@@ -106,14 +122,14 @@ def _expand(trellis: Trellis, s: PairChains, nodes: _Nodes, node: int, cost: flo
             continue
         twin = _find(nodes, node, i, choice, chain)
         if twin >= 0:
-            # Not by the last bit: of two prefixes that cost the same each could come to stand in for the other's child.
+            # Not by the last bit: of two prefixes that cost the same, each could come to replace the other's child.
             if nodes.f[twin] <= f + SAME:
                 continue
             if nodes.slot[twin] >= 0 and nodes.children[twin] == 0:
-                other = nodes.parent[twin]
-                _forsake(nodes, twin)
-                if other != node:
-                    _release(nodes, other)
+                parent = nodes.parent[twin]
+                _discard(nodes, twin)
+                if parent != node:
+                    _release(nodes, parent)
         if nodes.tally[_FREE] == 0 and not _forget(nodes, node):
             nodes.key[node] = floor
             return cost, False
@@ -123,7 +139,7 @@ def _expand(trellis: Trellis, s: PairChains, nodes: _Nodes, node: int, cost: flo
 
 @jit
 def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
-    """Room for `budget` nodes, and the one that fixes every chain at its start, open."""
+    """Allocate `budget` nodes, and open the one that fixes every chain at its start."""
     buckets = 1
     while buckets < budget:
         buckets *= 2
@@ -149,17 +165,17 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
 
 
 def nodes_in(memory: int, chains: int) -> int:
-    """How many nodes `memory` bytes hold at least, with what finds them and what forgetting takes for a while.
+    """Return how many nodes fit into `memory` bytes, everything counted that the search allocates for a node.
 
-    A node has 44 bytes and 2 a chain, less than 8 in the buckets, whose number is a power of two, and 1 that says
-    whether it is kept while others are forgotten.
+    A node takes 44 bytes and 2 a chain, less than 8 in the buckets, whose number is a power of two, and 1 that marks it
+    as kept while others are forgotten.
     """
     return memory // (44 + 2 * chains + 8 + 1)
 
 
 @jit
 def _trace(trellis: Trellis, nodes: _Nodes, node: int, path: Ints) -> None:
-    """Write the positions that a node and its ancestors chose, the start that the root stands for among them."""
+    """Write to `path` the positions that a node and its ancestors chose, and the start."""
     path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
     while node > 0:
         i = nodes.var[node]
@@ -169,21 +185,22 @@ def _trace(trellis: Trellis, nodes: _Nodes, node: int, path: Ints) -> None:
 
 @jit
 def _forget(nodes: _Nodes, current: int) -> bool:
-    """Forget all but the best open nodes and the ways to them, as many as fit into KEPT; whether there was anything.
+    """Forget all but the best open nodes and their ancestors, as many as fit into KEPT.
 
-    Leaves go first, and their keys are backed up. `current`, which is being expanded, is kept, and the way to it.
+    Leaves go first, and their keys are backed up. `current`, which is being expanded, is kept with its ancestors.
+    Returns whether there was anything to forget.
     """
     kept = np.zeros(len(nodes.var), np.bool_)
-    size, many = nodes.tally[_HEAPED], _mark(nodes, kept, current)
+    size, marked = nodes.tally[_HEAPED], _mark(nodes, kept, current)
     while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
-        if many + _unmarked(nodes, kept, node) > KEPT * len(kept):
+        if marked + _unmarked(nodes, kept, node) > KEPT * len(kept):
             break
         _close(nodes, node)
         last = nodes.tally[_HEAPED]
-        nodes.heap[last], nodes.slot[node] = node, last  # behind the heap, where there is room now
-        many += _mark(nodes, kept, node)
-    others = bool(nodes.tally[_NODES] > many)
+        nodes.heap[last], nodes.slot[node] = node, last  # after the end of the heap, where there is room now
+        marked += _mark(nodes, kept, node)
+    others = bool(nodes.tally[_NODES] > marked)
     nodes.tally[_HEAPED] = 0
     for k in range(size):
         node = nodes.heap[k]
@@ -208,7 +225,7 @@ def _forget(nodes: _Nodes, current: int) -> bool:
 
 @jit
 def _unmarked(nodes: _Nodes, kept: Bools, node: int) -> int:
-    """How many of a node and its ancestors are not marked."""
+    """Count those of a node and its ancestors that are not marked."""
     count = 0
     while node >= 0 and not kept[node]:
         count += 1
@@ -218,7 +235,7 @@ def _unmarked(nodes: _Nodes, kept: Bools, node: int) -> int:
 
 @jit
 def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
-    """Mark a node and its ancestors as kept; how many were not yet."""
+    """Mark a node and its ancestors as kept, and return how many were not yet."""
     count = 0
     while node >= 0 and not kept[node]:
         kept[node] = True
@@ -229,7 +246,7 @@ def _mark(nodes: _Nodes, kept: Bools, node: int) -> int:
 
 @jit
 def _release(nodes: _Nodes, node: int) -> None:
-    """Free a closed node without children, for nothing below the known cost lies behind it; and so its ancestors."""
+    """Free a closed node without children, since nothing below the known cost lies behind it; then its ancestors."""
     while node > 0 and nodes.slot[node] < 0 and nodes.children[node] == 0:
         parent = nodes.parent[node]
         _drop(nodes, node)
@@ -237,18 +254,18 @@ def _release(nodes: _Nodes, node: int) -> None:
 
 
 @jit
-def _forsake(nodes: _Nodes, leaf: int) -> None:
+def _discard(nodes: _Nodes, leaf: int) -> None:
     """Free an open leaf."""
     _close(nodes, leaf)
     _drop(nodes, leaf)
 
 
-# --- nodes and the table that finds them -----------------------------------------------------------------------------
+# --- nodes and their hash table ---------------------------------------------------------------------------------------
 
 
 @jit
 def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
-    """Bucket of the frontier of `node` with `choice` in `chain`: FNV-1a over its entries."""
+    """Return the bucket of the frontier of `node` with `choice` in `chain`: FNV-1a over its entries."""
     h = np.uint64(14695981039346656037) ^ np.uint64(var)
     for k in range(nodes.frontier.shape[1]):
         h = (h ^ np.uint64(choice if k == chain else nodes.frontier[node, k])) * np.uint64(1099511628211)
@@ -258,7 +275,7 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 
 @jit
 def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
-    """The node in memory that fixes `var` with the frontier of `node` and `choice` in `chain`; -1 if none does."""
+    """Return the node that fixes `var` with the frontier of `node` and `choice` in `chain`; -1 if none does."""
     twin = nodes.bucket[_hash(nodes, node, var, choice, chain)]
     while twin >= 0:
         same = nodes.var[twin] == var and nodes.frontier[twin, chain] == choice
@@ -274,7 +291,7 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 
 @jit
 def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, key: float) -> None:
-    """A new open child of `node`."""
+    """Add an open child of `node`."""
     nodes.tally[_FREE] -= 1
     child = nodes.free[nodes.tally[_FREE]]
     nodes.tally[_NODES] += 1
@@ -292,7 +309,7 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, 
 
 @jit
 def _drop(nodes: _Nodes, node: int) -> None:
-    """Take a closed node without children out of memory."""
+    """Remove a closed node without children from memory."""
     chain = nodes.var[node] % nodes.frontier.shape[1]
     home = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
     if nodes.bucket[home] == node:
@@ -308,12 +325,12 @@ def _drop(nodes: _Nodes, node: int) -> None:
     nodes.tally[_NODES] -= 1
 
 
-# --- the open list: a binary heap that knows where each node stands ---------------------------------------------------
+# --- the open list: a binary heap that knows the slot of each node ----------------------------------------------------
 
 
 @jit
 def _before(nodes: _Nodes, a: int, b: int) -> bool:
-    """Lower key first; of equal keys the deeper node, then the one of lower number, so that ties fall the same way."""
+    """Order nodes by key, the deeper first among equals, then the one of lower number: ties are deterministic."""
     if nodes.key[a] != nodes.key[b]:
         return bool(nodes.key[a] < nodes.key[b])
     if nodes.var[a] != nodes.var[b]:
@@ -323,6 +340,7 @@ def _before(nodes: _Nodes, a: int, b: int) -> bool:
 
 @jit
 def _open(nodes: _Nodes, node: int) -> None:
+    """Put a node on the open list."""
     k = nodes.tally[_HEAPED]
     nodes.tally[_HEAPED] += 1
     nodes.heap[k], nodes.slot[node] = node, k
@@ -331,6 +349,7 @@ def _open(nodes: _Nodes, node: int) -> None:
 
 @jit
 def _close(nodes: _Nodes, node: int) -> None:
+    """Take a node off the open list."""
     nodes.tally[_HEAPED] -= 1
     k, last = nodes.slot[node], nodes.heap[nodes.tally[_HEAPED]]
     nodes.slot[node] = -1
@@ -342,6 +361,7 @@ def _close(nodes: _Nodes, node: int) -> None:
 
 @jit
 def _rise(nodes: _Nodes, k: int) -> None:
+    """Move the node in slot k up to its place."""
     node = nodes.heap[k]
     while k > 0 and _before(nodes, node, nodes.heap[(k - 1) // 2]):
         nodes.heap[k] = nodes.heap[(k - 1) // 2]
@@ -352,6 +372,7 @@ def _rise(nodes: _Nodes, k: int) -> None:
 
 @jit
 def _sink(nodes: _Nodes, k: int) -> None:
+    """Move the node in slot k down to its place."""
     node, size = nodes.heap[k], nodes.tally[_HEAPED]
     while 2 * k + 1 < size:
         child = 2 * k + 1

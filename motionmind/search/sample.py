@@ -1,11 +1,10 @@
-"""A path drawn at random, with probability in proportion to exp(-cost), among those of a fixed number of moves.
+"""Sample a path with probability proportional to exp(-cost), among those with a given number of moves.
 
-By Gibbs sampling in blocks that are drawn exactly: each chain given the others is a chain in time, and each moment
-    given
-those before and after it a tree. A chain alone could reach each of its paths, whatever the others do, for no coupling
-is infinite; so the rounds converge to the distribution from any path that is possible. A number of rounds comes close
-to it and no more; where nothing couples the chains one round draws from it exactly. On real ballet, from 5 Hz and 15
-degrees to 10 Hz and 5 degrees, costs of paths 10 rounds apart are uncorrelated (0.04 and less).
+Blocked Gibbs sampling: each chain given the other chains is a chain in time, each moment given those before and after
+it a tree, and both are sampled exactly. No coupling is infinite, so a chain alone can reach each of its paths whatever
+the others do, and the rounds converge to the distribution from any possible path. A finite number of rounds only comes
+close; where nothing couples the chains, one round samples exactly. On real ballet, from 5 Hz and 15 degrees to 10 Hz
+and 5 degrees, costs of paths 10 rounds apart are uncorrelated (0.04 and less).
 
 Sources: Carter and Kohn, "On Gibbs sampling for state space models", Biometrika 81(3), 1994 (forward filtering,
 backward sampling; here in the other direction of time); Jensen, Kjaerulff and Kong, "Blocking Gibbs sampling in very
@@ -14,7 +13,6 @@ large probabilistic expert systems", IJHCS 42(6), 1995 (blocks that are trees).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -22,32 +20,29 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.polish import coupling, edge_cost, path_cost
-from motionmind.search.problem import Model, Rules, Via
+from motionmind.search.costs import add_couplings, path_cost, set_moment_costs
+from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, segment_trellises
-from motionmind.search.trws import correction
 
-ROUNDS = 100  # each draws every chain and every moment once
+ROUNDS = 100  # each samples every chain and every moment once
 
 
-def sample_path(
-    model: Model, start: Ints, goal: Ints, rules: Rules, vias: Sequence[Via], best: Certificate, seed: int
-) -> Certificate:
-    """A path drawn at random in place of the best one, with as many moves, past the vias at the same moves.
+def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certificate:
+    """Sample a path in place of the best one.
 
-    Its cost is its own; what the certificate proves of all paths stays.
+    Args:
+        problem: the problem that was solved.
+        certificate: its solution; the sampled path has as many moves, and passes the vias at the same moves.
+        seed: seeds the random numbers.
+
+    Returns:
+        The certificate with the sampled path, its cost and the status "sampled"; what it proves of all paths stays.
     """
     rng, cost = np.random.default_rng(seed), 0.0
-    stops = [
-        (0, start),
-        *((move, via.states) for move, via in zip(best.passed, vias, strict=True)),
-        (len(best.path) - 1, goal),
-    ]
-    path = best.path.copy()
-    for trellis, (first, _), (last, _) in zip(
-        segment_trellises(model, goal, rules.wait, stops), stops, stops[1:], strict=False
-    ):
+    path = certificate.path.copy()
+    moves = [0, *certificate.passed, len(path) - 1]
+    for trellis, (first, last) in zip(segment_trellises(problem, moves), pairwise(moves), strict=True):
         segment, chosen = path[first + 1 : last + 1], trellis.dom_ptr[:-1].copy()
         domains = [trellis.dom[slice(*span)] for span in pairwise(trellis.dom_ptr[trellis.chains :])]
         chosen[trellis.chains :] += [
@@ -55,12 +50,12 @@ def sample_path(
         ]
         cost += float(gibbs_sample(trellis, chosen, ROUNDS, rng))
         segment[:] = trellis.dom[chosen[trellis.chains :]].reshape(segment.shape)
-    return replace(best, path=path, cost=cost + rules.per_move * (len(path) - 1), status="sampled")
+    return replace(certificate, path=path, cost=cost + problem.rules.per_move * (len(path) - 1), status="sampled")
 
 
 @jit
 def gibbs_sample(trellis: Trellis, path: Ints, rounds: int, rng: np.random.Generator) -> float:
-    """Draw a path [n] (positions) in place, starting from the one there, in so many rounds; its cost."""
+    """Resample a path [n] of positions in place, `rounds` times, and return its cost in nats."""
     for _ in range(rounds):
         for t in range(1, trellis.moves + 1):
             _sample_moment(trellis, path, t, rng)
@@ -71,53 +66,39 @@ def gibbs_sample(trellis: Trellis, path: Ints, rounds: int, rng: np.random.Gener
 
 @jit
 def _sample_chain(trellis: Trellis, path: Ints, chain: int, rng: np.random.Generator) -> None:
-    """value[p]: -log of the sum, over a chain's ways on from position p, of exp(-cost), the other chains as they
-    are."""
+    """Resample a chain given the others.
+
+    value[p] is -log of the sum of exp(-cost) over the chain's walks on from position p.
+    """
     chains = trellis.chains
     value = np.empty(trellis.dom_ptr[trellis.moves * chains + chain + 1])
     for t in range(trellis.moves, 0, -1):
         i = t * chains + chain
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            value[p] = trellis.unary[p] + coupling(trellis, path, i, p)
-            for child in range(chain + 1, chains):
-                below = i - chain + child
-                if trellis.parents[child] == chain:
-                    value[p] += correction(trellis, trellis.up_ptr[below] + p - trellis.dom_ptr[i], path[below])
+            value[p] = add_couplings(trellis, path, i, p, trellis.unary[p])
             if t < trellis.moves:
                 edges = slice(trellis.row_ptr[p], trellis.row_ptr[p + 1])
-                value[p] += _soft_least(trellis.row_cost[edges] + value[trellis.row_to[edges]])
+                value[p] += _soft_min(trellis.row_cost[edges] + value[trellis.row_to[edges]])
     for i in range(chain + chains, len(path), chains):
         edges = slice(trellis.row_ptr[path[i - chains]], trellis.row_ptr[path[i - chains] + 1])
-        sample_path = _draw(trellis.row_cost[edges] + value[trellis.row_to[edges]], rng)
-        path[i] = trellis.row_to[edges][sample_path]
+        path[i] = trellis.row_to[edges][_sample_index(trellis.row_cost[edges] + value[trellis.row_to[edges]], rng)]
 
 
 @jit
 def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generator) -> None:
-    """value[p]: -log of the sum, over what the chains below in the tree may do at move t, of exp(-cost)."""
+    """Resample all positions at move t given the other moves.
+
+    value[p] is -log of the sum of exp(-cost) over what the chains below p's in the tree may do at the move.
+    """
     chains = trellis.chains
     first = trellis.dom_ptr[t * chains]
     value = np.full(trellis.dom_ptr[(t + 1) * chains] - first, np.inf)
     for chain in range(chains - 1, -1, -1):
         i = t * chains + chain
-        before = path[i - chains]
-        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
-            p = trellis.row_to[e]
-            value[p - first] = trellis.row_cost[e] + trellis.unary[p]
-            if t < trellis.moves:
-                value[p - first] += edge_cost(trellis, p, path[i + chains])
+        set_moment_costs(trellis, path, i, value)
         for child in range(chain + 1, chains):
             if trellis.parents[child] == chain:
-                below = i - chain + child
-                own = value[trellis.dom_ptr[below] - first : trellis.dom_ptr[below + 1] - first]
-                alike = _soft_least(own)
-                for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-                    if value[p - first] < np.inf:
-                        u = trellis.up_ptr[below] + p - trellis.dom_ptr[i]
-                        pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
-                        # The sum of all alike, 1, and what the listed pairs change in it: exp(-(v + d)) - exp(-v).
-                        listed = np.exp(alike - value[trellis.col_to[pairs] - first])
-                        value[p - first] += alike - np.log1p(np.sum(listed * np.expm1(-trellis.col_cost[pairs])))
+                _add_child(trellis, value, first, i, i - chain + child)
     for chain in range(chains):
         i, parent = t * chains + chain, trellis.parents[chain]
         costs = value[trellis.dom_ptr[i] - first : trellis.dom_ptr[i + 1] - first].copy()
@@ -126,12 +107,28 @@ def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generato
             u = trellis.up_ptr[i] + path[above] - trellis.dom_ptr[above]
             for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1]):
                 costs[trellis.col_to[q] - trellis.dom_ptr[i]] += trellis.col_cost[q]
-        path[i] = trellis.dom_ptr[i] + _draw(costs, rng)
+        path[i] = trellis.dom_ptr[i] + _sample_index(costs, rng)
 
 
 @jit
-def _soft_least(costs: Floats) -> float:
-    """-log of the sum of exp(-cost)."""
+def _add_child(trellis: Trellis, value: Floats, first: int, i: int, below: int) -> None:
+    """Add to the values of variable i -log of the sum of exp(-cost) over its child variable `below` and all below it.
+
+    Without corrections that sum is the same for every position of i; a listed pair changes it by
+    exp(-(v + d)) - exp(-v), v the child's value and d the correction.
+    """
+    uncorrected = _soft_min(value[trellis.dom_ptr[below] - first : trellis.dom_ptr[below + 1] - first])
+    for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+        if value[p - first] < np.inf:
+            u = trellis.up_ptr[below] + p - trellis.dom_ptr[i]
+            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
+            listed = np.exp(uncorrected - value[trellis.col_to[pairs] - first])
+            value[p - first] += uncorrected - np.log1p(np.sum(listed * np.expm1(-trellis.col_cost[pairs])))
+
+
+@jit
+def _soft_min(costs: Floats) -> float:
+    """Return -log of the sum of exp(-cost)."""
     least = np.inf
     for cost in costs:
         least = min(least, cost)
@@ -144,14 +141,14 @@ def _soft_least(costs: Floats) -> float:
 
 
 @jit
-def _draw(costs: Floats, rng: np.random.Generator) -> int:
-    """An index with probability in proportion to exp(-cost)."""
-    whole = _soft_least(costs)
-    left, sample_path = rng.random(), 0
+def _sample_index(costs: Floats, rng: np.random.Generator) -> int:
+    """Sample an index with probability proportional to exp(-cost)."""
+    whole = _soft_min(costs)
+    left, index = rng.random(), 0
     for k in range(len(costs)):
         if costs[k] < np.inf:
-            sample_path = k
+            index = k
             left -= np.exp(whole - costs[k])
             if left < 0.0:
                 break
-    return sample_path
+    return index

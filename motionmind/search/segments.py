@@ -1,8 +1,8 @@
-"""A way in segments, from stop to stop, when all chains are known at every stop: what is known of each segment, put
-together.
+"""Bounds and best paths of a path's segments, from stop to stop, put together to those of the whole.
 
-What a segment costs then depends on its own moves alone, so a path of N moves in K segments costs the sum over k of
-what segment k costs in n_k moves, with n_1 + ... + n_K = N. Least costs of all splits are min-plus convolutions.
+All chains are known at every stop, so what a segment costs depends on its own moves alone. A path of N moves in K
+segments costs the sum over k of what segment k costs in n_k moves, with n_1 + ... + n_K = N. The least costs over all
+splits are min-plus convolutions.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from motionmind._typing import Floats, States
 
 
 class Segments:
-    """What is known of K segments at each number of moves up to N.
+    """Bounds and best paths of K segments at each number of moves up to N; costs in nats.
 
     Attributes:
         lower: no path of segment k with n moves costs less [K, N + 1].
-        best: the least cost of a whole path that is known.
+        best: least cost of a whole path that is known; infinite before there is one.
     """
 
     def __init__(self, lower: Floats, shortest: int, at: Sequence[int | None]) -> None:
-        """Nothing but bounds.
+        """Begin with bounds, and no paths.
 
         Args:
             lower: the bounds [K, N + 1], infinite where a segment cannot have as many moves.
             shortest: least number of moves of the whole; N is the greatest.
-            at: the moves at which the K - 1 stops are passed, None for any.
+            at: the moves at which the K - 1 vias are passed, None for any.
         """
         self.lower, self.best = lower, np.inf
         moves = np.arange(lower.shape[1])
@@ -39,14 +39,14 @@ class Segments:
         self._unseen = np.isfinite(lower)
 
     def lower_bound(self) -> float:
-        """No whole path costs less."""
+        """Return a lower bound on the cost of every whole path, in nats."""
         return min(float((self.lower + self._others(self.lower)).min()), self.best)
 
     def most_promising(self) -> tuple[int, int, float, float]:
-        """Of what has not been looked at the segment and its number of moves that may be part of the cheapest path.
+        """Return the unseen segment and number of moves that may be part of the cheapest path.
 
-        With it come the least that such a path may cost, and the cost below which the segment is better than it is
-        known to be and part of a better path than the best known.
+        With them come the least that such a path may cost, and the cost below which the segment improves on its own
+        best and on the best whole path, in nats.
         """
         others = self._others(self.lower)
         through = np.where(self._unseen, self.lower + others, np.inf)
@@ -55,13 +55,13 @@ class Segments:
         return segment, moves, float(through[segment, moves]), below
 
     def reopen(self, left: Iterable[tuple[int, int]]) -> None:
-        """Have just these segments and numbers of moves looked at, again."""
+        """Mark just these segments and numbers of moves as unseen."""
         self._unseen[:] = False
         for segment, moves in left:
             self._unseen[segment, moves] = True
 
-    def learn(self, segment: int, moves: int, lower: float, cost: float, path: States) -> None:
-        """Take in what looking at a segment gave: a bound, and a path [n + 1, L] with its cost, or an empty one."""
+    def update(self, segment: int, moves: int, lower: float, cost: float, path: States) -> None:
+        """Take in a segment's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen."""
         self._unseen[segment, moves] = False
         self.lower[segment, moves] = max(self.lower[segment, moves], lower)
         if len(path) > 0 and cost < self._cost[segment, moves]:
@@ -69,7 +69,7 @@ class Segments:
             self.best = min(self.best, float((self._cost + self._others(self._cost)).min()))
 
     def path(self) -> tuple[States, tuple[int, ...]]:
-        """The best path [N + 1, L], and the moves at which it passes its stops."""
+        """Return the best path [N + 1, L], and the moves at which it passes its vias."""
         cost, pieces = self._cost.copy(), []
         for segment in range(len(cost)):
             moves = int((cost + self._others(cost))[segment].argmin())
@@ -79,20 +79,20 @@ class Segments:
         return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])]), tuple(map(int, stops))
 
     def _others(self, table: Floats) -> Floats:
-        """The least that all other segments cost together when a segment has as many moves [K, N + 1]."""
+        """Return the least cost of all other segments together, by the segment's number of moves [K, N + 1]."""
         before = [np.where(np.arange(table.shape[1]) == 0, 0.0, np.inf)]
         for costs, at in zip(table[:-1], self._at, strict=True):
-            before.append(_joined(before[-1], costs) + at)
+            before.append(_min_plus(before[-1], costs) + at)
         after, out = self._total, np.empty_like(table)
         for segment in range(len(table) - 1, -1, -1):
-            out[segment] = _joined(before[segment], after[::-1])[::-1]
+            out[segment] = _min_plus(before[segment], after[::-1])[::-1]
             if segment:
-                after = _joined(table[segment], after[::-1])[::-1] + self._at[segment - 1]
+                after = _min_plus(table[segment], after[::-1])[::-1] + self._at[segment - 1]
         return out
 
 
-def _joined(a: Floats, b: Floats) -> Floats:
-    """Min-plus convolution: c[n] = min over m of a[m] + b[n - m]."""
+def _min_plus(a: Floats, b: Floats) -> Floats:
+    """Return the min-plus convolution c[n] = min over m of a[m] + b[n - m]."""
     out = np.full(len(a), np.inf)
     for m in np.flatnonzero(np.isfinite(a)):
         np.minimum(out[m:], a[m] + b[: len(b) - m], out=out[m:])

@@ -1,42 +1,47 @@
-"""The search over all numbers of moves, and the certificate."""
+"""Solve a problem over all numbers of moves, with a certificate of how close to optimal the path is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
-from typing import Literal, NamedTuple, TypeVar
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.search import astar, pair_chains
-from motionmind.search import trws as bound
-from motionmind.search.polish import path_cost, polish
-from motionmind.search.problem import Model, Rules, Via, costs_to_go, with_waits
+from motionmind.errors import InfeasibleError
+from motionmind.search import astar, pair_chains, trws
+from motionmind.search.attention import Attention, Clock
+from motionmind.search.costs import path_cost
+from motionmind.search.pair_chain_tables import PairChains, count_pairs
+from motionmind.search.polish import polish
+from motionmind.search.problem import Model, Problem, costs_to_go
 from motionmind.search.segments import Segments
 from motionmind.search.trellis import Trellis, build_trellis
+from motionmind.search.trws import Messages
 
-SWEEPS_AT_ONCE = 2  # few, for fixing pays at once: 2 is fastest of 1 to 8 on real ballet
+SWEEPS_AT_ONCE = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
 STALLED = (
-    0.9  # sweeps of messages that leave more than this share of the gap, and of the positions, give way to pair chains
+    0.9  # message sweeps that leave more than this share of the gap, and of the positions, give way to pair chains
 )
 PAIR_CHAIN_SWEEPS = 100  # at most, for each number of moves
 PAIR_CHAINS_STALLED = 0.98  # as STALLED; then A* takes over
-WORTH_POLISHING = 0.1  # a path that costs no more than this share above the best is worth polishing
-MOST_STATES_OF_CHAIN = 1 << 16  # of a chain: A* numbers them in 16 bits
-MOST_PAIRS = 1 << 23  # of states in pair chains, 32 bytes each: more are not made, nor kept for A*
-SECONDS_UNWATCHED = 0.1  # that pass before whoever watches is asked again
-PROVEN = 1e-6  # nats: an answer within this of its lower bound is reported as optimal
+WORTH_POLISHING = 0.1  # paths that cost more than this share above the best are not polished
+MOST_STATES_OF_CHAIN = 1 << 16  # A* numbers the states of a chain in 16 bits
+MOST_PAIRS = 1 << 23  # pairs of states in pair chains, 32 bytes each; more are not built, nor kept for A*
+PROVEN = 1e-6  # nats: a path within this of its lower bound is reported as optimal
 
-_Result = TypeVar("_Result")
 Status = Literal["optimal", "bounded", "interrupted", "sampled"]
 
 
 class Progress(NamedTuple):
-    """How far a search is: the cost of the best path so far, infinite before there is any, what is proven of all paths,
-    and the nodes that A* has expanded."""
+    """Progress of a search.
+
+    Attributes:
+        cost: of the best path so far, nats; infinite before there is any.
+        lower_bound: proven of all paths, nats.
+        expansions: nodes that A* has expanded.
+    """
 
     cost: float
     lower_bound: float
@@ -48,18 +53,18 @@ Watch = Callable[[Progress], bool | None]
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """The best path found and how close to the best it provably is.
+    """The best path found, and how close to optimal it provably is.
 
     Attributes:
         path: states [T + 1, L].
-        cost: its cost in nats.
-        lower_bound: no path within the rules costs less than this, in nats.
-        status: "optimal" where both agree to 1e-6 nats, else "interrupted" if it was, else "bounded";
-            "sampled" where the path was drawn and not sought.
+        cost: its cost, nats.
+        lower_bound: no path within the rules costs less than this, nats.
+        status: "optimal" if the two agree to 1e-6 nats, else "interrupted" or "bounded"; "sampled" for a path that was
+            sampled.
         expansions: nodes expanded by A*.
         peak_nodes: the greatest number of nodes held at once.
-        seconds: of the parts "problem", "bound" and "search"; a measurement, and no part of the proof.
-        passed: the moves at which it passes its vias.
+        seconds: time spent on "problem", "bound" and "search"; a measurement, and no part of the proof.
+        passed: the moves at which the path passes its vias [K].
     """
 
     path: Int32s
@@ -72,243 +77,282 @@ class Certificate:
     passed: tuple[int, ...] = ()
 
 
-def solve(
-    model: Model, start: Ints, goal: Ints, rules: Rules, vias: Sequence[Via] = (), watch: Watch | None = None
-) -> Certificate | None:
-    """The best path from states `start` [L] to `goal` [L] over all numbers of moves; None where there is none.
+def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
+    """Find the cheapest path over all numbers of moves, and prove how good it is.
 
-    Numbers of moves are looked at in the order of what the chains cost on their own, as long as that is below the best
-    path found, and bounded; those that this leaves undecided are searched. The least bound of all proves the answer.
+    Numbers of moves are bounded in the order of what the chains cost on their own, as long as that is below the cost of
+    the best path found; those that this leaves undecided are searched by A*. The least of all bounds is what is proven.
 
-    It passes through `vias` in their order, which divide it into segments of at least one move; with vias it is numbers
-    of moves of a segment that are looked at, each below what the best path leaves when the other segments cost as
-    little as is proven.
+    Vias divide the path into segments of at least one move. Then the numbers of moves are those of a segment, each
+    bounded below what the best path leaves when the other segments cost as little as is proven.
 
-    `watch` is told between pieces of work how far the search is; where it returns True the search ends as soon as any
-    path is known, with what is proven by then.
+    Args:
+        problem: what to solve.
+        watch: called with the progress between pieces of work; if it returns True the search ends as soon as any path
+            is known, with what is proven by then.
+
+    Raises:
+        InfeasibleError: no path satisfies the problem.
+        ValueError: a chain has too many states.
     """
-    if np.diff(model.starts).max() > MOST_STATES_OF_CHAIN:
-        raise ValueError(
-            f"a chain has {np.diff(model.starts).max()} states; the search takes up to {MOST_STATES_OF_CHAIN}"
-        )
-    clock = _Clock()
-    held = with_waits(model, goal, rules.wait)
-    stops = [start, *(via.states for via in vias), goal]
-    to_go = [costs_to_go(held, stop, rules.longest) for stop in stops[1:]]
-    segments = Segments(separate_costs(held, stops, to_go, rules), rules.shortest, [via.move for via in vias])
-    clock.lap("problem")
-
-    expansions, peak = 0, 0
-    attention = _Attention(watch, lambda: Progress(segments.best, segments.lower_bound(), expansions))
-    left: dict[tuple[int, int], tuple[Trellis, pair_chains.PairChains]] = {}  # what is left to search
-    kept = 0  # pairs in it
-    while True:
-        segment, moves, least, below = segments.most_promising()
-        if not least < segments.best - PROVEN or (attention.ends() and np.isfinite(segments.best)):
-            break
-        toll = rules.per_move * moves
-        known = _Known(build_trellis(held, stops[segment], moves, to_go[segment], below - toll), below - toll)
-        clock.lap("problem")
-        messages = _tighten_by_messages(known, rules.sweeps, attention)
-        if (
-            not (known.settled or attention.ends())
-            and len(start) > 1
-            and pair_chains.pairs(known.trellis) <= MOST_PAIRS
-        ):
-            cut = _tighten_by_pair_chains(known, pair_chains.cut(known.trellis, messages), attention)
-            if not known.settled and kept + len(cut.stand) <= MOST_PAIRS:
-                left[segment, moves] = known.trellis, cut
-                kept += len(cut.stand)
-        segments.learn(segment, moves, known.proven + toll, known.cost + toll, known.states)
-        clock.lap("bound")
-    segments.reopen(left)
-    while True:
-        segment, moves, least, below = segments.most_promising()
-        if not least < segments.best - PROVEN or attention.ends():
-            break
-        toll, budget = rules.per_move * moves, rules.node_budget - expansions
-        found = _search(*left.pop((segment, moves)), below - toll, rules.node_budget, budget, attention)
-        segments.learn(segment, moves, found.proven + toll, found.cost + toll, found.states)
-        expansions, peak = expansions + found.expansions, max(peak, found.peak)
-        clock.lap("search")
-    if not np.isfinite(segments.best):
-        return None
-    lower, (path, passed) = segments.lower_bound(), segments.path()
-    status: Status = (
-        "optimal" if segments.best - lower <= PROVEN else "interrupted" if attention.ended[0] else "bounded"
-    )
-    return Certificate(path, segments.best, lower, status, expansions, peak, clock.seconds, passed)
+    states = int(np.diff(problem.model.starts).max())
+    if states > MOST_STATES_OF_CHAIN:
+        raise ValueError(f"a chain has {states} states; the search takes up to {MOST_STATES_OF_CHAIN}")
+    solver = _Solver(problem, watch)
+    solver.search(solver.bound())
+    return solver.certificate()
 
 
-def feasible(model: Model, start: Ints, goal: Ints, rules: Rules, vias: Sequence[Via]) -> bool:
-    """Whether there is any path from `start` to `goal` through `vias`."""
-    held = with_waits(model, goal, rules.wait)
-    stops = [start, *(via.states for via in vias), goal]
-    to_go = [costs_to_go(held, stop, rules.longest) for stop in stops[1:]]
-    segments = Segments(separate_costs(held, stops, to_go, rules), rules.shortest, [via.move for via in vias])
-    return bool(np.isfinite(segments.lower_bound()))
+def feasible(problem: Problem) -> bool:
+    """Return whether any path satisfies the problem."""
+    return bool(np.isfinite(_divide(problem)[2].lower_bound()))
 
 
-def separate_costs(held: Model, stops: Sequence[Ints], to_go: Sequence[Floats], rules: Rules) -> Floats:
-    """What each of K segments costs at least, its chains on their own, at each number of moves [K, longest + 1].
+def _divide(problem: Problem) -> tuple[Model, list[Floats], Segments]:
+    """Return the model with waits, the costs to go to each stop but the first, and bounds on the segments between."""
+    rules, stops, model = problem.rules, problem.stops, problem.model_with_waits()
+    to_go = [costs_to_go(model, stop, rules.longest) for stop in stops[1:]]
+    lower = _separate_costs(problem, model, to_go)
+    return model, to_go, Segments(lower, rules.shortest, [via.move for via in problem.vias])
 
-    Infinite where a segment cannot have as many moves, and finite where it can. `held` has its waits, and `to_go` leads
-    to each stop but the first.
+
+def _separate_costs(problem: Problem, model: Model, to_go: list[Floats]) -> Floats:
+    """Return the least cost of each of K segments, its chains on their own, by number of moves [K, longest + 1], nats.
+
+    It is finite exactly where the segment can have as many moves.
     """
+    rules, stops = problem.rules, problem.stops
     moves = np.arange(rules.longest + 1)
     out = np.array(
         [
-            costs[:, held.starts[:-1] + stop].sum(axis=1) + rules.per_move * moves
+            costs[:, model.starts[:-1] + stop].sum(axis=1) + rules.per_move * moves
             for stop, costs in zip(stops[:-1], to_go, strict=True)
         ]
     )
     if len(out) > 1:
         out[:, 0] = np.inf
-    if not all(held.allowed[held.starts[:-1] + stop].all() for stop in stops[1:-1]):
+    if not all(model.allowed[model.starts[:-1] + stop].all() for stop in stops[1:-1]):
         out[:] = np.inf
     return out
 
 
-class _Known:
-    """What is known of one number of moves.
+class _Solver:
+    """The state of one search: first `bound`, then `search`, then `certificate`."""
+
+    def __init__(self, problem: Problem, watch: Watch | None) -> None:
+        self.problem, self.rules = problem, problem.rules
+        self.expansions = self.peak_nodes = 0
+        self.clock = Clock("problem", "bound", "search")
+        self.model, self.to_go, self.segments = _divide(problem)
+        self.attention = Attention(None if watch is None else lambda: bool(watch(self.progress())))
+        self.clock.lap("problem")
+
+    def progress(self) -> Progress:
+        return Progress(self.segments.best, self.segments.lower_bound(), self.expansions)
+
+    def bound(self) -> dict[tuple[int, int], tuple[Trellis, PairChains]]:
+        """Bound segments, each in a number of moves, and find paths; return those left for A*."""
+        left: dict[tuple[int, int], tuple[Trellis, PairChains]] = {}
+        kept = 0  # pairs in them
+        while True:
+            segment, moves, least, below = self.segments.most_promising()
+            if not least < self.segments.best - PROVEN or (self.attention.ends() and np.isfinite(self.segments.best)):
+                return left
+            toll, start = self.rules.per_move * moves, self.problem.stops[segment]
+            trellis = build_trellis(self.model, start, moves, self.to_go[segment], below - toll)
+            state = _Bounded(trellis, below - toll)
+            self.clock.lap("problem")
+            messages = _tighten_by_messages(state, self.rules.sweeps, self.attention)
+            if (
+                not (state.closed or self.attention.ends())
+                and len(start) > 1
+                and count_pairs(state.trellis) <= MOST_PAIRS
+            ):
+                tables = _tighten_by_pair_chains(state, pair_chains.build(state.trellis, messages), self.attention)
+                if not state.closed and kept + len(tables.pair_cost) <= MOST_PAIRS:
+                    left[segment, moves] = state.trellis, tables
+                    kept += len(tables.pair_cost)
+            self.segments.update(segment, moves, state.lower_bound + toll, state.cost + toll, state.states)
+            self.clock.lap("bound")
+
+    def search(self, left: dict[tuple[int, int], tuple[Trellis, PairChains]]) -> None:
+        """Search by A* what is left, until the best path is proven, the budget spent, or the search is to end."""
+        self.segments.reopen(left)
+        while True:
+            segment, moves, least, below = self.segments.most_promising()
+            if not least < self.segments.best - PROVEN or self.attention.ends():
+                return
+            toll, budget = self.rules.per_move * moves, self.rules.node_budget - self.expansions
+            trellis, tables = left.pop((segment, moves))
+            found = _search(trellis, tables, below - toll, self.rules.node_budget, budget, self.attention)
+            self.segments.update(segment, moves, found.lower_bound + toll, found.cost + toll, found.states)
+            self.expansions += found.expansions
+            self.peak_nodes = max(self.peak_nodes, found.peak_nodes)
+            self.clock.lap("search")
+
+    def certificate(self) -> Certificate:
+        """Return what was found and proven."""
+        cost = self.segments.best
+        if not np.isfinite(cost):
+            raise InfeasibleError("no path satisfies the problem")
+        lower_bound, (path, passed) = self.segments.lower_bound(), self.segments.path()
+        status: Status = "bounded"
+        if cost - lower_bound <= PROVEN:
+            status = "optimal"
+        elif self.attention.ended[0]:
+            status = "interrupted"
+        return Certificate(
+            path, cost, lower_bound, status, self.expansions, self.peak_nodes, self.clock.seconds, passed
+        )
+
+
+class _Bounded:
+    """Bounds on one segment in one number of moves.
 
     Attributes:
-        trellis: what is left of it: no path cheaper than `cost` lies outside.
-        cost: of the best path found, or what it has to be cheaper than.
+        trellis: what is left of it; no path cheaper than `cost` lies outside.
+        cost: cost of the best path found, or what it has to be cheaper than, nats.
         states: the best path found [T + 1, L]; empty until then.
-        proven: no path that is cheaper than `cost` costs less than this.
+        lower_bound: no path that is cheaper than `cost` costs less than this, nats.
     """
 
     def __init__(self, trellis: Trellis, cost: float) -> None:
-        self.trellis, self.cost, self.proven = trellis, cost, -np.inf
+        self.trellis, self.cost, self.lower_bound = trellis, cost, -np.inf
         self.states = np.zeros((0, trellis.chains), dtype=np.int32)
 
     @property
-    def settled(self) -> bool:
+    def closed(self) -> bool:
         """Whether bound and path meet, or nothing is left that a better path could go through."""
-        return self.proven >= self.cost - PROVEN
+        return self.lower_bound >= self.cost - PROVEN
 
-    def learn(self, proven: float, chosen: Ints) -> None:
-        """A bound, and a path of positions [n], which is polished if it is near the best."""
+    def update(self, lower_bound: float, chosen: Ints) -> None:
+        """Take in a bound, and a path of positions [n], which is polished if it is near the best."""
         if path_cost(self.trellis, chosen) <= self.cost + WORTH_POLISHING * abs(self.cost):
             cost = polish(self.trellis, chosen)
             if cost < self.cost:
                 self.cost, self.states = cost, _states(self.trellis, chosen)
-        self.proven = min(max(self.proven, proven), self.cost)
+        self.lower_bound = min(max(self.lower_bound, lower_bound), self.cost)
 
-    def prune(self, trellis: Trellis) -> None:
-        """What is left of the trellis: if a domain of it is empty, nothing."""
+    def replace_trellis(self, trellis: Trellis) -> None:
+        """Go on with a pruned trellis; if one of its domains is empty, nothing is left."""
         self.trellis = trellis
         if np.any(np.diff(trellis.dom_ptr) == 0):
-            self.proven = self.cost
+            self.lower_bound = self.cost
 
     def stalls(self, gap: float, size: int, share: float) -> bool:
-        """Whether more than a share is left of the gap and of the number of positions that there were."""
-        return self.cost - self.proven > share * gap and len(self.trellis.dom) > share * size
+        """Return whether more than a share is left of an earlier gap, and of an earlier number of positions."""
+        return self.cost - self.lower_bound > share * gap and len(self.trellis.dom) > share * size
 
 
-def _tighten_by_messages(known: _Known, sweeps: int, attention: _Attention) -> bound.Messages:
-    """Bound a number of moves by messages, of which the last are returned.
+def _tighten_by_messages(state: _Bounded, sweeps: int, attention: Attention) -> Messages:
+    """Tighten the bound by messages, and return the last.
 
-    Every few sweeps the path that they met is polished, and positions that no better path goes through are taken out
-    of the trellis; until bound and path meet, or what separates them hardly shrinks, or it is to end.
+    Every few sweeps the path that they met is polished, and positions that no better path goes through are pruned. It
+    ends when bound and path meet, when the gap between them hardly shrinks, or when the search is to end.
     """
-    messages = bound.no_messages(known.trellis)
+    messages = trws.no_messages(state.trellis)
     for done in range(0, sweeps, SWEEPS_AT_ONCE):
-        gap, size = known.cost - known.proven, len(known.trellis.dom)
-        chosen = np.zeros(len(known.trellis.dom_ptr) - 1, dtype=np.int64)
-        proven, _ = bound.tighten(known.trellis, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), known.cost)
-        known.learn(proven, chosen)
-        if known.settled:
+        gap, size = state.cost - state.lower_bound, len(state.trellis.dom)
+        chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
+        lower_bound, _ = trws.tighten(state.trellis, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), state.cost)
+        state.update(lower_bound, chosen)
+        if state.closed:
             break
-        trellis, messages = bound.prune(known.trellis, messages, known.cost - astar.SAME)
-        known.prune(trellis)
-        if known.settled or attention.ends() or (done and known.stalls(gap, size, STALLED)):
+        trellis, messages = trws.prune(state.trellis, messages, state.cost - astar.SAME)
+        state.replace_trellis(trellis)
+        if state.closed or attention.ends() or (done and state.stalls(gap, size, STALLED)):
             break
     return messages
 
 
-def _tighten_by_pair_chains(
-    known: _Known, cut: pair_chains.PairChains, attention: _Attention
-) -> pair_chains.PairChains:
-    """Go on by pair chains, in the same way; the last are returned."""
-    known.proven = max(known.proven, min(pair_chains.proven(cut), known.cost))
+def _tighten_by_pair_chains(state: _Bounded, tables: PairChains, attention: Attention) -> PairChains:
+    """Tighten the bound further by pair chains, in the same way, and return the last."""
+    state.lower_bound = max(state.lower_bound, min(pair_chains.lower_bound(tables), state.cost))
     for done in range(PAIR_CHAIN_SWEEPS):
-        if known.settled:
+        if state.closed:
             break
-        gap, size = known.cost - known.proven, len(known.trellis.dom)
-        chosen, through = np.zeros(len(known.trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
-        proven = pair_chains.sweep(known.trellis, cut, through)
-        pair_chains.descend(known.trellis, cut, chosen)
-        known.learn(proven, chosen)
-        if not known.settled:
-            trellis, cut = pair_chains.prune(known.trellis, cut, through, known.cost - astar.SAME)
-            known.prune(trellis)
-        if attention.ends() or (done and known.stalls(gap, size, PAIR_CHAINS_STALLED)):
+        gap, size = state.cost - state.lower_bound, len(state.trellis.dom)
+        chosen, through = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
+        lower_bound = pair_chains.sweep(state.trellis, tables, through)
+        pair_chains.descend(state.trellis, tables, chosen)
+        state.update(lower_bound, chosen)
+        if not state.closed:
+            trellis, tables = pair_chains.prune(state.trellis, tables, through, state.cost - astar.SAME)
+            state.replace_trellis(trellis)
+        if attention.ends() or (done and state.stalls(gap, size, PAIR_CHAINS_STALLED)):
             break
-    return cut
+    return tables
 
 
-class _Searched(NamedTuple):
-    """The best path that A* found, what it proved, and what it took."""
+class _Found(NamedTuple):
+    """The best path that A* found [T + 1, L], its cost and the bound in nats, and the effort."""
 
     cost: float
     states: Int32s
-    proven: float
+    lower_bound: float
     expansions: int
-    peak: int
+    peak_nodes: int
 
 
 def _search(
-    trellis: Trellis, cut: pair_chains.PairChains, below: float, nodes: int, budget: int, attention: _Attention
-) -> _Searched:
-    """Search the parts of the body that nothing couples any more, each with the others on one path.
+    trellis: Trellis, tables: PairChains, below: float, nodes: int, budget: int, attention: Attention
+) -> _Found:
+    """Search the parts of the body that no coupling joins any more, each with the others fixed to one path.
 
-    What a path costs more than that one, or less, is the sum of what it does so in each part. So what is proven of each
-    part adds up; and a part needs to be searched only up to what, with the best that the others may save, would come
-    below `below`. Searched all at once, every near-best way of one part would be tried with those of all others.
+    What a path costs more or less than that path is the sum of the differences in each part, so the bounds of the parts
+    add up. A part needs to be searched only up to what, with the most that the others may save, would come below
+    `below`. Searched all at once, every near-best path of one part would be tried with those of all others.
     """
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
-    pair_chains.descend(trellis, cut, chosen)
+    pair_chains.descend(trellis, tables, chosen)
     cost = polish(trellis, chosen)
-    states = _states(trellis, chosen)
-    part = _parts(trellis)
-    part_of = np.repeat(np.resize(part, len(chosen)), np.diff(trellis.dom_ptr))
-    on_path = np.isin(np.arange(len(part_of)), chosen)
-    separate_costs = {}
-    for name in np.unique(part):
-        separate_costs[name] = pair_chains.prune(trellis, cut, np.where(on_path | (part_of == name), 0.0, np.inf), 1.0)
-    may_save = {name: max(cost - pair_chains.proven(fewer), 0.0) for name, (_, fewer) in separate_costs.items()}
+    states, part = _states(trellis, chosen), _parts(trellis)
+    left = _fix_all_but(trellis, tables, chosen, part)
+    may_save = {name: max(cost - pair_chains.lower_bound(fewer), 0.0) for name, (_, fewer) in left.items()}
     saved, expansions, peak = 0.0, 0, 0
     for name in sorted(may_save, key=lambda name: may_save[name]):
         others = sum(may_save.values()) - may_save[name]
-        smaller, fewer = separate_costs.pop(name)
-        known = _Known(smaller, min(cost, below + others))
-        fewer = _tighten_by_pair_chains(known, fewer, attention)
-        if not known.settled and expansions < budget and not attention.ends():
-            chosen = np.zeros(len(chosen), dtype=np.int64)
-            found, proven, expanded, held = attention.pay(
-                astar.search,
-                known.trellis,
-                fewer,
-                pair_chains.proven(fewer),
-                known.cost,
-                chosen,
-                nodes,
-                budget - expansions,
-            )
-            if found < known.cost:
-                known.cost, known.states = found, _states(known.trellis, chosen)
-            known.proven, expansions, peak = max(known.proven, proven), expansions + expanded, max(peak, held)
-        may_save[name] = cost - known.proven
-        if len(known.states) > 0:
-            saved += cost - known.cost
-            states[:, part == name] = known.states[:, part == name]
-    return _Searched(cost - saved, states, cost - sum(may_save.values()), expansions, peak)
+        smaller, fewer = left.pop(name)
+        state = _Bounded(smaller, min(cost, below + others))
+        expanded, held = _search_part(state, fewer, nodes, budget - expansions, attention)
+        expansions, peak = expansions + expanded, max(peak, held)
+        may_save[name] = cost - state.lower_bound
+        if len(state.states) > 0:
+            saved += cost - state.cost
+            states[:, part == name] = state.states[:, part == name]
+    return _Found(cost - saved, states, cost - sum(may_save.values()), expansions, peak)
+
+
+def _fix_all_but(
+    trellis: Trellis, tables: PairChains, chosen: Ints, part: Ints
+) -> dict[int, tuple[Trellis, PairChains]]:
+    """For each part return what is left with all other parts fixed to a path of positions [n]."""
+    part_of = np.repeat(np.resize(part, len(chosen)), np.diff(trellis.dom_ptr))
+    on_path = np.isin(np.arange(len(part_of)), chosen)
+    return {
+        name: pair_chains.prune(trellis, tables, np.where(on_path | (part_of == name), 0.0, np.inf), 1.0)
+        for name in np.unique(part)
+    }
+
+
+def _search_part(state: _Bounded, tables: PairChains, nodes: int, budget: int, attention: Attention) -> tuple[int, int]:
+    """Bound one part, then search it if that leaves a gap; return the number of expansions, and of nodes held."""
+    tables = _tighten_by_pair_chains(state, tables, attention)
+    if state.closed or budget <= 0 or attention.ends():
+        return 0, 0
+    chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
+    bound = pair_chains.lower_bound(tables)
+    cost, lower_bound, expansions, held = attention.run(
+        astar.search, state.trellis, tables, bound, state.cost, chosen, nodes, budget
+    )
+    if cost < state.cost:
+        state.cost, state.states = cost, _states(state.trellis, chosen)
+    state.lower_bound = max(state.lower_bound, lower_bound)
+    return expansions, held
 
 
 def _parts(trellis: Trellis) -> Ints:
-    """The first chain of the part that each chain belongs to [L].
+    """Return the first chain of the part that each chain belongs to [L].
 
     A coupling joins two chains only where there is a move at which both have more than one position left.
     """
@@ -320,53 +364,5 @@ def _parts(trellis: Trellis) -> Ints:
 
 
 def _states(trellis: Trellis, chosen: Ints) -> Int32s:
-    """States [T + 1, L] of a path of positions."""
+    """Return the states [T + 1, L] of a path of positions [n]."""
     return trellis.dom[chosen].reshape(trellis.moves + 1, trellis.chains)
-
-
-class _Attention:
-    """Whether the search is to end before its time: what `watch` says when it is told how far the search is.
-
-    Attributes:
-        ended: whether it said so [1].
-    """
-
-    def __init__(self, watch: Watch | None, so_far: Callable[[], Progress]) -> None:
-        self.ended = np.zeros(1, dtype=bool)
-        self._watch, self._so_far = watch, so_far
-
-    def ends(self) -> bool:
-        """Whether the search is to end."""
-        if self._watch is not None and not self.ended[0]:
-            self.ended[0] = bool(self._watch(self._so_far()))
-        return bool(self.ended[0])
-
-    def pay(self, work: Callable[..., _Result], *arguments: object) -> _Result:
-        """Do long compiled work, in a thread of its own where somebody watches, who is then asked meanwhile.
-
-        The work gets `ended` as its last argument, and stops when it is set.
-        """
-        if self._watch is None:
-            return work(*arguments, self.ended)
-        with ThreadPoolExecutor(1) as pool:
-            result = pool.submit(work, *arguments, self.ended)
-            try:
-                while not wait([result], SECONDS_UNWATCHED).done:
-                    self.ends()
-            except BaseException:
-                self.ended[0] = True  # what is thrown by `watch`, or by Ctrl-C, is not to wait for the work
-                raise
-            return result.result()
-
-
-class _Clock:
-    """Seconds spent since the last lap, added up by name."""
-
-    def __init__(self) -> None:
-        self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
-        self._last = perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = perf_counter()
-        self.seconds[name] += now - self._last
-        self._last = now

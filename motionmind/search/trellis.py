@@ -8,15 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.problem import Model, costs_to_go, with_waits
+from motionmind.search.csr import find_entry, select_entries
+from motionmind.search.problem import Model, Problem, costs_to_go
 
 
 class Trellis(NamedTuple):
-    """The problem for a fixed number of moves, as flat arrays.
+    """The problem for a fixed number of moves, as flat arrays; costs in nats.
 
-    Variable i = t * L + chain; a position is one state of one variable's domain, numbered through all variables.
+    There are n = (T + 1) L variables, i = t * L + chain. A position is one state of one variable's domain, numbered
+    through all variables.
 
     Attributes:
         chains: L.
@@ -49,20 +51,128 @@ class Trellis(NamedTuple):
     col_cost: Floats
 
 
-def segment_trellises(model: Model, goal: Ints, wait: float, stops: Sequence[tuple[int, Ints]]) -> list[Trellis]:
-    """The problems between stops, each the move at which it is passed and its states [L]; all that is allowed is in
-    their domains, and waits at `goal`."""
-    held = with_waits(model, goal, wait)
+def segment_trellises(problem: Problem, moves: Sequence[int]) -> list[Trellis]:
+    """Build a trellis for each segment of a problem, with every state that is allowed in the domains.
+
+    Args:
+        problem: a problem with K - 1 vias.
+        moves: the moves of its stops: 0, those at which the vias are passed, and the last move [K + 1].
+
+    Returns:
+        K trellises.
+    """
+    model, segments = problem.model_with_waits(), zip(pairwise(problem.stops), pairwise(moves), strict=True)
     return [
-        build_trellis(held, leaving, last - first, costs_to_go(held, arriving, last - first), np.inf)
-        for (first, leaving), (last, arriving) in pairwise(stops)
+        build_trellis(model, leaving, last - first, costs_to_go(model, arriving, last - first), np.inf)
+        for (leaving, arriving), (first, last) in segments
     ]
 
 
 @jit
+def build_trellis(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> Trellis:
+    """Build the trellis of exactly `moves` moves from a start to a goal.
+
+    A state is in a domain if it is allowed there, some walk of exactly T moves passes through it then, and the cheapest
+    such walk, beside the other chains' cheapest, costs less than `below`. So no path cheaper than `below` is lost.
+
+    Args:
+        model: the costs, waits included.
+        start: states to start from [L].
+        moves: number of moves T.
+        to_go: `costs_to_go` to the goal, for at least T moves, nats [T + 1 or more, G].
+        below: cost of a path already known, nats, or infinity.
+    """
+    chains = len(model.parents)
+    dom_ptr, dom, place = _domains(model, start, moves, to_go, below)
+    row_ptr, row_to, row_cost = _edges(model, dom_ptr, dom, place)
+    up_ptr, col_ptr, col_to, col_cost = _couplings(model, dom_ptr, dom, place)
+    unary = np.zeros(len(dom))
+    for i in range(chains, (moves + 1) * chains):
+        for p in range(dom_ptr[i], dom_ptr[i + 1]):
+            unary[p] = model.unary[model.starts[i % chains] + dom[p]]
+    return Trellis(
+        chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
+    )
+
+
+@jit
+def correction(trellis: Trellis, u: int, x: int) -> float:
+    """Return the correction in nats of position `x` in coupling row `u`; 0 for a pair that is not listed."""
+    q = find_entry(trellis.col_ptr, trellis.col_to, u, x)
+    return float(trellis.col_cost[q]) if q >= 0 else 0.0
+
+
+@jit
+def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
+    """Return which positions [P] a path cheaper than `below` may go through, each leading on and led to.
+
+    Args:
+        trellis: the problem.
+        through: a lower bound on the cost of all paths through each position, nats [P].
+        below: nats.
+    """
+    kept = through < below
+    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):  # what leads nowhere
+        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+            leads = False
+            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                leads = leads or kept[trellis.row_to[e]]
+            kept[p] = kept[p] and leads
+    led_to = np.zeros(len(kept), np.bool_)
+    led_to[: trellis.dom_ptr[trellis.chains]] = True
+    for p in range(len(kept)):  # what nothing leads to
+        kept[p] = kept[p] and led_to[p]
+        if kept[p]:
+            led_to[trellis.row_to[trellis.row_ptr[p] : trellis.row_ptr[p + 1]]] = True
+    return kept
+
+
+@jit
+def subset(trellis: Trellis, kept: Bools) -> Trellis:
+    """Build the trellis of the positions that are kept [P]."""
+    chains, variables = trellis.chains, len(trellis.dom_ptr) - 1
+    held, rows = np.flatnonzero(kept), coupling_rows(trellis, kept)
+    numbers = np.full(len(kept), -1, np.int32)  # of each kept position among them
+    numbers[held] = np.arange(len(held)).astype(np.int32)
+    dom_ptr = np.zeros(variables + 1, np.int64)
+    up_ptr = np.zeros(variables + 1, np.int64)
+    for i in range(variables):
+        dom_ptr[i + 1] = dom_ptr[i] + np.sum(kept[trellis.dom_ptr[i] : trellis.dom_ptr[i + 1]])
+        up_ptr[i + 1] = up_ptr[i]
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            above = i - i % chains + trellis.parents[i % chains]
+            up_ptr[i + 1] += dom_ptr[above + 1] - dom_ptr[above]
+    row_ptr, row_to, row_cost = select_entries(
+        trellis.row_ptr, trellis.row_to, trellis.row_cost, held, numbers, np.zeros(len(held), np.int64)
+    )
+    col_ptr, col_to, col_cost = select_entries(
+        trellis.col_ptr, trellis.col_to, trellis.col_cost, rows, numbers, np.zeros(len(rows), np.int64)
+    )
+    return Trellis(
+        chains, trellis.moves, trellis.parents, dom_ptr, trellis.dom[held], trellis.unary[held],
+        row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost,
+    )  # fmt: skip
+
+
+@jit
+def coupling_rows(trellis: Trellis, kept: Bools) -> Ints:
+    """Return the coupling rows [U'] of the positions that are kept [P]."""
+    coupled = np.zeros(trellis.up_ptr[-1], np.bool_)
+    for i in range(len(trellis.dom_ptr) - 1):
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            above = i - i % trellis.chains + trellis.parents[i % trellis.chains]
+            coupled[trellis.up_ptr[i] : trellis.up_ptr[i + 1]] = kept[
+                trellis.dom_ptr[above] : trellis.dom_ptr[above + 1]
+            ]
+    return np.flatnonzero(coupled)
+
+
+# --- building --------------------------------------------------------------------------------------------------------
+
+
+@jit
 def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
-    """U[t, row]: the least that exactly t moves from its chain's start to a state cost a chain on its own [T + 1,
-    G]."""
+    """Return the least cost of exactly t moves from a chain's start to each state, the chain on its own [T + 1, G]."""
     value = np.full((moves + 1, model.starts[-1]), np.inf)
     for chain in range(len(model.parents)):
         first, last = model.starts[chain], model.starts[chain + 1]
@@ -78,29 +188,8 @@ def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
 
 
 @jit
-def build_trellis(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> Trellis:
-    """The problem of exactly `moves` moves from `start` [L] to the goal that `to_go` leads to.
-
-    A state is in a domain if it is allowed there, some walk of exactly T moves passes through it then, and the cheapest
-    such walk, beside the other chains' cheapest, costs less than `below` (a path's cost already known, or infinity): no
-    better path is lost. `to_go` is `costs_to_go` for at least T moves.
-    """
-    chains = len(model.parents)
-    dom_ptr, dom, place = _domains(model, start, moves, to_go, below)
-    row_ptr, row_to, row_cost = _rows(model, dom_ptr, dom, place)
-    up_ptr, col_ptr, col_to, col_cost = _columns(model, dom_ptr, dom, place)
-    unary = np.zeros(len(dom))
-    for i in range(chains, (moves + 1) * chains):
-        for p in range(dom_ptr[i], dom_ptr[i + 1]):
-            unary[p] = model.unary[model.starts[i % chains] + dom[p]]
-    return Trellis(
-        chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
-    )
-
-
-@jit
 def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> tuple[Ints, Int32s, Int32s]:
-    """The states of each variable, and the position [T + 1, G] of each state at each move, -1 where it has none."""
+    """Return `dom_ptr`, `dom`, and the position of each state at each move [T + 1, G], -1 where it has none."""
     chains, rows = len(model.parents), model.starts[-1]
     so_far = _costs_so_far(model, start, moves)
     spare = below
@@ -112,8 +201,8 @@ def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float)
     for i in range((moves + 1) * chains):
         t, chain = i // chains, i % chains
         first, least = model.starts[chain], to_go[moves, model.starts[chain] + start[chain]]
-        # Of what the kept states before lead to. The margin grows with t, by more than the sums can be off, so that
-        # rounding cannot keep a state and drop all that follow it.
+        # Only what kept states lead to is kept. The margin grows with t, by more than the sums can be off: rounding
+        # cannot keep a state and drop all that follow it.
         margin = (t + 1) * (1e-9 + 1e-14 * (abs(least) + abs(spare)))
         led_to = np.zeros(model.starts[chain + 1] - first, np.bool_)
         if t == 0:
@@ -139,57 +228,34 @@ def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float)
 
 
 @jit
-def _rows(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Int32s, Floats]:
-    """The edges from each position to those of the same chain at the next move."""
-    chains, variables = len(model.parents), len(dom_ptr) - 1
-    ptr = np.zeros(len(dom) + 1, np.int64)
-    to, cost = np.empty(0, np.int32), np.empty(0)
-    for fill in range(2):
-        for i in range(variables - chains):
-            first = model.starts[i % chains]
-            for p in range(dom_ptr[i], dom_ptr[i + 1]):
-                count = 0
-                for e in range(model.indptr[first + dom[p]], model.indptr[first + dom[p] + 1]):
-                    x = place[i // chains + 1, first + model.targets[e]]
-                    if x >= 0:
-                        if fill:
-                            to[ptr[p] + count], cost[ptr[p] + count] = x, model.costs[e]
-                        count += 1
-                if not fill:
-                    ptr[p + 1] = count
-        if not fill:
-            ptr = np.cumsum(ptr)
-            to, cost = np.empty(ptr[-1], np.int32), np.empty(ptr[-1])
-    return ptr, to, cost
+def _edges(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Int32s, Floats]:
+    """Return the edges from each position to those of the same chain at the next move, as compressed rows."""
+    chains, variables, states = len(model.parents), len(dom_ptr) - 1, model.starts[-1]
+    rows, shifts = np.zeros(len(dom), np.int64), np.zeros(len(dom), np.int64)
+    for i in range(variables - chains):
+        first = model.starts[i % chains]
+        for p in range(dom_ptr[i], dom_ptr[i + 1]):
+            rows[p], shifts[p] = first + dom[p], (i // chains + 1) * states + first
+    last = dom_ptr[variables - chains]  # from here on no edges lead
+    ptr, to, cost = select_entries(model.indptr, model.targets, model.costs, rows[:last], place.ravel(), shifts[:last])
+    return np.append(ptr, np.full(len(dom) - last, len(to))), to, cost
 
 
 @jit
-def _columns(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Ints, Int32s, Floats]:
-    """The listed pairs that couple each variable to its parent variable, by the parent's position."""
-    chains, variables = len(model.parents), len(dom_ptr) - 1
+def _couplings(model: Model, dom_ptr: Ints, dom: Int32s, place: Int32s) -> tuple[Ints, Ints, Int32s, Floats]:
+    """Return the first coupling row of each variable, and the listed pairs as compressed rows."""
+    chains, variables, states = len(model.parents), len(dom_ptr) - 1, model.starts[-1]
     up_ptr = np.zeros(variables + 1, np.int64)
     for i in range(variables):
         above = i - i % chains + model.parents[i % chains]
         coupled = i >= chains and model.parents[i % chains] >= 0
         up_ptr[i + 1] = up_ptr[i] + (dom_ptr[above + 1] - dom_ptr[above] if coupled else 0)
-    ptr = np.zeros(up_ptr[-1] + 1, np.int64)
-    to, cost = np.empty(0, np.int32), np.empty(0)
-    for fill in range(2):
-        for i in range(chains, variables):
-            chain, t = i % chains, i // chains
-            first = dom_ptr[i - chain + model.parents[chain]]
-            for u in range(up_ptr[i], up_ptr[i + 1]):
-                row = model.pair_starts[chain] + dom[first + u - up_ptr[i]]
-                count = 0
-                for q in range(model.pair_ptr[row], model.pair_ptr[row + 1]):
-                    x = place[t, model.starts[chain] + model.pair_states[q]]
-                    if x >= 0:
-                        if fill:
-                            to[ptr[u] + count], cost[ptr[u] + count] = x, model.pair_costs[q]
-                        count += 1
-                if not fill:
-                    ptr[u + 1] = count
-        if not fill:
-            ptr = np.cumsum(ptr)
-            to, cost = np.empty(ptr[-1], np.int32), np.empty(ptr[-1])
+    rows, shifts = np.empty(up_ptr[-1], np.int64), np.empty(up_ptr[-1], np.int64)
+    for i in range(chains, variables):
+        chain, t = i % chains, i // chains
+        first = dom_ptr[i - chain + model.parents[chain]]
+        for u in range(up_ptr[i], up_ptr[i + 1]):
+            rows[u] = model.pair_starts[chain] + dom[first + u - up_ptr[i]]
+            shifts[u] = t * states + model.starts[chain]
+    ptr, to, cost = select_entries(model.pair_ptr, model.pair_states, model.pair_costs, rows, place.ravel(), shifts)
     return up_ptr, ptr, to, cost

@@ -13,7 +13,7 @@ from motionmind.discretize import StateSpace
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
-from motionmind.search.problem import Problem, places, with_waits
+from motionmind.search.problem import Problem, places
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def break_down_cost(
         network: how the chains' states of the problem coordinate.
         factor: factor of the network's -log P in the problem's costs.
     """
-    held, graph = with_waits(problem.model, problem.goal, problem.rules.wait), grammar.transitions
+    held, graph = problem.model_with_waits(), grammar.transitions
     at = places(problem.model, path)
     probability = np.exp(-graph.weights("conditional"))
     shape = (len(path) - 1, len(grammar.chains))

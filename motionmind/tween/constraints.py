@@ -11,7 +11,7 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.discretize import StateSpace
 from motionmind.errors import MotionMindError, NoPathError
-from motionmind.search.problem import Model, Problem, Via, costs_to_go, with_waits
+from motionmind.search.problem import Model, Problem, Via, costs_to_go
 from motionmind.search.solve import feasible
 
 FARTHEST = 60  # moves by which a via is moved to see whether that helps
@@ -123,8 +123,8 @@ def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:
 
 def _blocked_segments(chains: Sequence[str], problem: Problem) -> Iterator[str]:
     """Yield a line for each segment between A, the vias and B that some joints cannot make in any number of moves."""
-    held = with_waits(problem.model, problem.goal, problem.rules.wait)
-    stops = [problem.start, *(via.states for via in problem.vias), problem.goal]
+    held = problem.model_with_waits()
+    stops = problem.stops
     stop_names = ["A", *(_via_name(problem, i) for i in range(len(problem.vias))), "B"]
     for segment in range(len(stops) - 1):
         longest = problem.rules.longest

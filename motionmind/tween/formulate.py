@@ -21,7 +21,7 @@ from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.timeline import usual
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
-from motionmind.search.problem import Model, Problem, Rules, Via, with_waits
+from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.nearest_body import nearest_posture
@@ -140,7 +140,7 @@ def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int
 
 def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Problem, Coordination]:
     """Return the same problem with moves in place of states, and the network over moves."""
-    held = with_waits(problem.model, problem.goal, problem.rules.wait)
+    held = problem.model_with_waits()
     count = np.diff(held.starts) + np.diff(held.indptr[held.starts])  # of each chain's states
     if count.max() > MOST_STATES_OF_CHAIN:
         joint = learned.grammar.chains[int(count.argmax())]

@@ -104,7 +104,7 @@ class TweenRequest:
             _check_count("memory", self.memory, MOST_MEMORY)
         _check_choice("coordination", self.coordination, get_args(Scheme))
         _check_choice("weights", self.weights, get_args(Weights))
-        if not (isinstance(self.seed, Integral) and self.seed >= 0):
+        if not _is_whole(self.seed, 0, math.inf):
             raise MotionMindError(f"seed must be a whole number of at least 0, not {self.seed}")
         if not SLOWEST <= self.fps <= FASTEST:
             raise MotionMindError(
@@ -117,7 +117,7 @@ class TweenRequest:
             if not (math.isfinite(nats) and nats >= 0.0):
                 raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
         for number, (_, move) in enumerate(self.vias, start=1):
-            if move is not None and not (isinstance(move, Integral) and 1 <= move < MOST_MOVES):
+            if move is not None and not _is_whole(move, 1, MOST_MOVES - 1):
                 raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
 
     def _check_combinations(self) -> None:
@@ -204,7 +204,7 @@ class TweenRequest:
 
 
 def _check_count(name: str, value: object, most: int) -> None:
-    if not (isinstance(value, Integral) and 1 <= value <= most):
+    if not _is_whole(value, 1, most):
         raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
 
 
@@ -212,3 +212,8 @@ def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:
     if value not in choices:
         listed = f"{', '.join(map(repr, choices[:-1]))} or {choices[-1]!r}"
         raise MotionMindError(f"{name} must be {listed}, not {value!r}")
+
+
+def _is_whole(value: object, least: int, most: float) -> bool:
+    """Return whether a value is a whole number in a range; NumPy's integers count."""
+    return isinstance(value, Integral) and least <= int(value) <= most

@@ -1,19 +1,20 @@
-"""The search that the papers began with, as a baseline: whole postures of a corpus, in the order that they were in.
+"""The search that the papers began with, as a baseline: whole postures of a corpus, in the order they were recorded.
 
-Its nodes are whole bodies, states of all chains at once, and its edges the moves that the corpus made between them.
-Both cost what they cost the search that moves chains on their own, so this is that search restricted, and no path of it
-is cheaper. Chains beyond those of the nodes (the facing, which goes with nothing) travel on their own.
+Nodes are whole bodies, states of all chains at once, and edges the moves that the corpus made between them. Both cost
+what they cost the search that moves chains on their own, so this is that search restricted, and no path of it is
+cheaper. Chains beyond those of the nodes (the facing, which no tree couples) travel on their own.
 """
 
 from __future__ import annotations
 
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.errors import InfeasibleError
+from motionmind.search.attention import Clock
+from motionmind.search.problem import Model, Problem, Rules, costs_to_go
 from motionmind.search.solve import Certificate
 
 
@@ -21,7 +22,7 @@ class Bodies(NamedTuple):
     """Whole bodies and the moves between them.
 
     Attributes:
-        states: of the first K chains, each body once [P, K].
+        states: states of the first K chains, each body once [P, K].
         of: the body that each posture of the corpus is [N].
         indptr: moves from each body [P + 1]; `targets` from `indptr[body]` to `indptr[body + 1]`.
         targets: the body that a move leads to [M].
@@ -39,7 +40,7 @@ class Bodies(NamedTuple):
 
 
 def find_bodies(states: Int32s, begins: Ints, ends: Ints) -> Bodies:
-    """The bodies of postures with `states` [N, K], and the moves from postures `begins` [M] to `ends` [M]."""
+    """Collect the bodies of postures with `states` [N, K], and the moves from postures `begins` [M] to `ends` [M]."""
     bodies, of = np.unique(states, axis=0, return_inverse=True)
     of = of.reshape(-1).astype(np.int64)
     sources, targets = np.unique(np.stack([of[begins], of[ends]]), axis=1)
@@ -47,21 +48,53 @@ def find_bodies(states: Int32s, begins: Ints, ends: Ints) -> Bodies:
     return Bodies(bodies, of, indptr.astype(np.int64), targets)
 
 
-def solve_posturewise(model: Model, bodies: Bodies, start: Ints, goal: Ints, rules: Rules) -> Certificate | None:
-    """The best path through whole bodies from states `start` [L] to `goal` [L] over all numbers of moves; None where
-    there is none.
+def solve_posturewise(problem: Problem, bodies: Bodies) -> Certificate:
+    """Find the cheapest path through whole bodies over all numbers of moves.
 
         V[0, goal] = 0,   V[k, p] = min over moves p -> q of  cost(p, q) + V[k - 1, q]
 
-    with the costs of the model. Exact: what is returned is the least that any such path costs.
+    with the costs of the model. It is exact: no path through whole bodies costs less.
+
+    Args:
+        problem: a problem without vias whose start and goal are bodies; its restrictions are not looked at.
+        bodies: whole bodies of the first K chains.
+
+    Raises:
+        InfeasibleError: no sequence of bodies leads from start to goal within the rules.
     """
-    began, count = perf_counter(), bodies.states.shape[1]
-    held = with_waits(model, goal, rules.wait)
-    costs = _costs(held, bodies)
+    start, goal, rules = problem.start, problem.goal, problem.rules
+    clock, count = Clock("problem", "bound", "search"), bodies.states.shape[1]
+    model = problem.model_with_waits()
+    costs = _costs(model, bodies)
+    to_go = costs_to_go(model, goal, rules.longest)
+    alone = to_go[:, model.starts[count:-1] + start[count:]].sum(axis=1) + rules.per_move * np.arange(len(to_go))
+    clock.lap("problem")
     a, b = _body(bodies, start[:count]), _body(bodies, goal[:count])
-    to_go = costs_to_go(held, goal, rules.longest)
-    alone = to_go[:, held.starts[count:-1] + start[count:]].sum(axis=1) + rules.per_move * np.arange(len(to_go))
-    posed = perf_counter()
+    value, best, moves = _values(bodies, costs, alone, a, b, rules)
+    if not np.isfinite(best):
+        raise InfeasibleError("no path through whole bodies satisfies the problem")
+    path = np.empty((moves + 1, len(start)), dtype=np.int32)
+    path[0], body = start, a
+    for k in range(moves, 0, -1):
+        edges = np.arange(bodies.indptr[body], bodies.indptr[body + 1])
+        body = int(bodies.targets[edges[np.argmin(costs[edges] + value[k - 1][bodies.targets[edges]])]])
+        path[moves - k + 1, :count] = bodies.states[body]
+        for chain in range(count, len(start)):
+            row = model.starts[chain] + path[moves - k, chain]
+            edges = np.arange(model.indptr[row], model.indptr[row + 1])
+            left = to_go[k - 1, model.starts[chain] + model.targets[edges]]
+            path[moves - k + 1, chain] = model.targets[edges[np.argmin(model.costs[edges] + left)]]
+    clock.lap("search")
+    return Certificate(path, best, best, "optimal", 0, 0, clock.seconds)
+
+
+def _values(
+    bodies: Bodies, costs: Floats, alone: Floats, a: int, b: int, rules: Rules
+) -> tuple[list[Floats], float, int]:
+    """Return V up to the number of moves that needs to be looked at, the least cost from body a to b, and its moves.
+
+    `alone` is what all chains beyond the bodies and the moves themselves cost, by number of moves [longest + 1].
+    """
     rows = np.flatnonzero(np.diff(bodies.indptr))
     value = [np.where(np.arange(len(bodies.states)) == b, 0.0, np.inf)]
     best, moves, least = np.inf, 0, min(float(costs.min(initial=0.0)), 0.0)
@@ -71,33 +104,19 @@ def solve_posturewise(model: Model, bodies: Bodies, start: Ints, goal: Ints, rul
         value[-1][rows] = np.minimum.reduceat(through, bodies.indptr[rows]) if len(rows) else np.inf
         if k >= rules.shortest and value[-1][a] + alone[k] < best:
             best, moves = float(value[-1][a] + alone[k]), k
-        # What any longer path costs at least: its last k moves, and those before.
+        # A lower bound on any longer path: its last k moves, and those before.
         if value[-1].min() + rules.per_move * k + least * (rules.longest - k) >= best or np.isinf(value[-1].min()):
             break
-    if not np.isfinite(best):
-        return None
-    path = np.empty((moves + 1, len(start)), dtype=np.int32)
-    path[0], body = start, a
-    for k in range(moves, 0, -1):
-        edges = np.arange(bodies.indptr[body], bodies.indptr[body + 1])
-        body = int(bodies.targets[edges[np.argmin(costs[edges] + value[k - 1][bodies.targets[edges]])]])
-        path[moves - k + 1, :count] = bodies.states[body]
-        for chain in range(count, len(start)):
-            row = held.starts[chain] + path[moves - k, chain]
-            edges = np.arange(held.indptr[row], held.indptr[row + 1])
-            left = to_go[k - 1, held.starts[chain] + held.targets[edges]]
-            path[moves - k + 1, chain] = held.targets[edges[np.argmin(held.costs[edges] + left)]]
-    seconds = {"problem": posed - began, "bound": 0.0, "search": perf_counter() - posed}
-    return Certificate(path, best, best, "optimal", 0, 0, seconds)
+    return value, best, moves
 
 
 def _body(bodies: Bodies, states: Ints) -> int:
-    """The body whose states [K] these are."""
+    """Return the body with these states [K]."""
     return int(np.flatnonzero((bodies.states == states).all(axis=1))[0])
 
 
 def _costs(model: Model, bodies: Bodies) -> Floats:
-    """What each move [M] costs: its chains' moves, and the body that it leads to."""
+    """Return the cost of each move [M] in nats: its chains' moves, and the body that it leads to."""
     sources, states = bodies.sources, bodies.states.astype(np.int64)
     span = int(np.diff(model.starts).max())
     edges = np.repeat(np.arange(len(model.indptr) - 1), np.diff(model.indptr)) * span + model.targets

@@ -24,8 +24,7 @@ from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, find_bridges
 from motionmind.grammar.coordination import PSEUDO_COUNT, compile_network, fit_network
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions
-from motionmind.search.problem import Model, Rules
-from motionmind.search.solve import solve
+from motionmind.search.problem import Model, Problem, Rules
 from motionmind.tween.problem import build_model
 
 TURNS = 8  # steps of the facing's circle
@@ -333,7 +332,7 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
     rng = np.random.default_rng(seed)
     start, goal = (rng.integers(body.sizes) for _ in range(2))
     optima = brute_force(body, learned.bridges, scheme, factor, bridge_price, start, goal, wait=0.7, moves=4)
-    found = solve(build_model(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000))
+    found = solution(Problem(build_model(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000)))
     least = min(optima[moves] + 0.4 * moves for moves in range(1, 5))
     if found is None:
         assert least == np.inf
@@ -349,12 +348,13 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
 def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
     code = (
         "import sys, numpy as np; sys.path.insert(0, sys.argv[1])\n"
-        "from test_grammar import corpus, grammar, price, solve, Rules\n"
+        "from test_grammar import Problem, Rules, build_model, corpus, grammar, solution\n"
         "for seed in range(3):\n"
         "    body = corpus(seed)\n"
         "    for budget in (5, 100_000):\n"
         "        a, b = body.states[[0, -1]].astype(np.int64)\n"
-        "        found = solve(price(grammar(seed), 'conditional', 1.0, 0.1), a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
+        "        model = build_model(grammar(seed), 'conditional', 1.0, 0.1)\n"
+        "        found = solution(Problem(model, a, b, Rules(0.7, 0.4, 3, 8, budget)))\n"
         "        print(repr(found.cost), repr(found.lower_bound), found.path.tobytes().hex(), found.expansions)\n"
     )
     processes = [

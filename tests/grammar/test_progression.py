@@ -26,7 +26,7 @@ from motionmind.formats import read_posture
 from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
 from motionmind.grammar.progression import fit_progression
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Model, Rules, Via, costs_to_go, places, with_waits
+from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, places, with_waits
 from motionmind.search.sample import gibbs_sample, sample_path
 from motionmind.search.solve import PROVEN, solve
 from motionmind.search.trellis import build_trellis
@@ -255,7 +255,8 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: flo
     model = lift_to_moves(held, net, factor)
     expected = toy.best(start, goal, rules, factor, allowed, vias)
     rules = replace(rules, wait=np.inf)
-    found = solve(model, start, goal, rules, vias)
+    problem = Problem(model, start, goal, rules, vias)
+    found = solution(problem)
     if found is None:
         assert expected == np.inf
         return
@@ -272,7 +273,7 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(seed: int, share: flo
 
     chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
     through = [Via(via.states, t) for via, t in zip(vias, found.passed, strict=True)]
-    text = json.loads(cfn(model, start, goal, rules, len(path) - 1, chains, through))
+    text = json.loads(cfn(replace(problem, vias=through), len(path) - 1, chains))
     assert written_cost(text, model, found.path, found.passed, chains) == pytest.approx(found.cost, abs=1e-4)
 
 
@@ -310,8 +311,7 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         if not 4 <= len(likely) <= 300:
             continue
         trellis = build_trellis(model, start, 3, costs_to_go(model, goal, 3), np.inf)
-        best = solve(model, start, goal, Rules(np.inf, 0.0, 3, 3, 1000))
-        assert best is not None
+        best = solve(Problem(model, start, goal, Rules(np.inf, 0.0, 3, 3, 1000)))
         chains, domains = trellis.chains, [trellis.dom[a:b] for a, b in pairwise(trellis.dom_ptr)]
         path = np.array([np.searchsorted(d, s) for d, s in zip(domains, best.path.ravel(), strict=True)])
         path += trellis.dom_ptr[:-1]
@@ -349,10 +349,10 @@ def test_a_path_that_is_drawn_passes_what_the_best_one_does() -> None:
         toy, (start, goal) = body(seed), ends_of(seed)
         model, _ = toy.of_moves(goal, 0.7, 1.0)
         via = Via(np.random.default_rng(seed).integers(toy.sizes))
-        rules = Rules(np.inf, 0.3, 1, MOVES, 1000)
-        best = solve(model, start, goal, rules, [via])
+        problem = Problem(model, start, goal, Rules(np.inf, 0.3, 1, MOVES, 1000), [via])
+        best = solution(problem)
         if best is not None:
-            other = sample_path(model, start, goal, rules, [via], best, seed)
+            other = sample_path(problem, best, seed)
             path = places(model, other.path)
             assert path[best.passed[0]].tolist() == via.states.tolist()
             assert (path[0].tolist(), path[-1].tolist()) == (start.tolist(), goal.tolist())

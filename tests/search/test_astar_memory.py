@@ -14,9 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from toys import noisy_messages, random_toy, trellis_of
+from toys import noisy_messages, random_toy, solution, trellis_of
 
 from motionmind.search import astar, pair_chains, solve
+from motionmind.search.pair_chain_tables import PairChains
 from motionmind.search.trellis import Trellis
 
 MOVES = 5
@@ -30,7 +31,7 @@ class Case:
     """A trellis, pair chains with a poor bound, and the optimum by brute force."""
 
     trellis: Trellis
-    cut: pair_chains.PairChains
+    tables: PairChains
     bound: float
     optimum: float
 
@@ -38,7 +39,7 @@ class Case:
         """Cost, bound, expansions and peak of nodes of A*."""
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.trellis, self.cut, self.bound, cost, path, budget, expansions, on)
+        return astar.search(self.trellis, self.tables, self.bound, cost, path, budget, expansions, on)
 
     @property
     def depth(self) -> int:
@@ -55,8 +56,8 @@ def cases(even: bool = False) -> tuple[Case, ...]:
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if len(toy.sizes) > 1 and np.isfinite(optimum):
             trellis = trellis_of(toy, MOVES)
-            cut = pair_chains.cut(trellis, noisy_messages(trellis, seed, 20.0))
-            found.append(Case(trellis, cut, pair_chains.proven(cut), float(optimum)))
+            tables = pair_chains.build(trellis, noisy_messages(trellis, seed, 20.0))
+            found.append(Case(trellis, tables, pair_chains.lower_bound(tables), float(optimum)))
     return tuple(found)
 
 
@@ -131,7 +132,7 @@ def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pyte
     for seed in SEEDS:
         toy = random_toy(seed, frustrated=True)
         found = [
-            solve.solve(toy.model(), *toy.ends(), toy.rules(1, 6, node_budget, sweeps=1))
+            solution(toy.problem(toy.rules(1, 6, node_budget, sweeps=1)))
             for node_budget in (1, 2, 10, 30, 100, 1000, ENOUGH)
         ]
         if found[0] is not None:
@@ -152,7 +153,7 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
                 break
             node = int(nodes.heap[0])
             astar._close(nodes, node)
-            astar._expand(case.trellis, case.cut, nodes, node, np.inf, path)
+            astar._expand(case.trellis, case.tables, nodes, node, np.inf, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue
@@ -309,7 +310,7 @@ def children(case: Case, node: Node) -> Iterator[tuple[int, float]]:
     chain, frontier = i % trellis.chains, np.array(node.frontier, np.uint16)
     before = trellis.dom_ptr[i - trellis.chains] + node.frontier[chain]
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
-        grown = pair_chains.step(trellis, case.cut, i, frontier, e)
+        grown = pair_chains.step(trellis, case.tables, i, frontier, e)
         yield int(trellis.row_to[e] - trellis.dom_ptr[i]), node.f + grown
 
 

@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from toys import Toy, evaluate, noisy_messages, random_toy, trellis_of
+from toys import Toy, evaluate, noisy_messages, random_toy, solution, trellis_of
 
-from motionmind.search import astar, pair_chains, solve
-from motionmind.search import trws as bound
+from motionmind.search import astar, pair_chains, solve, trws
 from motionmind.search.cfn import cfn
-from motionmind.search.polish import path_cost, polish
-from motionmind.search.problem import Model, Rules, costs_to_go, with_waits
+from motionmind.search.costs import path_cost
+from motionmind.search.pair_chain_tables import PairChains
+from motionmind.search.polish import polish
+from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis
 
@@ -39,7 +40,7 @@ def kind(request: pytest.FixtureRequest) -> dict[str, bool]:
 
 
 def answer(toy: Toy, rules: Rules) -> Certificate | None:
-    return solve.solve(toy.model(), *toy.ends(), rules)
+    return solution(toy.problem(rules))
 
 
 def a_body(**changes: object) -> Toy:
@@ -132,8 +133,8 @@ def test_every_pair_of_sweeps_raises_the_bound_and_none_lifts_it_over_the_optimu
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if optimum < np.inf:
             trellis = trellis_of(toy, MOVES)
-            messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
-            proven = [bound.tighten(trellis, messages, path, 1, np.inf)[0] for _ in range(8)]
+            messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+            proven = [trws.tighten(trellis, messages, path, 1, np.inf)[0] for _ in range(8)]
             assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
             assert proven[-1] <= optimum + ROUNDING, seed
 
@@ -165,19 +166,19 @@ def test_f_never_overestimates_along_an_optimal_path_whatever_the_forward_messag
         if found is None:
             continue
         trellis = trellis_of(toy, MOVES)
-        messages = bound.no_messages(trellis) if noise is None else noisy_messages(trellis, seed, noise)
+        messages = trws.no_messages(trellis) if noise is None else noisy_messages(trellis, seed, noise)
         if noise is None:
-            bound.tighten(trellis, messages, np.zeros((MOVES + 1) * trellis.chains, np.int64), 3, np.inf)
+            trws.tighten(trellis, messages, np.zeros((MOVES + 1) * trellis.chains, np.int64), 3, np.inf)
             f = float(messages.constants.sum())
         else:
-            f = bound.backward(trellis, messages)
+            f = trws.backward(trellis, messages)
         optimum = found.cost - MOVES * toy.per_move
         path = positions(trellis, found.path)
         for i in range(trellis.chains, len(path)):
             edge = edge_between(trellis, path[i - trellis.chains], path[i])
             parent = trellis.parents[i % trellis.chains]
             above = path[i - i % trellis.chains + parent] if parent >= 0 else -1
-            grown = bound.step(trellis, messages, i, path[i - trellis.chains], above, edge)
+            grown = trws.step(trellis, messages, i, path[i - trellis.chains], above, edge)
             assert grown >= -ROUNDING
             f += grown
             assert f <= optimum + PROVEN, (seed, i)
@@ -190,49 +191,49 @@ def test_two_chains_are_one_pair_chain_and_its_bound_is_their_optimum(kind: dict
         optimum = toy.optima(MOVES)[MOVES] - MOVES * toy.per_move
         if len(toy.sizes) == 2 and optimum < np.inf:
             trellis = trellis_of(toy, MOVES)
-            cut, path = (
-                pair_chains.cut(trellis, noisy_messages(trellis, seed, 5.0)),
+            tables, path = (
+                pair_chains.build(trellis, noisy_messages(trellis, seed, 5.0)),
                 np.zeros((MOVES + 1) * 2, np.int64),
             )
-            assert pair_chains.proven(cut) == pytest.approx(optimum, abs=ROUNDING), seed
-            pair_chains.descend(trellis, cut, path)
+            assert pair_chains.lower_bound(tables) == pytest.approx(optimum, abs=ROUNDING), seed
+            pair_chains.descend(trellis, tables, path)
             assert path_cost(trellis, path) == pytest.approx(optimum, abs=ROUNDING), seed
 
 
 def test_every_sweep_of_pair_chains_raises_the_bound_and_none_lifts_it_over_the_optimum(kind: dict[str, bool]) -> None:
     tighter = 0
     for trellis, optimum, seed in bodies(100, kind):
-        messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
-        by_messages = bound.tighten(trellis, messages, path, 50, np.inf)[0]
-        cut, through = pair_chains.cut(trellis, messages), np.zeros(len(trellis.dom))
-        proven = [pair_chains.proven(cut), *(pair_chains.sweep(trellis, cut, through) for _ in range(8))]
+        messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        by_messages = trws.tighten(trellis, messages, path, 50, np.inf)[0]
+        tables, through = pair_chains.build(trellis, messages), np.zeros(len(trellis.dom))
+        proven = [pair_chains.lower_bound(tables), *(pair_chains.sweep(trellis, tables, through) for _ in range(8))]
         assert all(before <= after + ROUNDING for before, after in pairwise(proven)), seed
         assert proven[-1] <= optimum + ROUNDING, seed
-        assert proven[-1] == pytest.approx(pair_chains.proven(cut), abs=ROUNDING), seed
+        assert proven[-1] == pytest.approx(pair_chains.lower_bound(tables), abs=ROUNDING), seed
         tighter += proven[-1] > by_messages + 1e-3
     assert tighter > 3 or not kind.get("frustrated")
 
 
 def test_shares_move_between_pair_chains_but_add_up_to_what_a_path_costs(kind: dict[str, bool]) -> None:
     for trellis, _, seed in bodies(60, kind):
-        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
+        tables, through = pair_chains.build(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
         for draw in range(3):
             path = some_path(trellis, seed + draw)
-            assert shares(trellis, cut, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), (seed, draw)
-            pair_chains.sweep(trellis, cut, through)
+            assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), (seed, draw)
+            pair_chains.sweep(trellis, tables, through)
 
 
 @pytest.mark.parametrize("sweeps", [0, 1, 3])
 def test_by_pair_chains_f_grows_along_every_path_from_the_bound_to_its_cost(sweeps: int) -> None:
     for trellis, _, seed in bodies(60, {"frustrated": True}):
-        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 5.0)), np.zeros(len(trellis.dom))
+        tables, through = pair_chains.build(trellis, noisy_messages(trellis, seed, 5.0)), np.zeros(len(trellis.dom))
         for _ in range(sweeps):
-            pair_chains.sweep(trellis, cut, through)
+            pair_chains.sweep(trellis, tables, through)
         path = some_path(trellis, seed)
-        f, frontier = pair_chains.proven(cut), np.zeros(trellis.chains, np.uint16)
+        f, frontier = pair_chains.lower_bound(tables), np.zeros(trellis.chains, np.uint16)
         for i in range(trellis.chains, len(path)):
             grown = pair_chains.step(
-                trellis, cut, i, frontier, edge_between(trellis, path[i - trellis.chains], path[i])
+                trellis, tables, i, frontier, edge_between(trellis, path[i - trellis.chains], path[i])
             )
             assert grown >= -ROUNDING, (seed, i)
             f += grown
@@ -247,10 +248,10 @@ def test_what_pair_chains_bound_through_a_position_is_no_more_than_any_path_thro
         if len(toy.sizes) == 1 or not np.isfinite(toy.optima(moves)[moves]):
             continue
         trellis, joint = trellis_of(toy, moves), toy.joint_states()
-        cut, through = pair_chains.cut(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
+        tables, through = pair_chains.build(trellis, noisy_messages(trellis, seed, 2.0)), np.zeros(len(trellis.dom))
         cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
         for _ in range(3):
-            pair_chains.sweep(trellis, cut, through)
+            pair_chains.sweep(trellis, tables, through)
             for i, (first, last) in enumerate(pairwise(trellis.dom_ptr)):
                 for p in range(first, last):
                     here = cheapest[i // trellis.chains, joint[:, i % trellis.chains] == trellis.dom[p]].min()
@@ -261,17 +262,17 @@ def test_what_pair_chains_bound_through_a_position_is_no_more_than_any_path_thro
 def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_proven(spare: float) -> None:
     taken_out = 0
     for whole, optimum, seed in bodies(100, {"frustrated": True}):
-        trellis, cut = whole, pair_chains.cut(whole, bound.no_messages(whole))
+        trellis, tables = whole, pair_chains.build(whole, trws.no_messages(whole))
         for _ in range(3):
             through = np.zeros(len(trellis.dom))
-            proven = pair_chains.sweep(trellis, cut, through)
-            smaller, cut = pair_chains.prune(trellis, cut, through, optimum + spare)
-            assert pair_chains.proven(cut) >= proven - ROUNDING, seed
+            proven = pair_chains.sweep(trellis, tables, through)
+            smaller, tables = pair_chains.prune(trellis, tables, through, optimum + spare)
+            assert pair_chains.lower_bound(tables) >= proven - ROUNDING, seed
             taken_out += len(trellis.dom) - len(smaller.dom)
             trellis = smaller
         path = some_path(trellis, seed)
-        assert shares(trellis, cut, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
+        cost, lower, _, _ = astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -279,10 +280,10 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
 
 def test_pair_chains_are_left_empty_where_nothing_is_cheap_enough() -> None:
     for trellis, optimum, _ in bodies(20, {"frustrated": True}):
-        cut, through = pair_chains.cut(trellis, bound.no_messages(trellis)), np.zeros(len(trellis.dom))
-        proven = pair_chains.sweep(trellis, cut, through)
+        tables, through = pair_chains.build(trellis, trws.no_messages(trellis)), np.zeros(len(trellis.dom))
+        proven = pair_chains.sweep(trellis, tables, through)
         assert proven <= optimum + ROUNDING
-        smaller, _ = pair_chains.prune(trellis, cut, through, proven - 1.0)
+        smaller, _ = pair_chains.prune(trellis, tables, through, proven - 1.0)
         assert len(smaller.dom) == 0
 
 
@@ -293,10 +294,10 @@ def test_what_is_bounded_through_a_position_is_no_more_than_any_path_through_it(
         if not np.isfinite(toy.optima(moves)[moves]):
             continue
         trellis, joint = trellis_of(toy, moves), toy.joint_states()
-        messages = bound.no_messages(trellis)
+        messages = trws.no_messages(trellis)
         cheapest = toy.so_far(moves) + toy.to_go(moves)[::-1]
         for sweeps in (1, 3):
-            bound.tighten(trellis, messages, np.zeros((moves + 1) * trellis.chains, np.int64), sweeps, np.inf)
+            trws.tighten(trellis, messages, np.zeros((moves + 1) * trellis.chains, np.int64), sweeps, np.inf)
             for i, (first, last) in enumerate(pairwise(trellis.dom_ptr)):
                 for p in range(first, last):
                     here = cheapest[i // trellis.chains, joint[:, i % trellis.chains] == trellis.dom[p]].min()
@@ -312,16 +313,16 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         if optimum == np.inf:
             continue
         trellis = trellis_of(toy, MOVES)
-        messages, path = bound.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         for _ in range(3):
-            bound.tighten(trellis, messages, path, 1, np.inf)
-            smaller, messages = bound.prune(trellis, messages, optimum + spare)
+            trws.tighten(trellis, messages, path, 1, np.inf)
+            smaller, messages = trws.prune(trellis, messages, optimum + spare)
             taken_out += len(trellis.dom) - len(smaller.dom)
             trellis = smaller
         if trellis.chains == 1:
             continue
-        cut = pair_chains.cut(trellis, messages)
-        cost, lower, _, _ = astar.search(trellis, cut, pair_chains.proven(cut), np.inf, path, 50_000, 50_000, ON)
+        tables = pair_chains.build(trellis, messages)
+        cost, lower, _, _ = astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -337,7 +338,7 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
         trellis = trellis_of(toy, MOVES)
         messages, path = noisy_messages(trellis, seed, 5.0), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
-        before = bound.backward(trellis, messages) + bound.descend(trellis, messages, path, trellis.chains)
+        before = trws.backward(trellis, messages) + trws.descend(trellis, messages, path, trellis.chains)
         assert before == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
         after = polish(trellis, path)
         states = trellis.dom[path].reshape(MOVES + 1, trellis.chains)
@@ -466,7 +467,7 @@ def test_more_states_than_a_node_can_number_are_refused() -> None:
         place=every.astype(np.int32),
     )
     with pytest.raises(ValueError, match="70000"):
-        solve.solve(model, np.array([0]), np.array([2]), Rules(1.0, 1.0, 1, 3, 100))
+        solve.solve(Problem(model, np.array([0]), np.array([2]), Rules(1.0, 1.0, 1, 3, 100)))
 
 
 # --- the problem written out -----------------------------------------------------------------------------------------
@@ -479,13 +480,13 @@ def test_a_path_costs_in_the_written_problem_what_its_certificate_states() -> No
         if found is None:
             continue
         moves, chains = len(found.path) - 1, [f"chain{chain}" for chain in range(len(toy.sizes))]
-        text = cfn(toy.model(), *toy.ends(), toy.rules(1, MOVES), moves, chains)
+        text = cfn(toy.problem(toy.rules(1, MOVES)), moves, chains)
         assert evaluate(text, found.path, chains) == pytest.approx(found.cost, abs=1e-4), seed
 
 
 def test_the_written_problem_forbids_what_the_model_forbids() -> None:
     toy = a_body(edges=(np.array([[1.0, 1.0], [np.inf, np.inf]]), np.ones((2, 2))))
-    text = cfn(toy.model(), *toy.ends(), toy.rules(3, 3), 3, ["a", "b"])
+    text = cfn(toy.problem(toy.rules(3, 3)), 3, ["a", "b"])
     top = float(json.loads(text)["problem"]["mustbe"].removeprefix("<"))
     legal, illegal = [[0, 0], [0, 0], [0, 0], [1, 1]], [[0, 0], [1, 0], [0, 0], [1, 1]]
     assert evaluate(text, np.array(legal), ["a", "b"]) < top
@@ -529,20 +530,20 @@ def some_path(trellis: Trellis, seed: int) -> np.ndarray:
     return path
 
 
-def shares(trellis: Trellis, cut: pair_chains.PairChains, path: np.ndarray) -> float:
+def shares(trellis: Trellis, tables: PairChains, path: np.ndarray) -> float:
     """What the pair chains cost on a path [n], each by its own shares."""
     total = 0.0
     for i, p in enumerate(path):
         chain = i % trellis.chains
         if chain == 0:
             continue
-        a = i - chain + cut.above[chain]
+        a = i - chain + tables.partner[chain]
         size = trellis.dom_ptr[i + 1] - trellis.dom_ptr[i]
-        total += cut.stand[cut.pair_ptr[i] + (path[a] - trellis.dom_ptr[a]) * size + p - trellis.dom_ptr[i]]
+        total += tables.pair_cost[tables.pair_ptr[i] + (path[a] - trellis.dom_ptr[a]) * size + p - trellis.dom_ptr[i]]
         if i + trellis.chains < len(path):
-            total += cut.own[edge_between(trellis, p, path[i + trellis.chains])]
+            total += tables.edge_share[edge_between(trellis, p, path[i + trellis.chains])]
             e = edge_between(trellis, path[a], path[a + trellis.chains])
-            total += cut.led[cut.led_ptr[i] + e - trellis.row_ptr[trellis.dom_ptr[a]]]
+            total += tables.partner_share[tables.partner_ptr[i] + e - trellis.row_ptr[trellis.dom_ptr[a]]]
     return float(total)
 
 

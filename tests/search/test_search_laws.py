@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from toys import random_toy
+from toys import random_toy, solution
 
 from motionmind._typing import Floats, Ints, States
 from motionmind.body.motion import Motion, Posture
@@ -24,7 +24,7 @@ from motionmind.discretize import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
-from motionmind.search.solve import PROVEN, solve
+from motionmind.search.solve import PROVEN
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 
@@ -253,11 +253,11 @@ def test_an_avoided_state_that_the_best_path_does_not_visit_changes_nothing(seed
 @given(seeds, st.booleans())
 def test_the_best_number_of_moves_asked_for_gives_the_best_path(seed: int, frustrated: bool) -> None:
     toy = random_toy(seed, frustrated=frustrated)
-    free = solve(toy.model(), *toy.ends(), toy.rules(1, 6))
+    free = solution(toy.problem(toy.rules(1, 6)))
     assume(free is not None)
     assert free is not None
     moves = len(free.path) - 1
-    fixed = solve(toy.model(), *toy.ends(), toy.rules(moves, moves))
+    fixed = solution(toy.problem(toy.rules(moves, moves)))
     assert fixed is not None
     assert fixed.cost == pytest.approx(free.cost, abs=SAME)
     assert toy.cost(fixed.path) == pytest.approx(toy.cost(free.path), abs=SAME)
@@ -280,7 +280,7 @@ def test_where_moves_cost_the_same_both_ways_the_way_back_costs_what_the_way_the
         coupled = [chain for chain, parent in enumerate(toy.parents) if parent >= 0]
         return sum(toy.coupling(chain)[states[toy.parents[chain]], states[chain]] for chain in coupled)
 
-    first, second = (solve(body.model(), *body.ends(), body.rules(2, 5)) for body in (there, back))
+    first, second = (solution(body.problem(body.rules(2, 5))) for body in (there, back))
     assert (first is None) == (second is None)
     if first is not None and second is not None:
         assert first.cost - stand(there.goal) == pytest.approx(second.cost - stand(back.goal), abs=SAME)

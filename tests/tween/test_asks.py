@@ -27,9 +27,9 @@ from motionmind.formats import read_motion, read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.search import astar
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Via
+from motionmind.search.problem import Problem, Via
 from motionmind.search.sample import gibbs_sample
-from motionmind.search.solve import PROVEN, Certificate, Progress, solve
+from motionmind.search.solve import PROVEN, Certificate, Progress
 from motionmind.search.trellis import Trellis
 from motionmind.tween.engine import Engine
 from motionmind.tween.problem import penalise, shared_moves
@@ -96,7 +96,7 @@ def test_whatever_is_asked_the_cost_is_that_of_brute_force(
         vias.append(Via(rng.integers(toy.sizes), move))
     moves = range(fewest, MOVES + 1)
     expected = best(toy, moves, allowed, vias)
-    found = solve(toy.model()._replace(allowed=allowed), *toy.ends(), toy.rules(fewest, MOVES), vias)
+    found = solution(toy.problem(toy.rules(fewest, MOVES), vias, allowed=allowed))
     if found is None:
         assert expected == np.inf
     else:
@@ -132,8 +132,7 @@ def test_bounds_hold_whatever_effort_is_allowed_and_more_of_it_never_worsens_the
     expected = best(toy, range(1, MOVES + 1), allowed, vias)
     before = (-np.inf, np.inf)
     for node_budget in (1, 20, 100_000):
-        model = toy.model()._replace(allowed=allowed)
-        found = solve(model, *toy.ends(), toy.rules(1, MOVES, node_budget, 2), vias)
+        found = solution(toy.problem(toy.rules(1, MOVES, node_budget, 2), vias, allowed=allowed))
         if found is None:
             assert expected == np.inf
             continue
@@ -148,12 +147,12 @@ def test_bounds_hold_whatever_effort_is_allowed_and_more_of_it_never_worsens_the
 @given(st.integers(0, 10_000), st.booleans())
 def test_vias_at_the_postures_of_the_best_path_change_nothing(seed: int, at: bool) -> None:
     toy = random_toy(seed, even=seed % 2 == 0)
-    found = solve(toy.model(), *toy.ends(), toy.rules(2, MOVES))
+    found = solution(toy.problem(toy.rules(2, MOVES)))
     if found is None:
         return
     inner = [Via(states.astype(np.int64), t if at else None) for t, states in enumerate(found.path[1:-1], start=1)]
     for vias in (inner, inner[:1], inner[-1:]):
-        again = solve(toy.model(), *toy.ends(), toy.rules(2, MOVES), vias)
+        again = solution(toy.problem(toy.rules(2, MOVES), vias))
         assert again is not None
         assert again.cost == pytest.approx(found.cost, abs=2 * PROVEN)
 
@@ -162,7 +161,7 @@ def test_vias_at_the_postures_of_the_best_path_change_nothing(seed: int, at: boo
 @given(st.integers(0, 10_000))
 def test_a_restriction_never_lowers_the_cost_and_one_that_the_best_path_keeps_changes_nothing(seed: int) -> None:
     toy = random_toy(seed)
-    found = solve(toy.model(), *toy.ends(), toy.rules(1, MOVES))
+    found = solution(toy.problem(toy.rules(1, MOVES)))
     if found is None:
         return
     rng = np.random.default_rng(seed)
@@ -172,10 +171,10 @@ def test_a_restriction_never_lowers_the_cost_and_one_that_the_best_path_keeps_ch
     cost = found.cost
     for _ in range(4):
         allowed &= rng.random(len(allowed)) > 0.2
-        kept = solve(toy.model()._replace(allowed=allowed | on_it), *toy.ends(), toy.rules(1, MOVES))
+        kept = solution(toy.problem(toy.rules(1, MOVES), allowed=allowed | on_it))
         assert kept is not None
         assert kept.cost == pytest.approx(found.cost, abs=2 * PROVEN)
-        narrower = solve(toy.model()._replace(allowed=allowed), *toy.ends(), toy.rules(1, MOVES))
+        narrower = solution(toy.problem(toy.rules(1, MOVES), allowed=allowed))
         assert narrower is None or narrower.cost >= cost - 2 * PROVEN
         cost = np.inf if narrower is None else narrower.cost
 
@@ -195,7 +194,7 @@ def test_moves_shared_with_others_cost_as_much_more_as_is_said(seed: int, divers
                     tables[chain][state, target] += diversity
             dear = tuple(tables)
         expected = replace(toy, edges=dear).optima(MOVES)[1:].min()
-        found = solve(penalise(toy.model(), others, diversity), *toy.ends(), toy.rules(1, MOVES))
+        found = solution(Problem(penalise(toy.model(), others, diversity), *toy.ends(), toy.rules(1, MOVES)))
         if found is None:
             assert expected == np.inf
             return
@@ -228,14 +227,13 @@ def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
     allowed = [rng.random(size) > 0.2 for size in toy.sizes]
     via = [int(rng.integers(size)) for size in toy.sizes]
     renamed = [int(np.flatnonzero(p == s)[0]) for p, s in zip(new, via, strict=True)]
-    mine = solve(
-        toy.model()._replace(allowed=np.concatenate(allowed)), *toy.ends(), toy.rules(1, MOVES), [Via(np.array(via))]
-    )
-    theirs = solve(
-        other.model()._replace(allowed=np.concatenate([a[p] for a, p in zip(allowed, new, strict=True)])),
-        *other.ends(),
-        other.rules(1, MOVES),
-        [Via(np.array(renamed))],
+    mine = solution(toy.problem(toy.rules(1, MOVES), [Via(np.array(via))], allowed=np.concatenate(allowed)))
+    theirs = solution(
+        other.problem(
+            other.rules(1, MOVES),
+            [Via(np.array(renamed))],
+            allowed=np.concatenate([a[p] for a, p in zip(allowed, new, strict=True)]),
+        )
     )
     assert (mine is None) == (theirs is None)
     if mine is not None and theirs is not None:
@@ -261,8 +259,8 @@ def test_chains_in_another_order_cost_the_same(seed: int) -> None:
     via = rng.integers(toy.sizes)
     costs = []
     for body, chains in ((toy, range(len(order))), (other, order)):
-        model = body.model()._replace(allowed=np.concatenate([allowed[chain] for chain in chains]))
-        found = solve(model, *body.ends(), body.rules(1, MOVES), [Via(via[list(chains)])])
+        kept = np.concatenate([allowed[chain] for chain in chains])
+        found = solution(body.problem(body.rules(1, MOVES), [Via(via[list(chains)])], allowed=kept))
         costs.append(np.inf if found is None else found.cost)
     assert costs[0] == pytest.approx(costs[1], abs=2 * PROVEN)
 
@@ -278,12 +276,13 @@ def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:
             toy.model()._replace(allowed=allowed), [rng.integers(toy.sizes, size=(9, len(toy.sizes)))], 1.5
         )
         vias = [Via(rng.integers(toy.sizes)) for _ in range(seed % 3)]
-        found = solve(model, *toy.ends(), toy.rules(2, MOVES), vias)
+        problem = Problem(model, *toy.ends(), toy.rules(2, MOVES), vias)
+        found = solution(problem)
         if found is None:
             continue
         at = [Via(via.states, move) for via, move in zip(vias, found.passed, strict=True)]
         chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
-        text = cfn(model, *toy.ends(), toy.rules(2, MOVES), len(found.path) - 1, chains, at)
+        text = cfn(replace(problem, vias=at), len(found.path) - 1, chains)
         (tmp_path / "problem.cfn").write_text(text)
         network = pytoulbar2.CFN(verbose=-1)
         network.Read(str(tmp_path / "problem.cfn"))
@@ -304,11 +303,8 @@ def test_an_interrupted_search_knows_a_path_and_a_bound_wherever_it_is_ended() -
         expected = best(toy, range(1, MOVES + 1), np.ones(sum(toy.sizes), dtype=bool), vias)
         for calls in range(6):
             told: list[Progress] = []
-            found = solve(
-                toy.model(),
-                *toy.ends(),
-                toy.rules(1, MOVES),
-                vias,
+            found = solution(
+                toy.problem(toy.rules(1, MOVES), vias),
                 lambda so_far, told=told, calls=calls: told.append(so_far) or len(told) > calls,  # type: ignore[misc]
             )
             assert (found is None) == (expected == np.inf)

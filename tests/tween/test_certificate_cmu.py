@@ -13,7 +13,7 @@ from motionmind.formats import read_motion
 from motionmind.grammar.progression import fit_progression
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Rules, with_waits
+from motionmind.search.problem import Problem, Rules, with_waits
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model
@@ -52,10 +52,10 @@ def test_optima_on_recorded_dance_are_those_of_toulbar2(cmu05: Engine, tmp_path:
     optimal = 0
     for pair in range(PAIRS):
         start, goal = cmu05.states[rng.integers(len(cmu05.states), size=2)].astype(np.int64)
-        ours = solve(model, start, goal, rules)
-        assert ours is not None
+        problem = Problem(model, start, goal, rules)
+        ours = solve(problem)
         moves = len(ours.path) - 1
-        (tmp_path / "problem.cfn").write_text(cfn(model, start, goal, rules, moves, cmu05.grammar.chains))
+        (tmp_path / "problem.cfn").write_text(cfn(problem, moves, cmu05.grammar.chains))
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
         assert ours.lower_bound <= ours.cost
         optimal += ours.status == "optimal"
@@ -74,10 +74,10 @@ def test_optima_of_coordinated_moves_are_those_of_toulbar2(cmu05: Engine, tmp_pa
         net = fit_progression(cmu05.grammar.coordination.parents, *lists, np.asarray(cmu05.states), *seen)
         of_these = lift_to_moves(held, net, 1.0)
         rules = Rules(wait=np.inf, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
-        ours = solve(of_these, start, goal, rules)
-        assert ours is not None
+        problem = Problem(of_these, start, goal, rules)
+        ours = solve(problem)
         assert ours.status == "optimal"
-        text = cfn(of_these, start, goal, rules, len(ours.path) - 1, cmu05.grammar.chains)
+        text = cfn(problem, len(ours.path) - 1, cmu05.grammar.chains)
         (tmp_path / "problem.cfn").write_text(text)
         assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), pair
 
@@ -87,8 +87,9 @@ def test_optima_of_toy_bodies_at_each_number_of_moves_are_those_of_toulbar2(tmp_
         toy = random_toy(seed, frustrated=seed % 2 == 0)
         chains = [f"chain{chain}" for chain in range(len(toy.sizes))]
         for moves in (1, 3, 5):
-            ours = solve(toy.model(), *toy.ends(), toy.rules(moves, moves))
+            problem = toy.problem(toy.rules(moves, moves))
+            ours = solution(problem)
             if ours is not None:
-                text = cfn(toy.model(), *toy.ends(), toy.rules(moves, moves), moves, chains)
+                text = cfn(problem, moves, chains)
                 (tmp_path / "problem.cfn").write_text(text)
                 assert toulbar2(tmp_path / "problem.cfn") == pytest.approx(ours.cost, abs=SAME), (seed, moves)

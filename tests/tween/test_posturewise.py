@@ -69,7 +69,7 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
     bodies = find_bodies(states, begins, begins + 1)
     graph = nx.DiGraph((tuple(map(int, states[i])), tuple(map(int, states[i + 1]))) for i in begins)
     for shortest, longest in ((1, 7), (4, 4)):
-        found = solve_posturewise(toy.model(), bodies, start, goal, toy.rules(shortest, longest))
+        problem = toy.problem(toy.rules(shortest, longest))
         least = np.inf
         value = {toy.start: 0.0}
         for t in range(1, longest + 1):  # forwards, over dictionaries of bodies
@@ -83,15 +83,15 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
             value = after
             if t >= shortest and toy.goal in value:
                 least = min(least, value[toy.goal] + toy.per_move * t)
-        if found is None:
-            assert np.isinf(least)
+        if np.isinf(least):
+            with pytest.raises(InfeasibleError):
+                solve_posturewise(problem, bodies)
             continue
+        found = solve_posturewise(problem, bodies)
         assert found.cost == pytest.approx(least, abs=1e-9)
         assert toy.cost(found.path) == pytest.approx(found.cost, abs=1e-9)
         assert found.status == "optimal"
-        best = solve(toy.model(), start, goal, toy.rules(shortest, longest))
-        assert best is not None
-        assert best.lower_bound <= found.cost + 1e-6
+        assert solve(problem).lower_bound <= found.cost + 1e-6
 
 
 # --- recorded bodies --------------------------------------------------------------------------------------------------

@@ -1,0 +1,63 @@
+"""Compressed sparse rows: entries of row r lie at `ptr[r]` to `ptr[r + 1]`, their columns increasing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.jit import jit
+
+
+@jit
+def find_entry(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
+    """Return the index of the entry at (row, column); -1 where the row does not list the column."""
+    at = insertion_point(ptr, columns, row, column)
+    return at if at < ptr[row + 1] and columns[at] == column else -1
+
+
+@jit
+def insertion_point(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
+    """Return the index of the first entry of a row whose column is not less than `column`; the row's end if none is."""
+    low, high = ptr[row], ptr[row + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if columns[middle] < column:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low)
+
+
+@jit
+def select_entries(
+    ptr: Ints, columns: Int32s, costs: Floats, rows: Ints, numbers: Int32s, shifts: Ints
+) -> tuple[Ints, Int32s, Floats]:
+    """Build a matrix from some rows of another, keeping the columns that have a number and renumbering them.
+
+    Args:
+        ptr: rows of the other matrix [R + 1].
+        columns: its columns [E].
+        costs: its entries [E].
+        rows: the row that each row of the new matrix is taken from [N].
+        numbers: new column of each old one, -1 where it is left out.
+        shifts: where in `numbers` the old columns of each new row begin [N].
+
+    Returns:
+        Row pointers [N + 1], columns [M] and entries [M] of the new matrix.
+    """
+    out_ptr = np.zeros(len(rows) + 1, np.int64)
+    for k in range(len(rows)):
+        count = 0
+        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
+            if numbers[shifts[k] + columns[e]] >= 0:
+                count += 1
+        out_ptr[k + 1] = out_ptr[k] + count
+    out_columns, out_costs = np.empty(out_ptr[-1], np.int32), np.empty(out_ptr[-1])
+    at = 0
+    for k in range(len(rows)):
+        for e in range(ptr[rows[k]], ptr[rows[k] + 1]):
+            number = numbers[shifts[k] + columns[e]]
+            if number >= 0:
+                out_columns[at], out_costs[at] = number, costs[e]
+                at += 1
+    return out_ptr, out_columns, out_costs
