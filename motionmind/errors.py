@@ -45,18 +45,18 @@ class MotionMindWarning(UserWarning):
     """Something was mended while reading (a quaternion normalised, a header count corrected): says what, where."""
 
 
-def shown(text: str, most: int = 40) -> str:
+def quoted(text: str, most: int = 40) -> str:
     """`text` in quotes for a message, its middle left out where it is long."""
     return repr(text if len(text) <= most else f"{text[: most - 13]}...{text[-10:]}")
 
 
-def meant(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known: Iterable[str]) -> str:
     """'; did you mean X?' for the known name nearest to `name`, or nothing where none is near."""
     close = get_close_matches(name, list(known), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def listed(names: Iterable[str], most: int = 5) -> str:
+def enumerated(names: Iterable[str], most: int = 5) -> str:
     """Names in a row for a message: the first few and how many more."""
     names = list(names)
     more = f" and {len(names) - most} more" if len(names) > most else ""

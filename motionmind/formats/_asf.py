@@ -11,7 +11,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, listed, meant, shown
+from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import MOST_JOINTS, read_lines, to_number, to_numbers
 from motionmind.geometry import rotations as rot
@@ -136,7 +136,7 @@ def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FileP
             case _ if bone is not None:
                 _read_bone_line(bone, keyword.lower(), words, degrees=degrees, path=path, line=number)
     if bone is not None:
-        raise FormatError(f"bone {shown(bone.name)} has no end", path=path, line=bone.line)
+        raise FormatError(f"bone {quoted(bone.name)} has no end", path=path, line=bone.line)
 
 
 def _read_bone_line(bone: Bone, keyword: str, words: list[str], *, degrees: bool, path: FilePath, line: int) -> None:
@@ -161,7 +161,7 @@ def _channels(words: list[str], path: FilePath, line: int) -> list[str]:
     channels = [word.upper() for word in words]
     for channel in channels:
         if not _CHANNEL.fullmatch(channel):
-            raise FormatError(f"{shown(channel)} is no channel; they are tx ty tz rx ry rz l", path=path, line=line)
+            raise FormatError(f"{quoted(channel)} is no channel; they are tx ty tz rx ry rz l", path=path, line=line)
         if channels.count(channel) > 1:
             raise FormatError(f"the channel {channel} twice", path=path, line=line)
     return channels
@@ -170,7 +170,7 @@ def _channels(words: list[str], path: FilePath, line: int) -> list[str]:
 def _rotation_order(words: list[str], path: FilePath, line: int) -> str:
     order = "".join(words).upper() or "XYZ"
     if sorted(order) != ["X", "Y", "Z"]:
-        raise FormatError(f"{shown(order)} where an order of axes such as XYZ was expected", path=path, line=line)
+        raise FormatError(f"{quoted(order)} where an order of axes such as XYZ was expected", path=path, line=line)
     return order
 
 
@@ -191,10 +191,12 @@ def _read_hierarchy(
             continue
         unknown = next((word for word in words if word not in bones), None)
         if unknown is not None:
-            raise FormatError(f"there is no bone {shown(unknown)}{meant(unknown, bones)}", path=path, line=number)
+            raise FormatError(
+                f"there is no bone {quoted(unknown)}{did_you_mean(unknown, bones)}", path=path, line=number
+            )
         for child in words[1:]:
             if child in parents or child == "root":
-                raise FormatError(f"bone {shown(child)} hangs from two others", path=path, line=number)
+                raise FormatError(f"bone {quoted(child)} hangs from two others", path=path, line=number)
             parents[child] = words[0]
             children[words[0]].append(child)
     order: list[str] = []
@@ -204,5 +206,5 @@ def _read_hierarchy(
         waiting += reversed(children[order[-1]])
     loose = [name for name in bones if name not in order]
     if loose:
-        raise FormatError(f"the hierarchy does not reach {listed(loose)}", path=path, line=bones[loose[0]].line)
+        raise FormatError(f"the hierarchy does not reach {enumerated(loose)}", path=path, line=bones[loose[0]].line)
     return order, parents

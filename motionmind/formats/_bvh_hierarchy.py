@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from motionmind.errors import FormatError, shown
+from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import MOST_JOINTS, to_number
 
@@ -72,7 +72,7 @@ class _Words:
         name: list[str] = []
         while (word := self.take(f"the '{{' of a {kind}")) != "{":
             if word == "}" or self.line != line:
-                raise self.error(f"{shown(word)} where the '{{' of {kind} {' '.join(name)} was expected")
+                raise self.error(f"{quoted(word)} where the '{{' of {kind} {' '.join(name)} was expected")
             name.append(word)
         return " ".join(name)
 
@@ -101,7 +101,7 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
         elif kind == "}" and here is not None:
             open_blocks.pop()
             if here >= 0 and joints[here].offset is None:
-                raise words.error(f"joint {shown(joints[here].name)} has no OFFSET")
+                raise words.error(f"joint {quoted(joints[here].name)} has no OFFSET")
         elif kind == "END" and here is not None and here >= 0:
             words.take_name("End Site")
             open_blocks.append(-1)
@@ -115,14 +115,14 @@ def read_hierarchy(lines: list[str], path: FilePath) -> list[BvhJoint]:
         elif kind == "CHANNELS" and here is not None and here >= 0:
             joints[here].channels += _take_channels(words, joints[here])
         else:
-            raise words.error(f"{shown(word)} where ROOT, JOINT, End Site, OFFSET, CHANNELS or a brace was expected")
+            raise words.error(f"{quoted(word)} where ROOT, JOINT, End Site, OFFSET, CHANNELS or a brace was expected")
     if open_blocks or not joints:
         missing = f"{len(open_blocks)} '}}' missing" if open_blocks else "no ROOT"
         raise FormatError(f"the hierarchy is not whole: {missing}", path=path, line=len(lines))
     names: set[str] = set()
     for joint in joints:
         if joint.name in names:
-            raise FormatError(f"a second joint named {shown(joint.name)}", path=path, line=joint.line)
+            raise FormatError(f"a second joint named {quoted(joint.name)}", path=path, line=joint.line)
         names.add(joint.name)
     return joints
 
@@ -147,13 +147,13 @@ def _open_joint(kind: str, words: _Words, joints: list[BvhJoint], open_blocks: l
 def _take_channels(words: _Words, joint: BvhJoint) -> list[str]:
     count = words.take("the number of channels")
     if not re.fullmatch(r"[0-9]{1,3}", count):
-        raise words.error(f"{shown(count)} where the number of channels of {shown(joint.name)} was expected")
+        raise words.error(f"{quoted(count)} where the number of channels of {quoted(joint.name)} was expected")
     channels = list(joint.channels)
     for _ in range(int(count)):
         channel = words.take("a channel").upper()
         if not _CHANNEL.fullmatch(channel):
-            raise words.error(f"{shown(channel)} is no channel; they are called Xposition, Zrotation and so on")
+            raise words.error(f"{quoted(channel)} is no channel; they are called Xposition, Zrotation and so on")
         if channel.endswith("POSITION") and channel in channels:
-            raise words.error(f"joint {shown(joint.name)} has the channel {channel} twice")
+            raise words.error(f"joint {quoted(joint.name)} has the channel {channel} twice")
         channels.append(channel)
     return channels[len(joint.channels) :]

@@ -15,7 +15,7 @@ import numpy as np
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, listed, meant, shown
+from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import LARGEST, MOST_JOINTS
 from motionmind.geometry import rotations as rot
@@ -63,7 +63,7 @@ def kind_of(data: bytes, path: FilePath) -> str:
     """POSTURE or MOTION; FormatError if `data` is neither, or of a version that this code does not know."""
     header = decode(data, Header, path)
     if header.format not in (POSTURE, MOTION):
-        found = f"format {shown(header.format)} is unknown" if header.format else "there is no field format"
+        found = f"format {quoted(header.format)} is unknown" if header.format else "there is no field format"
         raise FormatError(f"{found}; it must be {POSTURE!r} or {MOTION!r}", path=path)
     if header.version != VERSION:
         found = f"version {header.version}" if header.version else "no version"
@@ -113,7 +113,7 @@ def _in_words(message: str, schema: type) -> str:
     unknown = re.fullmatch(r"Object contains unknown field (.*)", problem)
     if unknown:
         known = msgspec.structs.fields(schema) if not where else ()
-        problem = f"unknown field {shown(unknown[1])}{meant(unknown[1], [field.name for field in known])}"
+        problem = f"unknown field {quoted(unknown[1])}{did_you_mean(unknown[1], [field.name for field in known])}"
     problem = re.sub(r"^Object missing required field (.*)", r"there is no field \1", problem)
     problem = re.sub(r"\barray\b", "list", problem[0].lower() + problem[1:])
     return f"{where}: {problem}" if where else problem
@@ -128,7 +128,7 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
         if schema not in BODIES:
             ours = " and ".join(BODIES)
             raise FormatError(
-                f"skeleton {shown(schema)} has no description here; only {ours} go by their names alone", path=path
+                f"skeleton {quoted(schema)} has no description here; only {ours} go by their names alone", path=path
             )
         return BODIES[schema]()
     if len(schema.joints) > MOST_JOINTS:
@@ -138,8 +138,8 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
     for joint in schema.joints:
         if joint.parent is not None and joint.parent not in index:
             raise FormatError(
-                f"skeleton {shown(schema.name)}: the parent {shown(joint.parent)} of {shown(joint.name)} "
-                f"does not stand before it{meant(joint.parent, index)}",
+                f"skeleton {quoted(schema.name)}: the parent {quoted(joint.parent)} of {quoted(joint.name)} "
+                f"does not stand before it{did_you_mean(joint.parent, index)}",
                 path=path,
             )
         parents.append(-1 if joint.parent is None else index[joint.parent])
@@ -147,7 +147,7 @@ def to_skeleton(schema: str | SkeletonSchema, path: FilePath) -> Skeleton:
     offsets = np.array([joint.offset for joint in schema.joints], dtype=np.float64).reshape(-1, 3)
     tips = np.array([joint.tip or (0.0, 0.0, 0.0) for joint in schema.joints], dtype=np.float64).reshape(-1, 3)
     if not (np.all(np.abs(offsets) <= LARGEST) and np.all(np.abs(tips) <= LARGEST)):
-        raise FormatError(f"skeleton {shown(schema.name)} has an offset beyond {LARGEST:g} m", path=path)
+        raise FormatError(f"skeleton {quoted(schema.name)} has an offset beyond {LARGEST:g} m", path=path)
     try:
         return Skeleton(schema.name, tuple(joint.name for joint in schema.joints), tuple(parents), offsets, tips)
     except SkeletonError as error:
@@ -231,11 +231,12 @@ def check_joints(found: Sequence[str], skeleton: Skeleton, path: FilePath) -> No
     unknown = [name for name in found if name not in skeleton.names]
     if unknown:
         raise FormatError(
-            f"rotations: {skeleton.name} has no joint {shown(unknown[0])}{meant(unknown[0], skeleton.names)}", path=path
+            f"rotations: {skeleton.name} has no joint {quoted(unknown[0])}{did_you_mean(unknown[0], skeleton.names)}",
+            path=path,
         )
     missing = [name for name in skeleton.names if name not in set(found)]
     if missing:
         raise FormatError(
-            f"rotations: no {listed(missing)}; every joint of {skeleton.name} needs one (at rest it is 0, 0, 0, 1)",
+            f"rotations: no {enumerated(missing)}; every joint of {skeleton.name} needs one (at rest it is 0, 0, 0, 1)",
             path=path,
         )

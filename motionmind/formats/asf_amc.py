@@ -23,7 +23,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, listed, meant, shown
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats._asf import Acclaim, fixed_axes, read_asf
 from motionmind.formats.text import read_lines, to_numbers
@@ -74,7 +74,7 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
             for axis, channel in enumerate(("TX", "TY", "TZ")):
                 root[:, axis] += series.get(channel, 0.0)
     if left_out:
-        message = f"{path}: changes of the length or place of {listed(left_out)} are left out"
+        message = f"{path}: changes of the length or place of {enumerated(left_out)} are left out"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     return Motion(skeleton, rotations, root * acclaim.scale, (numbers - numbers[0]) / fps, name=Path(path).stem)
 
@@ -92,7 +92,7 @@ def _find_asf(path: FilePath) -> Path:
                 return file
     if len(found) == 1:
         return found[0]
-    there = f"there are {listed(file.name for file in found)}" if found else "there is none"
+    there = f"there are {enumerated(file.name for file in found)}" if found else "there is none"
     raise FormatError(f"its skeleton, an .asf file, was not found in {folder} ({there}): name it", path=path)
 
 
@@ -134,7 +134,9 @@ def _read_frames(lines: list[str], acclaim: Acclaim, path: FilePath) -> tuple[Fl
 
 def _frame_number(word: str, before: list[int], path: FilePath, line: int) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", word):
-        raise FormatError(f"{shown(word)} where a bone's values or a frame's number was expected", path=path, line=line)
+        raise FormatError(
+            f"{quoted(word)} where a bone's values or a frame's number was expected", path=path, line=line
+        )
     number = int(word)
     if before and number <= before[-1]:
         raise FormatError(f"frame {number} after frame {before[-1]}", path=path, line=line)
@@ -150,7 +152,7 @@ def _place_of(
         if name in acclaim.bones:
             fault = f"bone {name!r} has values here, but no dof in {acclaim.path}"
         else:
-            fault = f"there is no bone {shown(name)} in {acclaim.path}{meant(name, acclaim.bones)}"
+            fault = f"there is no bone {quoted(name)} in {acclaim.path}{did_you_mean(name, acclaim.bones)}"
         raise FormatError(fault, path=path, line=line)
     place = places[name]
     channels = acclaim.bones[name].channels
@@ -165,5 +167,7 @@ def _place_of(
 def _check_whole(missing: set[str], numbers: list[int], path: FilePath, line: int) -> None:
     if missing:
         raise FormatError(
-            f"frame {numbers[-1]} ends without {listed(sorted(missing))}: is the file cut short?", path=path, line=line
+            f"frame {numbers[-1]} ends without {enumerated(sorted(missing))}: is the file cut short?",
+            path=path,
+            line=line,
         )

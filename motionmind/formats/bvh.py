@@ -19,10 +19,10 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, shown
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
-from motionmind.formats._bvh_places import NormalisedRig, Placed, normalise
+from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
 from motionmind.formats._clock import even_step
 from motionmind.formats.text import LARGEST, read_lines, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
@@ -122,7 +122,7 @@ def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[i
         elif match := _FRAMES.fullmatch(line):
             if not re.fullmatch(r"[0-9]{1,18}", match[1]):
                 raise FormatError(
-                    f"{shown(match[1])} where the number of frames was expected", path=path, line=index + 1
+                    f"{quoted(match[1])} where the number of frames was expected", path=path, line=index + 1
                 )
             declared = int(match[1])
         else:
@@ -231,7 +231,7 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
 def _check_names(skeleton: Skeleton) -> None:
     for name in skeleton.names:
         if name != " ".join(name.split()) or not name or set("{}") & set(name) or is_comment(name):
-            raise MotionMindError(f"{skeleton.name}: {shown(name)} is no joint name that BVH can hold")
+            raise MotionMindError(f"{skeleton.name}: {quoted(name)} is no joint name that BVH can hold")
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import listed
+from motionmind.errors import enumerated
 from motionmind.files import FilePath
 
 _TINY = 1e-6  # seconds and metres
@@ -44,7 +44,7 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         found.append(f"the marks of frames that the engine made ({made})")
     bridged = [motion.skeleton.names[joint] for joint in np.flatnonzero(motion.bridged().any(axis=0))]
     if bridged:
-        found.append(f"the marks of joints that it bridged ({listed(bridged)})")
+        found.append(f"the marks of joints that it bridged ({enumerated(bridged)})")
     return found
 
 
@@ -59,13 +59,13 @@ def _body(motion: Motion, suffix: str) -> list[str]:
 
             known += smpl_bodies().values()
             missing = joints_without_place(motion)
-            found = [f"the turns of joints that SMPL does not have ({listed(missing)})"] if missing else []
+            found = [f"the turns of joints that SMPL does not have ({enumerated(missing)})"] if missing else []
         if not any(_same_places(body, skeleton) for body in known):
             found.insert(0, "the body's proportions")
     elif suffix == ".bvh":
         inner = [joint for joint in set(skeleton.parents[1:]) if skeleton.tips[joint].any()]
         ends = [skeleton.names[joint] for joint in sorted(inner)]
-        found = [f"the far ends of joints on which others hang ({listed(ends)})"] if ends else []
+        found = [f"the far ends of joints on which others hang ({enumerated(ends)})"] if ends else []
     return found
 
 

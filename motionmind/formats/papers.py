@@ -31,7 +31,7 @@ from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, listed, meant, shown
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats.text import read_lines, to_numbers
 from motionmind.geometry import rotations as rot
@@ -107,7 +107,9 @@ def _written(name: str, skeleton: Skeleton, form: str) -> str:
     plain = " ".join(words)
     clash = sum(_key(other) == _key(name) for other in skeleton.names) > 1
     if not words or set(plain) & set("{};,#") or any(_NUMBER.match(word) for word in words) or clash:
-        raise MotionMindError(f"{skeleton.name}: the papers' notation has no way to write the joint name {shown(name)}")
+        raise MotionMindError(
+            f"{skeleton.name}: the papers' notation has no way to write the joint name {quoted(name)}"
+        )
     return plain if form == "braces" else "_".join(words)
 
 
@@ -138,7 +140,7 @@ def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
                     yield entries
                     opened = 0
             elif piece in ("{", "}", ";") or (piece.strip() and not opened):
-                raise FormatError(f"{shown(piece.strip())} may not stand here", path=path, line=number)
+                raise FormatError(f"{quoted(piece.strip())} may not stand here", path=path, line=number)
             else:
                 start = start if text.strip() else number
                 text += piece + " "
@@ -155,7 +157,7 @@ def _split_lines(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
         for word in line.replace(",", " ").split():
             if _NUMBER.match(word):
                 if not name:
-                    raise FormatError(f"{shown(word)} where a joint's name was expected", path=path, line=number)
+                    raise FormatError(f"{quoted(word)} where a joint's name was expected", path=path, line=number)
                 numbers.append(word)
                 continue
             if numbers:
@@ -186,12 +188,12 @@ def _rotations(postures: list[list[_Entry]], skeleton: Skeleton, path: FilePath)
             joint = find(name)
             fault = ""
             if joint is None:
-                fault = f"{skeleton.name} has no joint {shown(name)}{meant(_key(name), skeleton.names)}"
+                fault = f"{skeleton.name} has no joint {quoted(name)}{did_you_mean(_key(name), skeleton.names)}"
             elif joint in row:
-                fault = f"{shown(name)} for the second time in posture {frame}"
+                fault = f"{quoted(name)} for the second time in posture {frame}"
             elif len(words) != 4:
                 fault = (
-                    f"{len(words)} numbers for {shown(name)}, where the four of a quaternion x, y, z, w were expected"
+                    f"{len(words)} numbers for {quoted(name)}, where the four of a quaternion x, y, z, w were expected"
                 )
             if joint is None or fault:
                 raise FormatError(fault, path=path, line=line)
@@ -206,7 +208,7 @@ def _rotations(postures: list[list[_Entry]], skeleton: Skeleton, path: FilePath)
         rotations[frame, list(row)] = list(row.values())
     unnamed = [name for joint, name in enumerate(skeleton.names) if joint not in first]
     if unnamed:
-        warnings.warn(f"{path}: {listed(unnamed)} are not named and stand at rest", MotionMindWarning, stacklevel=3)
+        warnings.warn(f"{path}: {enumerated(unnamed)} are not named and stand at rest", MotionMindWarning, stacklevel=3)
     return _unit(rotations, lines, skeleton, path)
 
 

@@ -6,7 +6,7 @@ import codecs
 import math
 from collections.abc import Sequence
 
-from motionmind.errors import FormatError, shown
+from motionmind.errors import FormatError, quoted
 from motionmind.files import FilePath, read_bytes
 
 # No length in any unit and no angle of a body comes near this; below it no sum or product can overflow.
@@ -38,7 +38,7 @@ def to_number(token: str, path: FilePath, line: int) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:  # false for NaN too
-        raise FormatError(f"{shown(token)} where a number was expected", path=path, line=line)
+        raise FormatError(f"{quoted(token)} where a number was expected", path=path, line=line)
     return value
 
 

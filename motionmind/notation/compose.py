@@ -10,7 +10,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.motion import Motion, Posture
-from motionmind.errors import FormatError, listed, meant
+from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
 from motionmind.notation import rows as phrases
@@ -34,10 +34,10 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
     names = [found.name for found in score.clips]
     if clip is None and len(names) != 1:
         raise FormatError(
-            f"holds {len(names) or 'no'} clips" + f"; choose one: {listed(names, 60)}" * bool(names), path=path
+            f"holds {len(names) or 'no'} clips" + f"; choose one: {enumerated(names, 60)}" * bool(names), path=path
         )
     if clip is not None and clip not in names:
-        hint = meant(clip, names) or f"; there are {listed(names, 60)}"
+        hint = did_you_mean(clip, names) or f"; there are {enumerated(names, 60)}"
         raise FormatError(f"no clip {clip!r}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
@@ -67,7 +67,7 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
 def posture(score: Score, name: str) -> Posture:
     """A posture that a score names."""
     if name not in score.postures:
-        hint = meant(name, score.postures) or f"; there are {listed(score.postures, 60) or 'none'}"
+        hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
         raise FormatError(f"no posture {name!r}{hint}", path=score.path)
     row = phrases.posture(score, score.postures[name])
     return _travel(score.body, name, [row], _pose(score.body, [row])).posture(0)

@@ -10,7 +10,7 @@ from unicodedata import normalize
 
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import HEADINGS, anatomy_named, read_body
-from motionmind.errors import FormatError, listed, meant
+from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.formats.text import read_lines
 from motionmind.notation.score import (
@@ -136,7 +136,9 @@ def _heading(score: Score, head: Line, inner: list[Line]) -> None:
     if word not in HEADINGS:
         layers = tuple(score.body.layers)
         known = HEADINGS + layers
-        raise where.error(f"{word!r} is no heading{meant(word, known) or f'; there are {listed(known, 20)}'}")
+        raise where.error(
+            f"{word!r} is no heading{did_you_mean(word, known) or f'; there are {enumerated(known, 20)}'}"
+        )
     if inner and word not in ("phrase", "clip"):
         raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
     if word == "title":
@@ -262,7 +264,7 @@ def _setting(score: Score, layer: str, words: list[str], where: Where) -> Settin
     if not set(parts) <= set(joints):
         if NUMBER.fullmatch(words[-1]):
             known = [*joints, *score.body.groups, *KINDS, *STANDING]
-            raise where.error(f"{first!r} is no joint of the {layer}{meant(first, known)}")
+            raise where.error(f"{first!r} is no joint of the {layer}{did_you_mean(first, known)}")
         return None
     setting: dict[object, float] = {}
     for name, value in _pairs(words[1:], where):
@@ -271,7 +273,7 @@ def _setting(score: Score, layer: str, words: list[str], where: Where) -> Settin
             names = {key: (key, 1.0) for key in angles}
             names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
             if name not in names:
-                hint = meant(name, names) or f"; it has {', '.join(names)}"
+                hint = did_you_mean(name, names) or f"; it has {', '.join(names)}"
                 raise where.error(f"{name!r} is no angle of the {first}{hint}")
             key, sign = names[name]
             setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
@@ -290,7 +292,7 @@ def _standing(words: list[str], where: Where) -> dict[object, float]:
             raise where.error(f"lean {direction}: lean ahead, back, left or right, and how many centimetres")
         known = (*STANDING, "lean")
         if word not in known:
-            hint = meant(word, known) or f"; there are {', '.join(known)}"
+            hint = did_you_mean(word, known) or f"; there are {', '.join(known)}"
             raise where.error(f"{word!r} means nothing of a leg that stands{hint}")
         value = number(next(rest, ""), f"{word} {direction}".strip(), where)
         least, most = STANDING.get(word, (-200.0, 200.0))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from motionmind.body.anatomy import SIDES, Anatomy
-from motionmind.errors import FormatError, meant
+from motionmind.errors import FormatError, did_you_mean
 
 Setting = Mapping[object, float]
 
@@ -190,7 +190,7 @@ class Score:
             return NOTHING
         if name not in known:
             elsewhere = [other for other, names in home.positions.items() if name in names]
-            hint = meant(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
+            hint = did_you_mean(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
             raise where.error(f"{word!r} is no position of the {layer}{hint}")
         return known[name]
 
@@ -199,12 +199,12 @@ class Score:
         prefix, dot, name = word.rpartition(".")
         home = self._included(prefix, where) if dot else self
         if name not in home.phrases:
-            raise where.error(f"{word!r} is no phrase{meant(name, home.phrases)}")
+            raise where.error(f"{word!r} is no phrase{did_you_mean(name, home.phrases)}")
         return home.phrases[name]
 
     def _included(self, prefix: str, where: Where) -> Score:
         if prefix not in self.included:
-            raise where.error(f"{prefix!r} is no score that is included{meant(prefix, self.included)}")
+            raise where.error(f"{prefix!r} is no score that is included{did_you_mean(prefix, self.included)}")
         return self.included[prefix]
 
     def facing(self, word: str, where: Where) -> float:
@@ -212,7 +212,9 @@ class Score:
         if NUMBER.fullmatch(word):
             return number(word, "face", where)
         if word not in self.facings:
-            raise where.error(f"{word!r} is no facing{meant(word, self.facings)}; give one of the facings, or degrees")
+            raise where.error(
+                f"{word!r} is no facing{did_you_mean(word, self.facings)}; give one of the facings, or degrees"
+            )
         return self.facings[word]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import listed
+from motionmind.errors import enumerated
 from motionmind.formats.units import bone_span
 from motionmind.geometry import rotations as rot
 
@@ -78,7 +78,7 @@ class NormalisedRig:
         yield from self.notes
         if self.strays:
             far = [f"{name} (by up to {1000.0 * scale * stray:.1f} mm)" for name, stray in self.strays]
-            yield f"joints that move against their parents are kept at their mean place: {listed(far)}"
+            yield f"joints that move against their parents are kept at their mean place: {enumerated(far)}"
 
 
 def normalise(body: Placed) -> NormalisedRig:
@@ -170,8 +170,8 @@ def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
     name = old.names[top]
     aside = [old.names[joint] for joint in range(len(old)) if joint not in new and joint not in above]
     if aside:
-        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {listed(aside)}")
+        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {enumerated(aside)}")
     walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL * span]
     if walking:
-        notes.append(f"{name} is taken as the root, at its own place; the path of {listed(walking)} itself is lost")
+        notes.append(f"{name} is taken as the root, at its own place; the path of {enumerated(walking)} itself is lost")
     return Placed(skeleton, rotations, {**{new[j]: p for j, p in body.places.items() if j in new}, 0: root})
