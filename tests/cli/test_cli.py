@@ -436,7 +436,7 @@ BAD = [
     (f"{BUILD} --tolerance left_hop=5", r"no joint 'left_hop'.*; did you mean left_hip\?"),
     (f"{BUILD} --discretize nobody", r"no library 'nobody'; bundled are ballet, human23"),
     (f"{BUILD} --discretize broken.toml", r"broken\.toml: not TOML"),
-    (f"{BUILD} --joints broken.toml", r"broken\.toml: no mapping of joints"),
+    (f"{BUILD} --joints broken.toml", r"broken\.toml: not a joint mapping"),
     (f"{BUILD} --unit parsec", r"unit 'parsec' is unknown; give one of cm, m"),
     (f"{BUILD} --flip-angle nan", r"'--flip-angle': nan is not a finite number"),
     (f"{BUILD} --home A.json/home", r"cannot be written"),
