@@ -1,4 +1,4 @@
-"""Whole files in and out: one clear error line when a file cannot be read, and never a half-written one."""
+"""Reading and writing whole files: one clear error if a file cannot be read, and never a half-written file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FilePath = str | os.PathLike[str]
 
 
 def read_bytes(path: FilePath) -> bytes:
-    """All bytes of the file at `path`; FormatError where there is none, or it may not be read."""
+    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read."""
     try:
         return Path(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
@@ -21,11 +21,14 @@ def read_bytes(path: FilePath) -> bytes:
 
 
 def write_atomically(path: FilePath, data: bytes) -> None:
-    """Put `data` at `path` so that whoever reads it finds the old file or the new one, whole.
+    """Write `data` to `path` atomically: a reader finds either the old file or the new one, never a part.
 
-    The bytes go to a temporary name in the same folder, are flushed to the disk, and are moved into place. A link
-    is followed; the permissions of a file that is replaced are kept. What is no ordinary file (a pipe,
-    `/dev/stdout`) is written to as it is. MotionMindError where writing fails; the temporary file is gone then.
+    The bytes go to a temporary file in the same folder, are flushed to disk, and are moved into place. Links are
+    followed, and the permissions of a replaced file are kept. Anything but a regular file (a pipe, `/dev/stdout`) is
+    written to directly.
+
+    Raises:
+        MotionMindError: writing failed; the temporary file is removed.
     """
     try:
         given = Path(path)
@@ -44,7 +47,7 @@ def write_atomically(path: FilePath, data: bytes) -> None:
 def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
     temporary = target.with_name(f".motionmind-{os.urandom(8).hex()}.tmp")
     try:
-        # Opened here, not by tempfile, whose files are private to their owner whatever the umask says.
+        # Not tempfile: it makes files private to their owner, whatever the umask.
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)

@@ -13,7 +13,7 @@ import numpy as np
 from motionmind.body.anatomy import SIDES, Anatomy, Joint, Leg
 from motionmind.body.human import BODIES
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, meant
+from motionmind.errors import FormatError, did_you_mean
 from motionmind.files import FilePath, read_bytes
 
 FORMAT, VERSION = "motionmind-body", 1
@@ -49,7 +49,7 @@ def anatomy_named(name: str) -> Anatomy:
 def _bundled(name: object, path: FilePath | None = None) -> Path:
     known = sorted(file.stem for file in _BODIES.glob("*.toml"))
     if name not in known:
-        hint = meant(str(name), known) or f"; there are {', '.join(known)}, or a .toml file"
+        hint = did_you_mean(str(name), known) or f"; there are {', '.join(known)}, or a .toml file"
         raise FormatError(f"no body {name!r}{hint}", path=path)
     return _BODIES / f"{name}.toml"
 
@@ -95,7 +95,7 @@ def _shares(read: _File, group: str, path: FilePath) -> dict[str, dict[str, floa
     out = {}
     for name, share in read.groups[group].items():
         if name not in read.joints:
-            raise FormatError(f"[groups] {group}: no joint {name!r}{meant(name, read.joints)}", path=path)
+            raise FormatError(f"[groups] {group}: no joint {name!r}{did_you_mean(name, read.joints)}", path=path)
         angles = read.joints[name].angles
         out[name] = share if isinstance(share, dict) else dict.fromkeys(angles, share)
         if set(out[name]) != set(angles):
@@ -147,7 +147,7 @@ def _check(body: Anatomy, path: FilePath) -> None:
             raise FormatError(f"{layer!r} cannot be a layer: it is a heading of scores", path=path)
         strangers = [joint for joint in joints if joint not in body.joints]
         if strangers or not joints:
-            what = f"{strangers[0]!r}{meant(strangers[0], body.joints)}" if strangers else "nothing"
+            what = f"{strangers[0]!r}{did_you_mean(strangers[0], body.joints)}" if strangers else "nothing"
             raise FormatError(f"[layers] {layer}: {what} is no joint", path=path)
         if len({body.paired(joint) for joint in joints}) > 1:
             raise FormatError(f"[layers] {layer}: pairs and single joints move in layers of their own", path=path)
@@ -158,7 +158,7 @@ def _check(body: Anatomy, path: FilePath) -> None:
     if body.leg is not None:
         for joint in (body.leg.hip, body.leg.knee, body.leg.ankle, body.leg.toes):
             if joint not in body.joints or not body.paired(joint):
-                raise FormatError(f"[leg]: {joint!r} is no pair of joints{meant(joint, body.joints)}", path=path)
+                raise FormatError(f"[leg]: {joint!r} is no pair of joints{did_you_mean(joint, body.joints)}", path=path)
         if not any(anatomy.mass for anatomy in body.joints.values()):
             raise FormatError("[leg]: a body that stands needs the mass of its joints' segments", path=path)
 
@@ -166,7 +166,7 @@ def _check(body: Anatomy, path: FilePath) -> None:
 def _check_joint(body: Anatomy, joint: str, anatomy: Joint, path: FilePath) -> None:
     stems, where = _stems(body.skeleton), f"[joints.{joint}]"
     if joint not in stems:
-        raise FormatError(f"{where}: no such joint{meant(joint, stems)}", path=path)
+        raise FormatError(f"{where}: no such joint{did_you_mean(joint, stems)}", path=path)
     if anatomy.long not in ("x", "y", "z"):
         raise FormatError(f"{where}: long must be x, y or z, not {anatomy.long!r}", path=path)
     for name, angle in anatomy.angles.items():

@@ -84,11 +84,13 @@ def frames_of(clip: Path | str, length: int, start: int, end: int) -> range:
 
 
 def _chosen(source: Path, names: Sequence[str], wanted: Sequence[str]) -> Sequence[str]:
-    from motionmind.errors import listed, meant
+    from motionmind.errors import did_you_mean, enumerated
 
     if not names:
         raise MotionMindError(f"{source}: holds no clips")
     for name in wanted:
         if name not in names:
-            raise MotionMindError(f"{source}: no clip {name!r}{meant(name, names)}; there are {listed(names, 60)}")
+            raise MotionMindError(
+                f"{source}: no clip {name!r}{did_you_mean(name, names)}; there are {enumerated(names, 60)}"
+            )
     return list(dict.fromkeys(wanted)) or names

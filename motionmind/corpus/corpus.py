@@ -231,7 +231,7 @@ class Corpus:
         postures, between = self.motion(clip), self.detail.shape[1]
         if between == 0 or len(clip) == 1:
             return postures
-        times = subdivided(postures.times, between)
+        times = subdivide_times(postures.times, between)
         detail = np.zeros((len(times), len(self.skeleton), 3))
         detail[np.arange(len(times)) % (between + 1) > 0] = self.detail[clip.start : clip.stop - 1].reshape(
             -1, len(self.skeleton), 3
@@ -242,7 +242,7 @@ class Corpus:
         return Motion(self.skeleton, rotations, root, times, clip.name)
 
 
-def subdivided(times: Floats, between: int) -> Floats:
+def subdivide_times(times: Floats, between: int) -> Floats:
     """Times [N] with so many more between each and the next, even in time [(N - 1) (between + 1) + 1]."""
     share = np.arange(between + 1) / (between + 1)
     return np.append((times[:-1, None] + share * np.diff(times)[:, None]).ravel(), times[-1])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, JointFlip, subdivided
+from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, JointFlip, subdivide_times
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
@@ -224,7 +224,7 @@ def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.f
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
     if between > 0 and count > 1 and recording.fps >= _COARSE:
-        times = subdivided(postures.times, between)
+        times = subdivide_times(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
         detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]

@@ -32,7 +32,7 @@ from motionmind.body.human import BODIES
 from motionmind.corpus.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
-from motionmind.errors import FormatError, meant
+from motionmind.errors import FormatError, did_you_mean
 from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.geometry import rotations as rot
 
@@ -88,7 +88,7 @@ class Library:
         for table in self.tables:
             joints = joints_meant(table, names)
             if not joints:
-                hint = meant(table, nameable(names)) or f"; there are {', '.join(names)}"
+                hint = did_you_mean(table, nameable(names)) or f"; there are {', '.join(names)}"
                 raise FormatError(f"[{table}]: no such joint{hint}", path=self.path)
             for j in joints:
                 if j in owner:

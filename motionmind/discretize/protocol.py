@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.discretize.states import StateSpace, checked_rotations
-from motionmind.errors import MotionMindError, SkeletonError, meant
+from motionmind.errors import MotionMindError, SkeletonError, did_you_mean
 
 SIDES = ("left_", "right_")
 
@@ -63,7 +63,7 @@ def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str,
         for name, own in per_joint.items():
             joints = joints_meant(name, names)
             if not joints:
-                hint = meant(name, nameable(names)) or f"; there are {', '.join(names)}"
+                hint = did_you_mean(name, nameable(names)) or f"; there are {', '.join(names)}"
                 raise SkeletonError(f"no joint {name!r} to set a value for{hint}")
             if (name in names) is exact:
                 values[joints] = own

@@ -11,7 +11,7 @@ from motionmind.discretize.expert import ExpertLibrary
 from motionmind.discretize.grids import EulerGrid, QuaternionGrid
 from motionmind.discretize.library import library_from_mapping, read_library
 from motionmind.discretize.protocol import Discretization
-from motionmind.errors import FormatError, MotionMindError, meant
+from motionmind.errors import FormatError, MotionMindError, did_you_mean
 
 KINDS = ("codebook", "quaternion", "euler")
 
@@ -48,7 +48,7 @@ def make(kind: str, tolerance: float = 15.0, per_joint: Mapping[str, float] | No
     except FormatError as error:
         if kind.endswith(".toml"):
             raise
-        hint = meant(kind, KINDS) or f"; the kinds without a library are {', '.join(KINDS)}"
+        hint = did_you_mean(kind, KINDS) or f"; the kinds without a library are {', '.join(KINDS)}"
         raise FormatError(f"{error}{hint}") from None
 
 

@@ -1,15 +1,15 @@
-"""Files in and out. `read_motion` and `read_posture` know the format by the name's suffix, as do the writers.
+"""File formats, one module each. Readers and writers choose the format by the file name's suffix.
 
 | suffix | read | written |
 |---|---|---|
 | `.json` | posture or motion | posture or motion |
 | `.bvh` | motion | motion, posture as one frame |
 | `.amc` | motion, with the `.asf` beside it | |
-| `.npz` | motion on SMPL's joints, as AMASS keeps it | motion of people, posture as one frame |
+| `.npz` | motion on SMPL's joints (AMASS) | motion of people, posture as one frame |
 | `.txt` | the notation of the papers | the notation of the papers |
 | `.glb` | | motion, posture without animation |
 
-What a format has no place for, `lossy_fields` says.
+`lossy_fields` names what a format cannot hold.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from motionmind.formats.lossy import lossy_fields
 
 __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
-_READ = (".json", ".bvh", ".amc", ".txt", ".npz")
-_WRITTEN = (".json", ".bvh", ".txt", ".glb", ".npz")
+_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz")
+_WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz")
 
 
 def read_motion(
@@ -36,21 +36,24 @@ def read_motion(
     fps: float | None = None,
     skeleton: Skeleton | None = None,
 ) -> Motion:
-    """Movement from a file of any format that is known; a posture is a motion of one frame at time 0.
+    """Read a motion from a file of any readable format; a posture becomes a motion of one frame at time 0.
 
     Args:
-        path: the file; its suffix tells the format.
-        unit: BVH's unit of length (`read_bvh`); None tells it from the skeleton. Other formats know their own.
+        path: the file; its suffix determines the format.
+        unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
-        fps: frames a second of formats that do not say: AMC (default 120), the papers' notation (default 1), `.npz`
-            that lacks them (no default).
-        skeleton: the body of the papers' notation, which names joints only; None tells it from their names.
+        fps: frames per second where the file does not record them: AMC (default 120), the papers' notation
+            (default 1), `.npz` without a rate (no default).
+        skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
+
+    Returns:
+        The motion, in metres and seconds, on the file's own skeleton.
 
     Raises:
-        FormatError: the suffix is unknown, or the file is not there, or is not what its suffix says.
+        FormatError: the suffix is unknown, the file does not exist, or its content does not match its suffix.
     """
-    suffix = _suffix(path, _READ, "read")
-    # The formats are imported here, so that a program pays for those that it meets.
+    suffix = _suffix(path, _READABLE, "read")
+    # Formats are imported here, so a program loads only those it uses.
     if suffix == ".bvh":
         from motionmind.formats.bvh import read_bvh
 
@@ -88,18 +91,26 @@ def read_posture(
     asf: FilePath | None = None,
     skeleton: Skeleton | None = None,
 ) -> Posture:
-    """One posture from a file of any format that is known; arguments as for `read_motion`.
+    """Read one posture from a file of any readable format.
 
-    A file with several frames needs `frame`, counted from 0, or from the end if negative.
+    Args:
+        path: the file; its suffix determines the format.
+        frame: which frame, counted from 0, or from the end if negative; None if the file has only one.
+        unit: as for `read_motion`.
+        asf: as for `read_motion`.
+        skeleton: as for `read_motion`.
+
+    Returns:
+        The posture, in metres, on the file's own skeleton.
 
     Raises:
-        FormatError: as `read_motion`; or there are several frames and none is chosen.
+        FormatError: as `read_motion`; or the file has several frames and `frame` is None.
         MotionMindError: there is no such frame.
     """
     motion = read_motion(path, unit=unit, asf=asf, skeleton=skeleton)
     if frame is None and len(motion) > 1:
         raise FormatError(
-            f"{len(motion)} frames, where one posture was expected; say which frame (motionmind posture takes one out)",
+            f"{len(motion)} frames, where one posture was expected; say which frame (motionmind posture extracts one)",
             path=path,
         )
     return motion.posture(frame or 0)
@@ -108,10 +119,15 @@ def read_posture(
 def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") -> None:
     """Write `motion` in the format of the suffix.
 
-    That is `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body), or `.npz` (AMASS). `unit` is
-    BVH's unit of length (`write_bvh`); other formats have their own.
+    Args:
+        path: the file: `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body) or `.npz` (AMASS).
+        motion: the movement to write.
+        unit: BVH's unit of length (`write_bvh`); other formats define their own.
+
+    Raises:
+        MotionMindError: the suffix is unknown, the format cannot hold this motion, or the file cannot be written.
     """
-    suffix = _suffix(path, _WRITTEN, "written")
+    suffix = _suffix(path, _WRITABLE, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
 
@@ -135,8 +151,12 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
 
 
 def write_posture(path: FilePath, posture: Posture) -> None:
-    """Write `posture` in the format of the suffix; as a motion of one frame where the format has no postures."""
-    if _suffix(path, _WRITTEN, "written") == ".json":
+    """Write `posture` in the format of the suffix; as a motion of one frame if the format has no postures.
+
+    Raises:
+        MotionMindError: as `write_motion`.
+    """
+    if _suffix(path, _WRITABLE, "written") == ".json":
         from motionmind.formats.posture_json import write_posture_json
 
         write_posture_json(path, posture)
@@ -144,9 +164,10 @@ def write_posture(path: FilePath, posture: Posture) -> None:
         write_motion(path, posture.as_motion())
 
 
-def _suffix(path: FilePath, known: tuple[str, ...], done: str) -> str:
+def _suffix(path: FilePath, known: tuple[str, ...], verb: str) -> str:
+    """Return the lower-case suffix; an error if it is not `known` among those that can be "read" or "written"."""
     suffix = Path(path).suffix.lower()
     if suffix not in known:
-        message = f"suffix {suffix!r} is unknown; files that can be {done} end in {', '.join(known)}"
-        raise FormatError(message, path=path) if done == "read" else MotionMindError(f"{path}: {message}")
+        message = f"suffix {suffix!r} is unknown; files that can be {verb} end in {', '.join(known)}"
+        raise FormatError(message, path=path) if verb == "read" else MotionMindError(f"{path}: {message}")
     return suffix

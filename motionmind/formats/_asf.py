@@ -1,4 +1,4 @@
-"""Acclaim's skeleton file (ASF): bones, their frames and their channels; see `asf_amc` for what they mean."""
+"""Reads Acclaim's skeleton file (ASF): bones, their frames and their channels. `asf_amc` explains their meaning."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, listed, meant, shown
+from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import MOST_JOINTS, read_lines, to_number, to_numbers
 from motionmind.geometry import rotations as rot
@@ -22,29 +22,47 @@ _CHANNEL = re.compile(r"[TR][XYZ]|L")
 
 @dataclass
 class Bone:
-    """The root, or one bone of :bonedata; lengths in the file's unit, angles in radians."""
+    """The root, or one bone of :bonedata.
+
+    Attributes:
+        name: the bone's name; "root" for the root.
+        line: the line where it begins.
+        direction: unit vector from its start to its end [3]; 0 for none.
+        length: in the file's unit.
+        axis: quaternion of the frame in which its angles turn [4].
+        channels: "TX", "RX", ..., in the AMC's order.
+    """
 
     name: str
     line: int
     direction: Floats = field(default_factory=lambda: np.zeros(3))
     length: float = 0.0
     axis: Floats = field(default_factory=lambda: rot.IDENTITY)
-    channels: list[str] = field(default_factory=list)  # "TX", "RX", ..., in the order of the AMC
+    channels: list[str] = field(default_factory=list)
 
 
 @dataclass
 class Acclaim:
-    """What an ASF file says."""
+    """The contents of an ASF file.
+
+    Attributes:
+        path: the file.
+        bones: by name, the root first and parents before their children.
+        parents: each bone's parent, by name; the root has none.
+        position: place [3], in the file's unit, added to the root's movement.
+        scale: metres in one unit of the file.
+        degrees: whether its angles are in degrees.
+    """
 
     path: FilePath
-    bones: dict[str, Bone]  # the root first, parents before their children
+    bones: dict[str, Bone]
     parents: dict[str, str]
     position: Floats
-    scale: float  # metres in one unit
+    scale: float
     degrees: bool
 
     def skeleton(self) -> Skeleton:
-        """The bones as joints: each stands where its bone starts, which is where its parent's ends; metres."""
+        """Build the skeleton: a joint at each bone's start, which is its parent's end; metres."""
         index = {name: joint for joint, name in enumerate(self.bones)}
         parents = [index[self.parents[name]] if name in self.parents else -1 for name in self.bones]
         ends = np.array([bone.length * bone.direction for bone in self.bones.values()]) * self.scale
@@ -56,13 +74,13 @@ class Acclaim:
 
 
 def fixed_axes(order: str, angles: Floats) -> Floats:
-    """Rotation [..., 4] of turns by `angles` [..., len(order)] radians about fixed axes, the first letter's first."""
-    # Turns about fixed axes are turns about moving ones in reverse.
+    """Return rotations [..., 4] by `angles` [..., len(order)] radians about fixed axes, applied in the given order."""
+    # Extrinsic rotations are intrinsic rotations in reverse order.
     return rot.from_euler(order[::-1], angles[..., ::-1])
 
 
-def _words(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """The words of each line that has any; commas and parentheses are blanks, # begins a comment."""
+def _tokenise(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the number and words of each line with words; commas and parentheses are blanks, # begins a comment."""
     for number, line in enumerate(lines, start=1):
         words = re.sub(r"[(),]", " ", line.split("#")[0]).split()
         if words:
@@ -70,11 +88,11 @@ def _words(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
 
 
 def read_asf(path: FilePath) -> Acclaim:
-    """All that an ASF file says of its skeleton; FormatError names file and line of what it does not."""
+    """Read an ASF file's skeleton; FormatError names file and line of anything missing or invalid."""
     lines = read_lines(path)
     sections: dict[str, list[tuple[int, list[str]]]] = {}
     section: list[tuple[int, list[str]]] = []
-    for number, words in _words(lines):
+    for number, words in _tokenise(lines):
         if words[0].startswith(":"):
             name = words[0].lower()
             section = sections.setdefault(name, [])
@@ -82,7 +100,7 @@ def read_asf(path: FilePath) -> Acclaim:
             section.append((number, words))
     for wanted in (":root", ":bonedata", ":hierarchy"):
         if wanted not in sections:
-            raise FormatError(f"no whole ASF file: there is no section {wanted}", path=path, line=len(lines))
+            raise FormatError(f"incomplete ASF file: there is no section {wanted}", path=path, line=len(lines))
     units = {words[0].lower(): (number, words) for number, words in sections.get(":units", [])}
     degrees = units.get("angle", (0, ["", "deg"]))[1][-1].lower() != "rad"
     number, words = units.get("length", (0, ["", "1"]))
@@ -97,7 +115,7 @@ def read_asf(path: FilePath) -> Acclaim:
 
 
 def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> tuple[Bone, Floats]:
-    """The root, and the place that is added to its movement."""
+    """Read the root, and the place [3] added to its movement."""
     root = Bone("root", section[0][0] if section else 1)
     position, orientation, order = np.zeros(3), np.zeros(3), "XYZ"
     for number, (keyword, *words) in section:
@@ -116,6 +134,7 @@ def _read_root(section: list[tuple[int, list[str]]], degrees: bool, path: FilePa
 
 
 def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FilePath) -> Iterator[Bone]:
+    """Yield the bones of :bonedata, each from its begin to its end."""
     bone: Bone | None = None
     names = {"root"}
     for number, (keyword, *words) in section:
@@ -130,17 +149,17 @@ def _read_bones(section: list[tuple[int, list[str]]], degrees: bool, path: FileP
                     raise FormatError(fault, path=path, line=number if bone is None else bone.line)
                 names.add(bone.name)
                 if len(names) > MOST_JOINTS:
-                    raise FormatError(f"more than {MOST_JOINTS} bones are no body", path=path, line=number)
+                    raise FormatError(f"more than {MOST_JOINTS} bones: not a body", path=path, line=number)
                 yield bone
                 bone = None
             case _ if bone is not None:
                 _read_bone_line(bone, keyword.lower(), words, degrees=degrees, path=path, line=number)
     if bone is not None:
-        raise FormatError(f"bone {shown(bone.name)} has no end", path=path, line=bone.line)
+        raise FormatError(f"bone {quoted(bone.name)} has no end", path=path, line=bone.line)
 
 
 def _read_bone_line(bone: Bone, keyword: str, words: list[str], *, degrees: bool, path: FilePath, line: int) -> None:
-    """One line between begin and end; limits, masses and what else is there does not matter here."""
+    """Read one line between begin and end; limits, masses and the like are ignored."""
     if keyword == "name":
         bone.name = " ".join(words)
     elif keyword == "direction":
@@ -158,19 +177,22 @@ def _read_bone_line(bone: Bone, keyword: str, words: list[str], *, degrees: bool
 
 
 def _channels(words: list[str], path: FilePath, line: int) -> list[str]:
+    """Return the channels in upper case; FormatError if one is unknown or repeated."""
     channels = [word.upper() for word in words]
     for channel in channels:
         if not _CHANNEL.fullmatch(channel):
-            raise FormatError(f"{shown(channel)} is no channel; they are tx ty tz rx ry rz l", path=path, line=line)
+            message = f"{quoted(channel)} is not a channel; channels are tx ty tz rx ry rz l"
+            raise FormatError(message, path=path, line=line)
         if channels.count(channel) > 1:
             raise FormatError(f"the channel {channel} twice", path=path, line=line)
     return channels
 
 
 def _rotation_order(words: list[str], path: FilePath, line: int) -> str:
+    """Return an order of axes such as "XYZ", the default."""
     order = "".join(words).upper() or "XYZ"
     if sorted(order) != ["X", "Y", "Z"]:
-        raise FormatError(f"{shown(order)} where an order of axes such as XYZ was expected", path=path, line=line)
+        raise FormatError(f"{quoted(order)} where an order of axes such as XYZ was expected", path=path, line=line)
     return order
 
 
@@ -183,7 +205,7 @@ def _vector(words: list[str], path: FilePath, line: int) -> Floats:
 def _read_hierarchy(
     section: list[tuple[int, list[str]]], bones: dict[str, Bone], path: FilePath
 ) -> tuple[list[str], dict[str, str]]:
-    """Names of the bones, parents before their children, and each bone's parent."""
+    """Return the bones' names, parents before their children, and each bone's parent."""
     parents: dict[str, str] = {}
     children: dict[str, list[str]] = {name: [] for name in bones}
     for number, words in section:
@@ -191,10 +213,12 @@ def _read_hierarchy(
             continue
         unknown = next((word for word in words if word not in bones), None)
         if unknown is not None:
-            raise FormatError(f"there is no bone {shown(unknown)}{meant(unknown, bones)}", path=path, line=number)
+            raise FormatError(
+                f"there is no bone {quoted(unknown)}{did_you_mean(unknown, bones)}", path=path, line=number
+            )
         for child in words[1:]:
             if child in parents or child == "root":
-                raise FormatError(f"bone {shown(child)} hangs from two others", path=path, line=number)
+                raise FormatError(f"bone {quoted(child)} hangs from two others", path=path, line=number)
             parents[child] = words[0]
             children[words[0]].append(child)
     order: list[str] = []
@@ -204,5 +228,5 @@ def _read_hierarchy(
         waiting += reversed(children[order[-1]])
     loose = [name for name in bones if name not in order]
     if loose:
-        raise FormatError(f"the hierarchy does not reach {listed(loose)}", path=path, line=bones[loose[0]].line)
+        raise FormatError(f"the hierarchy does not reach {enumerated(loose)}", path=path, line=bones[loose[0]].line)
     return order, parents

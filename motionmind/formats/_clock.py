@@ -1,4 +1,4 @@
-"""The clock of formats that know one step from frame to frame and no times."""
+"""The frame step of formats that record one step instead of times."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ from motionmind.errors import MotionMindError
 
 
 def even_step(motion: Motion, form: str) -> float:
-    """Seconds from frame to frame; a thirtieth where there is only one frame.
+    """Return the seconds from frame to frame; a thirtieth if there is only one frame.
 
-    MotionMindError where the times are off an even step by more than a thousandth of it; `form` is the format's name.
+    Args:
+        motion: the movement to write.
+        form: the format's name, for the message.
+
+    Raises:
+        MotionMindError: the times depart from an even step by more than a thousandth of it.
     """
     if len(motion) == 1:
         return 1.0 / 30.0
@@ -20,7 +25,7 @@ def even_step(motion: Motion, form: str) -> float:
     if np.max(late) > 1e-3 * step:
         frame = int(np.argmax(late))
         raise MotionMindError(
-            f"{motion.name or 'motion'}: {form} needs frames that are even in time; frame {frame} is "
+            f"{motion.name or 'motion'}: {form} needs frames evenly spaced in time; frame {frame} is "
             f"{late[frame]:.3g} s off a step of {step:.6g} s (resample the motion first, as convert --fps does)"
         )
     return step

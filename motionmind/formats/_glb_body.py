@@ -1,7 +1,7 @@
-"""A low-poly body for any skeleton: a tapered prism around each bone, with a ridge to its front.
+"""Builds a low-poly body for any skeleton: a tapered prism around each bone, with a ridge along its front.
 
-An armature without a mesh is taken for empty by some programs, and shows nobody which way a knee points. It is no
-portrait: `motionmind.render` draws better ones, which no file could carry.
+Some programs treat an armature without a mesh as empty, and it does not show which way a knee points. The body is
+plain; `motionmind.render` draws better ones, which a file could not hold.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from motionmind.geometry import rotations as rot
 
 FRONT = "front"
 
-# sRGB, as the pictures have them: warm is left, cool is right.
+# sRGB, as in the pictures: warm is left, cool is right.
 COLOURS: Mapping[str, tuple[int, int, int]] = {
     LEFT: (222, 98, 66),
     RIGHT: (62, 118, 190),
@@ -26,24 +26,24 @@ COLOURS: Mapping[str, tuple[int, int, int]] = {
     FRONT: (255, 226, 120),
 }
 
-# The prism's section: corners about the bone from its front on, degrees. The two faces beside the first corner are the
-# ridge: narrow, so that a limb seen from the front still has its side's colour.
+# The prism's section: corners about the bone, starting at its front, in degrees. The two faces beside the first corner
+# are the ridge, narrow enough that a limb seen from the front still shows its side's colour.
 _CORNERS = np.radians([0.0, 22.0, 80.0, 140.0, 220.0, 280.0, 338.0])
-_RINGS = np.array([0.0, 0.5, 1.0])  # where along the bone the sections are
-_RIDGE, _NOSE = 1.3, 1.8  # how far the first corner stands out, in radii; a head's at half its height
-_CAP = 0.5  # how far the prism's ends stand out beyond the bone's, in radii
+_RINGS = np.array([0.0, 0.5, 1.0])  # places of the sections, as shares of the bone
+_RIDGE, _NOSE = 1.3, 1.8  # distance of the first corner from the bone, in radii; of a head's at half its height
+_CAP = 0.5  # distance of the prism's ends beyond the bone's, in radii
 
 
 @dataclass(frozen=True, eq=False)
 class Bones:
-    """What is clad: from each joint to its children, and from each leaf to its tip.
+    """The B bones that the mesh covers: from each joint to its children, and from each leaf to its tip.
 
     Attributes:
-        joints: the joint that each bone turns with [B].
-        starts, ends: where its ends are at rest [B, 3], metres.
-        radii: how thick it is at its ends [B, 2], metres.
+        joints: the joint that each bone moves with [B].
+        starts, ends: its ends at rest [B, 3], metres.
+        radii: at its ends [B, 2], metres.
         sides: LEFT, RIGHT or MIDDLE for each bone.
-        heads: whether it is a head: a leaf in the middle [B].
+        heads: whether it is a head, a leaf in the middle [B].
     """
 
     joints: Indices
@@ -56,13 +56,13 @@ class Bones:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles that share no vertex, so that each is flat, at rest with the root where `body_mesh` was told.
+    """The body's V vertices at rest; triangles share none, which makes each flat.
 
     Attributes:
         positions, normals: of the vertices [V, 3]; metres, and unit vectors.
-        joints: the one joint that each vertex moves with [V].
-        paints: which vertices have which of `COLOURS` [n]; three in a row are a triangle, counterclockwise from
-            outside. No paint is there without a vertex.
+        joints: the joint that each vertex moves with [V].
+        paints: by name in `COLOURS`, its vertices [n], at least one; three in a row are a triangle, counterclockwise
+            from outside.
     """
 
     positions: Floats
@@ -72,7 +72,10 @@ class Mesh:
 
 
 def body_mesh(skeleton: Skeleton, root: Floats) -> Mesh:
-    """The body at rest, its root at `root` [3]; its front is where +z is, on a bone that lies along z where +y is."""
+    """Build the mesh of a body at rest with its root at `root` [3], metres.
+
+    Its front is towards +z, and on a bone that lies along z towards +y.
+    """
     bones = bones_of(skeleton, root)
     corners = _corners(bones)  # [B, P, 3]
     template, ridge = _template()
@@ -90,7 +93,10 @@ def body_mesh(skeleton: Skeleton, root: Floats) -> Mesh:
 
 
 def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
-    """The bones that have a length, on a body at rest with its root at `root` [3]; one upwards where none has."""
+    """Return the bones that have a length, of a body at rest with its root at `root` [3], metres.
+
+    If none has one, return a single bone pointing up.
+    """
     count, parents = len(skeleton), skeleton.parents
     both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (count, 1)), root)
     rest, tips = both[:count], both[count:]
@@ -122,7 +128,7 @@ def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
 
 
 def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Floats:
-    """How thick a body is at its joints [J], metres: the thinner the nearer to a limb's end, along the bones."""
+    """Return the body's radii at its joints [J], metres: smaller towards a limb's end, by distance along the bones."""
     reach = np.linalg.norm(skeleton.tips, axis=-1)
     for joint in range(len(skeleton) - 1, 0, -1):
         parent = skeleton.parents[joint]
@@ -132,7 +138,7 @@ def _radii(skeleton: Skeleton, sides: list[str], span: float) -> Floats:
 
 
 def _corners(bones: Bones) -> Floats:
-    """The prisms' corners [B, P, 3]: the rings' from the start on, then the two ends' points."""
+    """Return the prisms' corners [B, P, 3]: the rings', from the bone's start on, then the points at its two ends."""
     along = bones.ends - bones.starts
     axis = along / np.linalg.norm(along, axis=-1, keepdims=True)
     front = np.where(np.abs(axis[:, 2:]) > 0.8, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
@@ -153,7 +159,7 @@ def _corners(bones: Bones) -> Floats:
 
 
 def _template() -> tuple[Indices, list[bool]]:
-    """The prism's triangles [F, 3] as indices of its corners, and which of them are the ridge's [F]."""
+    """Return the prism's triangles [F, 3] as indices of its corners, and whether each belongs to the ridge [F]."""
     count, rings = len(_CORNERS), len(_RINGS)
     bottom, top, last = rings * count, rings * count + 1, (rings - 1) * count
     triangles: list[tuple[int, int, int]] = []

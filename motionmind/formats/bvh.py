@@ -1,9 +1,9 @@
-"""BVH (Biovision hierarchy) files: movement of any tree of joints, in and out.
+"""Reads and writes BVH (Biovision hierarchy) files: movement of any tree of joints.
 
-The format has no standard of its own. What is read here is what its writers write, after the description of M. Meredith
-and S. Maddock, "Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels
-turn in the order in which they stand, each about the axes that the ones before have turned; position channels move
-the joint in its parent's frame, wherever they stand among the channels, and take the place of its OFFSET.
+The format has no standard. The reader accepts what programs write, after the description by M. Meredith and
+S. Maddock, "Motion capture file formats explained", University of Sheffield, CS-01-11 (2001): rotation channels apply
+in the listed order, each about axes turned by those before it; position channels, wherever they are listed, move the
+joint in its parent's frame and replace its OFFSET.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, shown
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
-from motionmind.formats._bvh_places import NormalisedRig, Placed, normalise
+from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
 from motionmind.formats._clock import even_step
 from motionmind.formats.text import LARGEST, read_lines, to_number, to_numbers
 from motionmind.formats.units import guess_unit, metres_per_unit
@@ -35,27 +35,30 @@ _log = logging.getLogger(__name__)
 
 
 def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
-    """Movement from a BVH file, on the file's own tree of joints, in metres.
+    """Read a motion from a BVH file, on the file's own tree of joints.
 
-    Each joint has its own channels, in any order. Lines of the motion that are blank or begin with # or // are
-    passed over. Where the header's count of frames is wrong, the frames that are there count; a warning says so.
+    Each joint has its own channels, in any order. Blank lines among the frames, and lines that begin with # or //,
+    are skipped. If the header's frame count is wrong, all frames in the file are read, with a warning.
 
-    Position channels of a joint other than the root take the place of its OFFSET where they are constant. If they
-    vary, and the joint carries most of the body, it becomes the root, with all above it folded in (Bandai-Namco's
-    `joint_Root` stands at the origin while `Hips` moves); if it does not, its mean place is kept and a warning says
-    by how much it strayed. A file whose position channels stand near 0 while its offsets do not adds the two, as
-    old exporters of Blender wrote it; a warning says that it was read so.
+    Constant position channels of a joint other than the root replace its OFFSET. If they vary and the joint carries
+    most of the body, it becomes the root, with its ancestors folded in (Bandai-Namco's `joint_Root` stays at the
+    origin while `Hips` moves); otherwise its mean place is kept, and a warning gives its largest departure. If
+    position channels are near 0 while the offsets are not, the two are added, as old exporters of Blender meant; a
+    warning says so.
 
     Args:
         path: the file; its stem becomes the name of the skeleton and of the motion.
-        unit: a name in `UNITS`, or metres in one unit of the file; None takes the one that `guess_unit` tells from
+        unit: a name in `UNITS`, or metres in one unit of the file; None takes the unit that `guess_unit` infers from
             the skeleton, and logs it (logger "motionmind.formats.bvh", level INFO).
 
+    Returns:
+        The motion, in metres and seconds, starting at time 0.
+
     Raises:
-        FormatError: the file is not there, or is no whole BVH; the message names file and line.
+        FormatError: the file does not exist, or is not a complete BVH; the message names file and line.
 
     Warns:
-        MotionMindWarning: something was mended, as said above.
+        MotionMindWarning: something was repaired, as described above.
     """
     body, times = _read_body(path)
     if unit is None:
@@ -63,7 +66,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
         _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
     else:
         scale = metres_per_unit(unit)
-    for message in body.mended(scale):
+    for message in body.repairs(scale):
         warnings.warn(f"{path}: {message}", MotionMindWarning, stacklevel=2)
     raw = body.skeleton
     return Motion(
@@ -76,12 +79,12 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
 
 
 def bvh_unit(path: FilePath) -> tuple[str, float]:
-    """The unit that `read_bvh` takes for a file when none is given: its name, and its metres."""
+    """Return the unit that `read_bvh` assumes for a file if none is given: its name, and its length in metres."""
     return guess_unit(_read_body(path)[0].skeleton)
 
 
 def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
-    """The whole file, in its own unit, and the frames' times [T] in seconds."""
+    """Read the file in its own unit, and the frames' times [T] in seconds."""
     lines = read_lines(path)
     start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
     joints = read_hierarchy(lines[:start], path)
@@ -89,7 +92,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
         raise FormatError("no line MOTION: the file ends before its frames", path=path, line=len(lines))
     channels = sum(len(joint.channels) for joint in joints)
     if channels == 0:
-        raise FormatError("no joint has CHANNELS: nothing could move", path=path, line=start + 1)
+        raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
     values = _read_frames(lines, first, channels, declared, path)
     body = normalise(_assemble(joints, values, Path(path).stem))
@@ -104,7 +107,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
 
 
 def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[int, float, int]:
-    """The count of frames that the header claims, seconds a frame, and the index of the line that follows."""
+    """Return the header's frame count, its seconds per frame, and the index of the next line."""
     declared: int | None = None
     frame_time: float | None = None
     for index in range(start, len(lines)):
@@ -115,14 +118,14 @@ def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[i
             frame_time = to_number(match[1], path, index + 1)
             if frame_time < 1e-9:
                 raise FormatError(
-                    f"Frame Time is {match[1]}; it must be the seconds from frame to frame, more than 0",
+                    f"Frame Time is {match[1]}; it must be the seconds per frame, more than 0",
                     path=path,
                     line=index + 1,
                 )
         elif match := _FRAMES.fullmatch(line):
             if not re.fullmatch(r"[0-9]{1,18}", match[1]):
                 raise FormatError(
-                    f"{shown(match[1])} where the number of frames was expected", path=path, line=index + 1
+                    f"{quoted(match[1])} where the number of frames was expected", path=path, line=index + 1
                 )
             declared = int(match[1])
         else:
@@ -134,13 +137,13 @@ def _read_motion_header(lines: list[str], start: int, path: FilePath) -> tuple[i
 
 
 def _read_frames(lines: list[str], first: int, channels: int, declared: int, path: FilePath) -> Floats:
-    """Channel values [T, C], one line a frame; frames wrapped over several lines where their sum is right."""
+    """Read channel values [T, C], one frame per line; frames may wrap over lines if their total count is right."""
     rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
     if not rows:
         raise FormatError("no frames after the header", path=path, line=len(lines))
     try:
         frames = np.loadtxt([line for _, line in rows], dtype=np.float64, comments=None, ndmin=2)
-    except ValueError:  # a word that is no number, or lines of different lengths
+    except ValueError:  # a word that is not a number, or lines of different lengths
         return _read_odd_frames(rows, channels, declared, path)
     if frames.shape[1] != channels or not np.all(np.abs(frames) <= LARGEST):  # false for NaN too
         return _read_odd_frames(rows, channels, declared, path)
@@ -148,7 +151,7 @@ def _read_frames(lines: list[str], first: int, channels: int, declared: int, pat
 
 
 def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, path: FilePath) -> Floats:
-    """Frames read word by word: to name the first fault, or to find that line ends mean nothing in this file."""
+    """Read frames word by word, to name the first fault or accept frames that wrap over lines."""
     values = [to_numbers(line.split(), path, number) for number, line in rows]
     flat = np.array([value for row in values for value in row])
     odd = next((i for i, row in enumerate(values) if len(row) != channels), None)
@@ -159,11 +162,11 @@ def _read_odd_frames(rows: list[tuple[int, str]], channels: int, declared: int, 
 
 
 def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
-    """Rotations and places of the joints from the channels' values [T, C]."""
+    """Turn the channels' values [T, C] into the joints' rotations and places."""
     frames = len(values)
     rotations = np.tile(rot.IDENTITY, (frames, len(joints), 1))
     places: dict[int, Floats] = {}
-    groups: dict[str, list[tuple[int, list[int]]]] = {}  # joints that turn in the same order, all at once
+    groups: dict[str, list[tuple[int, list[int]]]] = {}  # by rotation order: joints, converted all at once
     column = 0
     for index, joint in enumerate(joints):
         columns = list(enumerate(joint.channels, start=column))
@@ -191,24 +194,29 @@ def _assemble(joints: list[BvhJoint], values: Floats, name: str) -> Placed:
     return Placed(skeleton, rotations, places)
 
 
-# --- out -----------------------------------------------------------------------------------------------------------
+# --- writing -------------------------------------------------------------------------------------------------------
 
 
-# The order in which most files turn (MotionBuilder's, Bandai-Namco's), so that most readers have met it. Euler angles
-# lock where the middle turn is 90 degrees: about x, that is rarer in arms that a T-pose stretches along x.
+# The commonest order (MotionBuilder's, Bandai-Namco's), which most readers have met. Euler angles lock where the middle
+# rotation is 90 degrees; about x that is rarer in arms, which a T-pose stretches along x.
 _ORDER = "ZXY"
 
 
 def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
-    """Write `motion` as BVH: root with positions, all joints with Zrotation Xrotation Yrotation.
+    """Write `motion` as BVH: the root with positions, all joints with Zrotation Xrotation Yrotation.
 
-    Read back with the same unit, rotations agree to 1e-6 rad and positions to 1e-6 m. Joints come in the depth-first
-    order that the format dictates. Each leaf has an End Site at its tip (0 0 0 where it has none). The first time
-    becomes 0. Angles are unwrapped, so that a reader who blends neighbouring frames sees no jump of 360 degrees.
+    Read back with the same unit, rotations agree to 1e-6 rad and positions to 1e-6 m. Joints come in depth-first
+    order, as the format requires. Each leaf has an End Site at its tip (0 0 0 for none). The first time becomes 0.
+    Angles are unwrapped: a reader that blends neighbouring frames sees no jump of 360 degrees.
+
+    Args:
+        path: the file to write.
+        motion: the movement, evenly spaced in time.
+        unit: a name in `UNITS`, or metres in one unit of the file.
 
     Raises:
-        MotionMindError: the times are not even (`motion.resample` makes them so), a joint's name cannot stand in a
-            BVH file, or the file cannot be written.
+        MotionMindError: the times are not even (`motion.resample` makes them so), BVH cannot hold a joint's name, or
+            the file cannot be written.
     """
     scale = 1.0 / metres_per_unit(unit)
     skeleton = motion.skeleton
@@ -220,7 +228,7 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     lines = ["HIERARCHY", *_hierarchy_lines(skeleton, order, scale, digits), "MOTION"]
     lines += [f"Frames: {len(motion)}", f"Frame Time: {step:.12g}"]
     degrees = np.degrees(np.unwrap(rot.to_euler(_ORDER, motion.rotations[:, order]), axis=0))
-    # Adding 0 makes 0 of -0, which would be printed with its sign.
+    # Adding 0 turns -0, printed with its sign, into 0.
     root = np.round(motion.root * scale, digits) + 0.0
     values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
     row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
@@ -231,10 +239,11 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
 def _check_names(skeleton: Skeleton) -> None:
     for name in skeleton.names:
         if name != " ".join(name.split()) or not name or set("{}") & set(name) or is_comment(name):
-            raise MotionMindError(f"{skeleton.name}: {shown(name)} is no joint name that BVH can hold")
+            raise MotionMindError(f"{skeleton.name}: {quoted(name)} is not a joint name that BVH can hold")
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
+    """Return the joints in depth-first order."""
     children: list[list[int]] = [[] for _ in skeleton.names]
     for joint, parent in enumerate(skeleton.parents[1:], start=1):
         children[parent].append(joint)
@@ -247,6 +256,8 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 
 
 def _hierarchy_lines(skeleton: Skeleton, order: list[int], scale: float, digits: int) -> Iterator[str]:
+    """Yield the lines below HIERARCHY, with `digits` decimals and `scale` units per metre."""
+
     def offset(vector: Floats) -> str:
         return "OFFSET " + " ".join(f"{value:.{digits}f}" for value in np.round(vector * scale, digits) + 0.0)
 

@@ -1,19 +1,18 @@
-"""glTF 2.0 in one binary file (`.glb`): movement as a skinned, animated body, out only.
+"""Writes glTF 2.0 in one binary file (`.glb`): movement as a skinned, animated body.
 
-Sections named here are those of "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021); ISO/IEC 12113:2022.
-glTF's world is ours (3.4): metres, y up, +z is to where a person faces; its quaternions are x, y, z, w.
+Section numbers refer to "glTF 2.0 Specification", version 2.0.1, The Khronos Group (2021); ISO/IEC 12113:2022.
+glTF's world is ours (3.4): metres, y up, a person faces +z; its quaternions are x, y, z, w.
 
-What is written is laid out so that programs take it for an armature:
+The layout makes programs recognise an armature:
 
-- One node a joint, of the joint's name, in the skeleton's tree; they and no others are the skin's joints. Leaves have
-  no end bones: a bone in glTF is a frame without a length, readers choose lengths themselves, and bones that the body
-  does not have come back from every program that the file goes through. Tips show in the mesh.
-- The skin's inverse bind matrices are the rest pose: identity rotations, the lowest point on the floor, x = z = 0.
+- One node per joint, with the joint's name, in the skeleton's tree; these nodes alone are the skin's joints. Leaves get
+  no end bones: a bone in glTF is a frame without a length, readers choose lengths themselves, and extra bones would
+  come back from every program that the file passes through. Tips show in the mesh.
+- The skin's inverse bind matrices define the rest pose: identity rotations, the lowest point on the floor, x = z = 0.
   Nodes stand there too, for programs that take the rest pose from them.
-- A mesh on that skin (`_glb_body`), since a skin that nothing uses is a fault, and an animation without a skin is no
-  armature.
-- One animation that turns all joints and moves the root. One frame is no movement: it has no animation, and its nodes
-  stand in the posture instead, where programs show it that play nothing. The skin knows the rest pose all the same.
+- A mesh on that skin (`_glb_body`): an unused skin is a fault, and an animation without a skin is not an armature.
+- One animation that rotates all joints and moves the root. A single frame has no animation; its nodes stand in the
+  posture instead, where programs show it without playing anything. The skin still holds the rest pose.
 """
 
 from __future__ import annotations
@@ -34,29 +33,33 @@ from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
 from motionmind.formats._json import rounded
 from motionmind.geometry import rotations as rot
 
-# 3.6.2.2 and 5.11.5: the format's numbers.
+# The format's constants: 3.6.2.2 and 5.11.5.
 _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
-_VERTICES, _INDICES = 34962, 34963  # what a view of the buffer is for
+_VERTICES, _INDICES = 34962, 34963  # the target of a buffer view
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_LONGEST = 1e6  # metres; single precision is off by centimetres there, and farther out by more
+_LONGEST = 1e6  # metres; single precision is off by centimetres there, and by more beyond
 
 
 def write_glb(path: FilePath, motion: Motion) -> None:
     """Write `motion` as binary glTF.
 
-    Whoever interpolates (rotations by slerp, root linear) finds all joints where `motion` has them, to the seven digits
-    of single precision. The first time becomes 0. Neighbouring quaternions lie on the same side, so that readers
-    who blend their numbers find no turn the long way round. The same motion gives the same bytes.
+    Interpolated (rotations by slerp, root linearly), all joints are where `motion` has them, to the seven digits of
+    single precision. The first time becomes 0. Neighbouring quaternions lie in the same hemisphere, so readers that
+    blend their components never turn the long way round. The same motion gives the same bytes.
+
+    Args:
+        path: the file to write.
+        motion: the movement, on any skeleton.
 
     Raises:
-        MotionMindError: the body or its path is longer than 1000 km, times are too close to one another for single
+        MotionMindError: the body or its path is longer than 1000 km, times are too close together for single
             precision, or the file cannot be written.
     """
     skeleton = motion.skeleton
     name = motion.name or skeleton.name
     for what, lengths in (("root", motion.root), ("offsets", skeleton.offsets), ("tips", skeleton.tips)):
         if np.abs(lengths).max() > _LONGEST:
-            raise MotionMindError(f"{name}: {what}: GLB has no place for {np.abs(lengths).max():.3g} metres")
+            raise MotionMindError(f"{name}: {what}: GLB cannot hold {np.abs(lengths).max():.3g} metres")
     rest = _at_rest(skeleton)
     moving = len(motion) > 1
     buffer = _Buffer()
@@ -66,8 +69,8 @@ def write_glb(path: FilePath, motion: Motion) -> None:
         "scene": 0,
         "scenes": [{"name": name, "nodes": [0, len(skeleton)]}],
         "nodes": [
-            *(_joint_nodes(skeleton, rest[0]) if moving else _posed_nodes(motion)),
-            {"name": f"{skeleton.name} body", "mesh": 0, "skin": 0},  # 3.7.3: its own place would not count
+            *(_joint_nodes(skeleton, rest[0]) if moving else _posture_nodes(motion)),
+            {"name": f"{skeleton.name} body", "mesh": 0, "skin": 0},  # 3.7.3: its own transform is ignored
         ],
         "meshes": [{"name": f"{skeleton.name} body", "primitives": _primitives(buffer, mesh)}],
         "materials": [_material(paint) for paint in mesh.paints],
@@ -91,7 +94,7 @@ def write_glb(path: FilePath, motion: Motion) -> None:
 
 
 class _Buffer:
-    """The binary chunk as it grows, with the views and accessors that say what is where in it (3.6)."""
+    """The binary chunk under construction, with the views and accessors that describe it (3.6)."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -99,12 +102,12 @@ class _Buffer:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, array: NDArray[Any], *, target: int | None = None, bounds: bool = False) -> int:
-        """Put in an array [n] or [n, components] in a view of its own; the index of its accessor."""
+        """Append an array [n] or [n, components] with a view of its own; return its accessor's index."""
         view = self.view(array, target)
         return self.accessor(view, array, bounds=bounds)
 
     def view(self, array: NDArray[Any], target: int | None = None) -> int:
-        """Put in an array whose rows are a multiple of 4 bytes, as all views must begin (3.6.2.4); its view's index."""
+        """Append an array with rows of a multiple of 4 bytes, for alignment (3.6.2.4); return its view's index."""
         data = array.tobytes()
         self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)})
         if target is not None:
@@ -113,13 +116,13 @@ class _Buffer:
         return len(self.views) - 1
 
     def accessor(self, view: int, array: NDArray[Any], *, offset: int = 0, bounds: bool = False) -> int:
-        """Say what is in a view from byte `offset` on: an array of this one's shape and type."""
+        """Add an accessor to a view from byte `offset` on, for an array of this shape and type; return its index."""
         rows = array.reshape(len(array), -1)
-        kinds = {"<u2": _UNSIGNED_SHORT, "<u4": _UNSIGNED_INT, "<f4": _FLOAT}
+        component_types = {"<u2": _UNSIGNED_SHORT, "<u4": _UNSIGNED_INT, "<f4": _FLOAT}
         accessor = {
             "bufferView": view,
             "byteOffset": offset,
-            "componentType": kinds[array.dtype.str],
+            "componentType": component_types[array.dtype.str],
             "count": len(rows),
             "type": _TYPES[rows.shape[1]],
         }
@@ -130,7 +133,7 @@ class _Buffer:
 
 
 def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
-    """The file: a header, the JSON padded with spaces, the binary data (4.4)."""
+    """Return the file's bytes: a header, the JSON padded with spaces, the binary data (4.4)."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     whole = 12 + 8 + len(text) + 8 + len(data)
@@ -151,14 +154,14 @@ def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
 
 
 def _at_rest(skeleton: Skeleton) -> Floats:
-    """Where the joints are at rest [J, 3], metres: the root above the origin, the lowest point of the body at 0."""
+    """Return the joints' places at rest [J, 3], metres: the root above the origin, the body's lowest point at 0."""
     both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
     both[:, 1] -= both[:, 1].min()
     return both[: len(skeleton)]
 
 
 def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
-    """The joints' nodes in their order, at rest: no rotation is the identity (3.5.3)."""
+    """Return the joints' nodes in order, at rest: a node without a rotation has the identity (3.5.3)."""
     nodes: list[dict[str, Any]] = []
     for joint, name in enumerate(skeleton.names):
         place = skeleton.offsets[joint] if joint else root
@@ -168,8 +171,8 @@ def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
     return nodes
 
 
-def _posed_nodes(motion: Motion) -> list[dict[str, Any]]:
-    """The joints' nodes in the first posture."""
+def _posture_nodes(motion: Motion) -> list[dict[str, Any]]:
+    """Return the joints' nodes in the first posture."""
     nodes = _joint_nodes(motion.skeleton, motion.root[0])
     for node, rotation in zip(nodes, rot.canonical(motion.rotations[0]), strict=True):
         node["rotation"] = rounded(rotation).tolist()
@@ -177,20 +180,20 @@ def _posed_nodes(motion: Motion) -> list[dict[str, Any]]:
 
 
 def _inverse_binds(rest: Floats) -> Singles:
-    """What takes a vertex at rest into each joint's frame [J, 16]: a matrix in columns (3.7.3).
+    """Return the inverse bind matrices [J, 16], column by column: from the rest pose to each joint's frame (3.7.3).
 
-    Frames at rest are turned as the world is, so the inverse is a step back.
+    Frames at rest have the world's axes, so each is a translation.
     """
     matrices = np.tile(np.eye(4), (len(rest), 1, 1))
     matrices[:, 3, :3] = 0.0 - rest
     return matrices.reshape(-1, 16).astype("<f4")
 
 
-# --- what is seen ---------------------------------------------------------------------------------------------------
+# --- the mesh -------------------------------------------------------------------------------------------------------
 
 
 def _primitives(buffer: _Buffer, mesh: Mesh) -> list[dict[str, Any]]:
-    """A primitive a paint, of the same vertices; each vertex has the weight 1 with one joint (3.7.3)."""
+    """Return one primitive per paint, all on the same vertices; each vertex has weight 1 at one joint (3.7.3)."""
     joints, weights = np.zeros((len(mesh.joints), 4), "<u2"), np.zeros((len(mesh.joints), 4), "<f4")
     joints[:, 0], weights[:, 0] = mesh.joints, 1.0
     attributes = {
@@ -206,9 +209,9 @@ def _primitives(buffer: _Buffer, mesh: Mesh) -> list[dict[str, Any]]:
 
 
 def _material(paint: str) -> dict[str, Any]:
-    """A dull colour. Materials, not colours of vertices, which not every program shows."""
+    """Return a matte material. Vertex colours would not show in every program."""
     srgb = np.array(COLOURS[paint]) / 255.0
-    # 3.9.2: factors are linear. IEC 61966-2-1; none of the colours is as dark as its straight piece.
+    # 3.9.2: factors are linear. IEC 61966-2-1; no colour is dark enough for its linear segment.
     linear = ((srgb + 0.055) / 1.055) ** 2.4
     colour = [*np.round(linear, 4).tolist(), 1.0]
     return {
@@ -221,7 +224,7 @@ def _material(paint: str) -> dict[str, Any]:
 
 
 def _animation(buffer: _Buffer, motion: Motion, name: str) -> dict[str, Any]:
-    """A sampler and a channel a joint for its rotations, and one for the root's places (3.11)."""
+    """Return an animation: a sampler and a channel for each joint's rotations, and for the root's places (3.11)."""
     times = (motion.times - motion.times[0]).astype("<f4")
     late = np.flatnonzero(np.diff(times) <= 0.0)
     if len(late):
@@ -248,7 +251,7 @@ def _animation(buffer: _Buffer, motion: Motion, name: str) -> dict[str, Any]:
 
 
 def _continuous(rotations: Floats) -> Floats:
-    """The same rotations [T, J, 4], each quaternion on the side of the one before it."""
+    """Return the same rotations [T, J, 4], each quaternion in the hemisphere of the one before."""
     flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
     signs = np.cumprod(np.where(flips, -1.0, 1.0), axis=0)
     first = rot.canonical(rotations[:1])

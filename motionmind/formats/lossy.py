@@ -1,4 +1,4 @@
-"""What a format cannot hold, in words: so that nothing is left out of a file in silence."""
+"""Names what a format cannot hold, so that no loss is silent."""
 
 from __future__ import annotations
 
@@ -9,67 +9,73 @@ import numpy as np
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import listed
+from motionmind.errors import enumerated
 from motionmind.files import FilePath
 
 _TINY = 1e-6  # seconds and metres
 
 
 def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None) -> list[str]:
-    """What of `motion` a file at `path` has no place for, as phrases: "times", "the body's proportions".
+    """Name what a file at `path` cannot hold of `motion`, as phrases: "times", "the body's proportions".
 
-    Where it was read from the file `source`, also what that held beside the movement.
+    Only what this motion has is named. JSON holds all movement. Names are not a loss: formats without them use the
+    file's name. Motions that a format cannot hold at all (uneven times in BVH and .npz, a body that does not map to
+    SMPL's in .npz) are refused by its writer.
 
-    Only what this motion has is named. JSON holds all movement. Names are no loss: in formats without them the file's
-    name is the motion's. What no file of the format could be made of (uneven times in BVH and .npz, a body that is
-    none of SMPL's in .npz) is refused by those who write it.
+    Args:
+        motion: the movement to write.
+        path: the file to write; its suffix determines the format.
+        source: the file that the motion was read from, if any; what else it holds is lost too.
+
+    Returns:
+        The phrases; empty if nothing is lost.
     """
     suffix = Path(path).suffix.lower()
-    found = []
+    lossy = []
     if source is not None and Path(source).suffix.lower() == ".json":
         from motionmind.formats.motion_json import holds_variation
 
-        found += ["the variation's original, alternatives and decisions"] * holds_variation(source)
+        lossy += ["the variation's original, alternatives and decisions"] * holds_variation(source)
     if suffix == ".json":
-        return found
+        return lossy
     if suffix == ".txt":
         if len(motion) > 1:
-            found.append("times")
-        found.append("where the body is")
+            lossy.append("times")
+        lossy.append("where the body is")
     elif abs(motion.times[0]) > _TINY:
-        found.append(f"the time when it begins, {motion.times[0]:.6g} s")
-    found += _body(motion, suffix)
-    made = int(motion.inserted().sum())
-    if made:
-        found.append(f"the marks of frames that the engine made ({made})")
+        lossy.append(f"the time when it begins, {motion.times[0]:.6g} s")
+    lossy += _lossy_body(motion, suffix)
+    inserted = int(motion.inserted().sum())
+    if inserted:
+        lossy.append(f"the marks of frames that the engine made ({inserted})")
     bridged = [motion.skeleton.names[joint] for joint in np.flatnonzero(motion.bridged().any(axis=0))]
     if bridged:
-        found.append(f"the marks of joints that it bridged ({listed(bridged)})")
-    return found
+        lossy.append(f"the marks of joints that it bridged ({enumerated(bridged)})")
+    return lossy
 
 
-def _body(motion: Motion, suffix: str) -> list[str]:
-    """What is lost of the body that moves."""
+def _lossy_body(motion: Motion, suffix: str) -> list[str]:
+    """Name what is lost of the body."""
     skeleton = motion.skeleton
-    found = []
+    lossy = []
     if suffix in (".txt", ".npz"):
         known = [body() for body in BODIES.values()]
         if suffix == ".npz":
-            from motionmind.formats.npz import joints_without_place, smpl_bodies
+            from motionmind.formats._smpl import joints_without_place, smpl_bodies
 
             known += smpl_bodies().values()
             missing = joints_without_place(motion)
-            found = [f"the turns of joints that SMPL does not have ({listed(missing)})"] if missing else []
-        if not any(_same_places(body, skeleton) for body in known):
-            found.insert(0, "the body's proportions")
+            lossy = [f"the turns of joints that SMPL does not have ({enumerated(missing)})"] if missing else []
+        if not any(_same_proportions(body, skeleton) for body in known):
+            lossy.insert(0, "the body's proportions")
     elif suffix == ".bvh":
         inner = [joint for joint in set(skeleton.parents[1:]) if skeleton.tips[joint].any()]
         ends = [skeleton.names[joint] for joint in sorted(inner)]
-        found = [f"the far ends of joints on which others hang ({listed(ends)})"] if ends else []
-    return found
+        lossy = [f"the far ends of joints on which others hang ({enumerated(ends)})"] if ends else []
+    return lossy
 
 
-def _same_places(one: Skeleton, other: Skeleton) -> bool:
+def _same_proportions(one: Skeleton, other: Skeleton) -> bool:
     return (
         one.difference(other) is None
         and np.allclose(one.offsets, other.offsets, atol=_TINY)

@@ -1,4 +1,4 @@
-"""Movement as JSON, one frame a line.
+"""Motions as JSON, one frame per line.
 
     {
     "format": "motionmind-motion",
@@ -16,14 +16,14 @@
     ]
     }
 
-`times` in seconds, increasing; `root` the root's places in metres; `rotations` quaternions x, y, z, w, each joint's
+`times` are seconds, increasing; `root` the root's places in metres; `rotations` each joint's quaternion x, y, z, w
 against its parent, in the skeleton's order. `skeleton` is "human23", "human44" or a description, as in a posture's
-JSON. What the engine put in, if it did, is listed by the times of the postures that its moves lead from and to, with
-the joints' moves that no corpus attests:
+JSON. What the engine inserted, if anything, is given by the times of the postures that its moves connect, with the
+joints' moves that no corpus attests (bridges):
 
     "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
 
-A variation's file is its movement as it stands, with one field more, `variation`, which holds all the rest
+A variation's file is its current movement with one more field, `variation`, which holds the rest
 (`motionmind.variation.variation_json`).
 """
 
@@ -43,14 +43,14 @@ from motionmind.formats import _json
 
 
 class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """What the engine put in."""
+    """What the engine inserted: the times of its postures, and (joint, move) for each bridge."""
 
     times: list[float]
-    bridged: list[tuple[str, int]] = []  # msgspec gives each object its own
+    bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
 
 
 class FramesSchema(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """Movement on a skeleton that the file names elsewhere."""
+    """Frames of a motion, without its skeleton."""
 
     times: list[float]
     root: list[_json.Vector]
@@ -65,28 +65,32 @@ class MotionSchema(FramesSchema, forbid_unknown_fields=True, kw_only=True):
     format: str
     version: int
     skeleton: str | _json.SkeletonSchema
-    moves: list[float] = []  # one insertion's times, as tweens were written before they had bridges
-    variation: msgspec.Raw = msgspec.Raw()  # what else a variation's file holds
+    moves: list[float] = []  # one insertion's times, as tweens were written before bridges existed
+    variation: msgspec.Raw = msgspec.Raw()  # the rest of a variation's file
 
 
-class _More(msgspec.Struct):
+class _VariationField(msgspec.Struct):
     variation: msgspec.Raw = msgspec.Raw()
 
 
 def holds_variation(path: FilePath) -> bool:
-    """Whether the JSON at `path` holds a variation with its movement."""
-    return bool(bytes(_json.decode(read_bytes(path), _More, path).variation))
+    """Return whether the JSON at `path` holds a variation besides its movement."""
+    return bool(bytes(_json.decode(read_bytes(path), _VariationField, path).variation))
 
 
 def motion_from_json(data: bytes, path: FilePath) -> Motion:
-    """The motion in `data`, the content of the file at `path`.
+    """Decode a motion.
+
+    Args:
+        data: the content of the file.
+        path: the file, for messages.
 
     Raises:
-        FormatError: it holds no motion of version 1; or its lists do not fit together, times
-            do not increase, or a quaternion is zero. The message names file, joint and frame.
+        FormatError: `data` is not a motion of version 1, its lists differ in length, times do not increase, or a
+            quaternion is zero. The message names file, joint and frame.
 
     Warns:
-        MotionMindWarning: quaternions' lengths were off by more than 1e-6 and have been made 1.
+        MotionMindWarning: quaternions whose length was off by more than 1e-6 have been normalised.
     """
     kind = _json.kind_of(data, path)
     if kind != _json.MOTION:
@@ -98,23 +102,22 @@ def motion_from_json(data: bytes, path: FilePath) -> Motion:
 
 
 def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend: bool = True) -> Motion:
-    """The motion of a skeleton that a file describes; FormatError as `motion_from_json`.
+    """Build a motion of `skeleton` from decoded frames.
 
-    Without `mend` quaternions stay as they are, to the last bit, for files that were written in full.
+    Args:
+        schema: the frames.
+        skeleton: the body that moves.
+        path: the file, for messages.
+        mend: whether to normalise quaternions; False keeps them to the last bit, for files written in full precision.
+
+    Raises:
+        FormatError: as `motion_from_json`.
     """
     frames, joints = len(schema.times), len(skeleton)
     if frames == 0:
-        raise FormatError("times: a motion has one frame at least", path=path)
-    for what, rows in (("root", schema.root), ("rotations", schema.rotations)):
-        if len(rows) != frames:
-            raise FormatError(f"{what} has {len(rows)} frames, times has {frames}", path=path)
-    odd = next((frame for frame, row in enumerate(schema.rotations) if len(row) != joints), None)
-    if odd is not None:
-        raise FormatError(
-            f"rotations: frame {odd} has {len(schema.rotations[odd])} quaternions, {skeleton.name} has {joints} joints",
-            path=path,
-        )
-    # Flat iteration builds the array in half the time that nested lists take.
+        raise FormatError("times: a motion has at least one frame", path=path)
+    _check_counts(schema, skeleton, path)
+    # Flat iteration builds the array in half the time of nested lists.
     numbers = chain.from_iterable(chain.from_iterable(schema.rotations))
     rotations = np.fromiter(numbers, dtype=np.float64, count=frames * joints * 4).reshape(frames, joints, 4)
     root = np.array(schema.root, dtype=np.float64)
@@ -140,13 +143,33 @@ def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend:
         raise FormatError(str(error), path=path) from error
 
 
-def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] | None = None) -> None:
-    """Write `motion` as JSON; read back, no number is off by more than 1e-9. MotionMindError if it cannot be.
+def _check_counts(schema: FramesSchema, skeleton: Skeleton, path: FilePath) -> None:
+    """Raise FormatError unless there is a place for each time, and a quaternion for each time and joint."""
+    frames, joints = len(schema.times), len(skeleton)
+    for what, rows in (("root", schema.root), ("rotations", schema.rotations)):
+        if len(rows) != frames:
+            raise FormatError(f"{what} has {len(rows)} frames, times has {frames}", path=path)
+    odd = next((frame for frame, row in enumerate(schema.rotations) if len(row) != joints), None)
+    if odd is not None:
+        raise FormatError(
+            f"rotations: frame {odd} has {len(schema.rotations[odd])} quaternions, {skeleton.name} has {joints} joints",
+            path=path,
+        )
 
-    `more` are fields that the file holds as well, as JSON.
+
+def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] | None = None) -> None:
+    """Write `motion` as JSON; read back, no number is off by more than 1e-9.
+
+    Args:
+        path: the file to write.
+        motion: the movement.
+        more: further fields of the file, by name, as JSON.
+
+    Raises:
+        MotionMindError: the file cannot be written.
     """
     times = _json.rounded(motion.times)
-    if np.any(np.diff(times) <= 0.0):  # steps finer than what is rounded to
+    if np.any(np.diff(times) <= 0.0):  # steps finer than the rounding
         times = motion.times
     fields = [
         f'"format": "{_json.MOTION}"',
@@ -156,8 +179,8 @@ def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] 
         f'"times": {_compact(times.tolist())}',
     ]
     if motion.insertions:
-        listed = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
-        fields.append(f'"insertions": {msgspec.json.encode(listed).decode()}')
+        insertions = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
+        fields.append(f'"insertions": {msgspec.json.encode(insertions).decode()}')
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
         rows = ",\n".join(_compact(row) for row in _json.rounded(array).tolist())
         fields.append(f'"{what}": [\n{rows}\n]')

@@ -12,10 +12,9 @@
       }
     }
 
-`root` is the place of the root in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
-`skeleton` is "human23", "human44", or a description:
-`{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`, metres,
-parents before their children; `tip` may be left out.
+`root` is the root's place in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
+`skeleton` is "human23", "human44", or a description in metres, parents before their children, `tip` optional:
+`{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`.
 """
 
 from __future__ import annotations
@@ -40,14 +39,18 @@ class PostureSchema(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def posture_from_json(data: bytes, path: FilePath) -> Posture:
-    """The posture in `data`, the content of the file at `path`.
+    """Decode a posture.
+
+    Args:
+        data: the content of the file.
+        path: the file, for messages.
 
     Raises:
-        FormatError: it holds no posture of version 1; or a joint is missing, unknown, or has
-            a zero quaternion. The message names file and joint.
+        FormatError: `data` is not a posture of version 1, or a joint is missing, unknown or has a zero quaternion. The
+            message names file and joint.
 
     Warns:
-        MotionMindWarning: a quaternion's length was off by more than 1e-6 and has been made 1.
+        MotionMindWarning: a quaternion whose length was off by more than 1e-6 has been normalised.
     """
     kind = _json.kind_of(data, path)
     if kind != _json.POSTURE:
@@ -62,7 +65,7 @@ def posture_from_json(data: bytes, path: FilePath) -> Posture:
 
 
 def write_posture_json(path: FilePath, posture: Posture) -> None:
-    """Write `posture` as JSON; read back, no number is off by more than 1e-9. MotionMindError if it cannot be."""
+    """Write `posture` as JSON; read back, no number is off by more than 1e-9. MotionMindError if writing fails."""
     skeleton = posture.skeleton
     rows = [
         f"    {_json.text(name)}: {rotation}"

@@ -1,1 +1,1 @@
-"""Scores: text that a person writes, and the movement that it describes; docs/notation.md explains it."""
+"""The score language: text that describes movement, and its reading, checking and playing; see docs/notation.md."""

@@ -1,4 +1,4 @@
-"""From scores to movement: angles to rotations, feet to the floor, and the body over them."""
+"""Composes scores into movement: angles become rotations, feet meet the floor, and the body moves over them."""
 
 from __future__ import annotations
 
@@ -10,79 +10,95 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.motion import Motion, Posture
-from motionmind.errors import FormatError, listed, meant
+from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
-from motionmind.notation import rows as phrases
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row
+from motionmind.notation.rows import Row, check_words, play_phrase, posture_row
 from motionmind.notation.score import Clip, Score, Setting
-from motionmind.notation.stance import Feet, place
+from motionmind.notation.stance import Feet, place_legs
 
-LENIENT = 0.5  # degrees past a limit that rounding explains
-SUNK = 0.01  # metres under the floor that no eye sees
-SHORT = 0.001  # metres by which a leg may fail to reach the floor, or the weight its place
+LIMIT_TOLERANCE = 0.5  # degrees past a limit that rounding explains
+FLOOR_TOLERANCE = 0.01  # metres under the floor that nobody sees
+REACH_TOLERANCE = 0.001  # metres by which a leg may miss the floor, or the weight its place
 
 
 def compose(path: FilePath, clip: str | None = None) -> Motion:
-    """The movement of a score's clip; of its only one, where none is named.
+    """Compose a score's clip into movement.
+
+    Args:
+        path: the score.
+        clip: the clip's name; None for the only one.
+
+    Returns:
+        The motion, in metres and seconds, on the score's body.
 
     Raises:
-        FormatError: the score makes no sense, or asks of a body what it cannot do; names file, line and word.
+        FormatError: the score is invalid, has no such clip, or demands what the body cannot do; names file, line and
+            word.
     """
     score = read_score(path)
     names = [found.name for found in score.clips]
     if clip is None and len(names) != 1:
         raise FormatError(
-            f"holds {len(names) or 'no'} clips" + f"; choose one: {listed(names, 60)}" * bool(names), path=path
+            f"holds {len(names) or 'no'} clips" + f"; choose one: {enumerated(names, 60)}" * bool(names), path=path
         )
     if clip is not None and clip not in names:
-        hint = meant(clip, names) or f"; there are {listed(names, 60)}"
+        hint = did_you_mean(clip, names) or f"; there are {enumerated(names, 60)}"
         raise FormatError(f"no clip {clip!r}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
 
 def motions(score: Score, clips: Sequence[Clip] | None = None) -> list[Motion]:
-    """The movement of a score's clips, all of them or those that are given."""
+    """Compose a score's clips into movement, all of them or those given; FormatError as `compose`."""
     return [motion for _, motion in played(score, clips)]
 
 
 def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list[Row], Motion]]:
-    """The clips' rows, which tell what everything was called, and their movement."""
+    """Play a score's clips, all of them or those given.
+
+    Returns:
+        For each clip its rows, which hold the names of all that it does, and its motion, in metres and seconds.
+
+    Raises:
+        FormatError: as `compose`.
+    """
     for phrase in score.phrases.values():
         if phrase.score is score:
-            phrases.check(phrase)
+            check_words(phrase)
     clips = score.clips if clips is None else clips
     if not clips:
         return []
-    parts = [phrases.play(clip) for clip in clips]
-    posed = _pose(score.body, [row for part in parts for row in part])
+    parts = [play_phrase(clip) for clip in clips]
+    placed = _place_postures(score.body, [row for part in parts for row in part])
     ends = np.cumsum([len(part) for part in parts])
     return [
-        (part, _travel(score.body, clip.name, part, posed.part(end - len(part), end)))
+        (part, _join_moves(score.body, clip.name, part, placed.part(end - len(part), end)))
         for clip, part, end in zip(clips, parts, ends, strict=True)
     ]
 
 
 def posture(score: Score, name: str) -> Posture:
-    """A posture that a score names."""
+    """Compose a posture that a score names; FormatError if there is none, or the body cannot take it."""
     if name not in score.postures:
-        hint = meant(name, score.postures) or f"; there are {listed(score.postures, 60) or 'none'}"
+        hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
         raise FormatError(f"no posture {name!r}{hint}", path=score.path)
-    row = phrases.posture(score, score.postures[name])
-    return _travel(score.body, name, [row], _pose(score.body, [row])).posture(0)
+    row = posture_row(score, score.postures[name])
+    return _join_moves(score.body, name, [row], _place_postures(score.body, [row])).posture(0)
 
 
 @dataclass(frozen=True)
-class _Posed:
-    """Postures where they stand, in the frame that each faces in.
+class _Placed:
+    """Postures placed on the floor, each in the frame that it faces in.
 
     Attributes:
-        rotations: local [T, J, 4]; root: [T, 3], metres.
-        weight: the share of it that each foot bears [T, F]; rests: which feet are on the floor [T, F].
-        balls, tips: where feet are [T, F, 3].
-        back: from the ball of a foot towards its heel [T, F, 3], of length 1.
-        pivot: how far that way it is to the place about which the foot turns [T, F, 1], metres.
+        rotations: local [T, J, 4].
+        root: [T, 3], metres.
+        weight: the share that each foot bears [T, F].
+        rests: whether a foot is on the floor [T, F].
+        balls, tips: places of the feet [T, F, 3], metres.
+        back: unit vectors from the ball of a foot towards its heel [T, F, 3].
+        pivot: distance in that direction to the point about which the foot turns [T, F, 1], metres.
     """
 
     rotations: Floats
@@ -94,20 +110,20 @@ class _Posed:
     back: Floats
     pivot: Floats
 
-    def part(self, start: int, stop: int) -> _Posed:
-        """Those from `start` up to `stop`."""
-        return _Posed(*(getattr(self, name)[start:stop] for name in self.__dataclass_fields__))
+    def part(self, start: int, stop: int) -> _Placed:
+        """Return the postures from `start` up to `stop`."""
+        return _Placed(*(getattr(self, name)[start:stop] for name in self.__dataclass_fields__))
 
 
-def _pose(body: Anatomy, rows: list[Row]) -> _Posed:
-    """Postures as rows describe them, each on the floor or above it as it should be."""
+def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
+    """Place the postures that rows describe on the floor, or at their height above it; check what a body can do."""
     settings = _settings(body, rows)
     degrees = _degrees(body, settings, len(rows))
     rotations = body.rotations(degrees)
     root = np.zeros((len(rows), 3))
     stands = np.zeros(len(rows), dtype=np.bool_)
     if body.leg is None:
-        toes, rests = _planted(body, settings, len(rows))
+        toes, rests = _planted_limbs(body, settings, len(rows))
         tips = toes
         weight, pivot = rests.astype(np.float64), np.zeros((len(rows), len(toes)))
     else:
@@ -115,27 +131,27 @@ def _pose(body: Anatomy, rows: list[Row]) -> _Posed:
         toes, tips = np.array([np.take(body.foot(body.leg.toes, side), [0, -1]) for side in SIDES]).T
         rests, weight = feet.stands | feet.touches, np.where(feet.stands, feet.weight, 0.0)
         pivot = feet.pivot
-        stance = place(body, body.leg, rotations, feet)
+        stance = place_legs(body, body.leg, rotations, feet)
         rotations, root, stands = stance.rotations, stance.root, feet.stands[:, 0] | feet.stands[:, 1]
-        _check_reach(rows, feet, stance.short)
-        for t in np.flatnonzero(stance.astray > SHORT)[:1]:
+        _check_reach(rows, feet, stance.shortfall)
+        for t in np.flatnonzero(stance.imbalance > REACH_TOLERANCE)[:1]:
             raise rows[t].where.error("the weight cannot be brought over the feet")
-        found = body.degrees(rotations)
-        for side in (0, 1):  # what was found for legs on the floor, in place of what was said
+        solved = body.degrees(rotations)
+        for side in (0, 1):  # legs on the floor: the solved angles replace those written
             for joint in body.leg_joints(body.leg, SIDES[side]):
                 name = body.skeleton.names[joint]
-                degrees[name] = np.where(rests[:, side, None], found[:, joint], degrees[name])
+                degrees[name] = np.where(rests[:, side, None], solved[:, joint], degrees[name])
     _check_limits(body, rows, degrees)
-    root[:, 1] += _lifted(body, rows, rotations, root, stands)
+    root[:, 1] += _lift(body, rows, rotations, root, stands)
     points = body.skeleton.positions_and_tips(rotations, root)
     on_floor = np.array([row.up is None for row in rows])[:, None]
     above = body.skeleton.global_rotations(rotations)[:, [body.skeleton.parents[joint] for joint in toes]]
-    return _Posed(
+    return _Placed(
         rotations,
         root,
         weight * on_floor,
         rests & on_floor,
-        points[:, toes if body.leg else len(body.skeleton) + tips],  # a limb that is no leg stands on its tip
+        points[:, toes if body.leg else len(body.skeleton) + tips],  # a limb that is not a leg stands on its tip
         points[:, len(body.skeleton) + tips],
         rot.mul_vec(above, np.array([0.0, 0.0, -1.0])),
         pivot[..., None],
@@ -143,7 +159,7 @@ def _pose(body: Anatomy, rows: list[Row]) -> _Posed:
 
 
 def _settings(body: Anatomy, rows: list[Row]) -> dict[tuple[str, str], list[Setting]]:
-    """What each limb does in each row, by layer and side; a trunk has no side."""
+    """Collect each limb's settings in all rows, by layer and side; a trunk's side is ""."""
     out = {}
     for index, (layer, joints) in enumerate(body.layers.items()):
         for number, side in enumerate(SIDES if body.paired(joints[0]) else ("",)):
@@ -152,7 +168,7 @@ def _settings(body: Anatomy, rows: list[Row]) -> dict[tuple[str, str], list[Sett
 
 
 def _degrees(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> dict[str, Floats]:
-    """Angles [T, 3] of each joint, by its name."""
+    """Return the written angles of each joint, by name: [T, 3], degrees."""
     out = {name: np.zeros((count, 3)) for name in body.skeleton.names}
     for (_, side), limbs in settings.items():
         for t, setting in enumerate(limbs):
@@ -164,8 +180,8 @@ def _degrees(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], coun
 
 
 def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> Feet:
-    """What the rows say of legs on the floor, in metres and radians."""
-    assert body.leg is not None
+    """Convert what the rows say of legs on the floor to metres and radians."""
+    assert body.leg is not None  # checked by the caller
     layer = next(layer for layer, joints in body.layers.items() if body.leg.hip in joints)
     legs = [settings[layer, side] for side in SIDES]
 
@@ -175,7 +191,7 @@ def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: 
     stands = read("stand", 0.0) > 0.0
     turn, knee, weight = read("turn", 0.0), read("knee", np.nan), read("weight", np.nan)
     others = np.where(stands[:, ::-1] & ~np.isnan(weight[:, ::-1]), 100.0 - weight[:, ::-1], 50.0)
-    lean = np.stack([_either(legs, "lean left", count), _either(legs, "lean ahead", count)], axis=-1)
+    lean = np.stack([_mean_over_legs(legs, key, count) for key in ("lean left", "lean ahead")], axis=-1)
     return Feet(
         stands=stands,
         touches=read("touch", 0.0) > 0.0,
@@ -192,62 +208,63 @@ def _feet(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: 
     )
 
 
-def _either(legs: list[list[Setting]], key: str, count: int) -> Floats:
-    """A value [T] of the whole body that either leg may speak of; their mean where both do."""
-    said = [[leg[t][key] for leg in legs if key in leg[t]] for t in range(count)]
-    return np.array([sum(values) / max(len(values), 1) for values in said])
+def _mean_over_legs(legs: list[list[Setting]], key: str, count: int) -> Floats:
+    """Return a value of the whole body [T] that either leg may set: the mean if both do, 0 if neither does."""
+    written = [[leg[t][key] for leg in legs if key in leg[t]] for t in range(count)]
+    return np.array([sum(values) / max(len(values), 1) for values in written])
 
 
-def _planted(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> tuple[Ints, Bools]:
-    """The last joint of each limb [F], and whether it is planted [T, F]."""
+def _planted_limbs(body: Anatomy, settings: dict[tuple[str, str], list[Setting]], count: int) -> tuple[Ints, Bools]:
+    """Return the last joint of each limb [F], and whether it is planted [T, F]."""
     limbs = [(layer, side) for layer, side in settings if side]
     ends = np.array([body.named(body.layers[layer][-1], side) for layer, side in limbs], dtype=np.int64)
     planted = np.array([["planted" in settings[limb][t] for limb in limbs] for t in range(count)], dtype=bool)
     return ends, planted.reshape(count, len(limbs))
 
 
-def _lifted(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
-    """How far to lift each posture [T], metres: its lowest point on the floor, or as high as its row says.
+def _lift(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stands: Bools) -> Floats:
+    """Return by how much to lift each posture [T], metres, to bring its lowest point to the floor or its row's height.
 
-    Where a leg stands the height is right already, and nothing may be under the floor.
+    If a leg stands the height is right already, and nothing may be under the floor.
     """
     lowest, joints = body.lowest(rotations, root)
     for t in np.flatnonzero(stands):
         row = rows[t]
         if row.up is not None:
             raise row.where.error(f"up {row.up:g}, but a leg stands; give the legs a position in the air")
-        if lowest[t] < -SUNK:
+        if lowest[t] < -FLOOR_TOLERANCE:
             joint = body.skeleton.names[joints[t]].replace("_", " ")
             raise row.where.error(f"the {joint} would be {-100.0 * lowest[t]:.0f} cm under the floor")
     up = np.array([(row.up or 0.0) / 100.0 for row in rows])
     return np.where(stands, 0.0, up - lowest)
 
 
-def _check_reach(rows: list[Row], feet: Feet, short: Floats) -> None:
+def _check_reach(rows: list[Row], feet: Feet, shortfall: Floats) -> None:
+    """Raise FormatError if a leg cannot reach its place, or nothing bears the weight."""
     for t in np.flatnonzero(feet.touches.any(axis=1) & ~feet.stands.any(axis=1))[:1]:
         raise rows[t].where.error("a leg touches the floor, but none stands on it")
     weightless = feet.stands.any(axis=1) & ~(feet.stands & (feet.weight > 0.0)).any(axis=1)
     for t in np.flatnonzero(weightless)[:1]:
         raise rows[t].where.error("no foot bears weight")
-    for t, side in np.argwhere(short > SHORT):
-        far = f"{100.0 * short[t, side]:.0f} cm"
+    for t, side in np.argwhere(shortfall > REACH_TOLERANCE):
+        far = f"{100.0 * shortfall[t, side]:.0f} cm"
         if feet.touches[t, side]:
             raise rows[t].where.error(f"the {SIDES[side]} foot should touch the floor, and stays {far} above it")
         raise rows[t].where.error(f"the {SIDES[side]} foot is {far} further from the hip than the leg is long")
 
 
 def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) -> None:
-    """Refuse what no body can do: FormatError names line, joint, angle and limit."""
+    """Raise FormatError if an angle is past its joint's limits; names line, joint, angle and limit."""
     for name in body.skeleton.names:
         _, joint = body.anatomy(name)
         swing = np.delete(degrees[name], "xyz".index(joint.long), axis=1)
-        for t in np.flatnonzero(np.linalg.norm(swing, axis=1) > 180.0 + LENIENT)[:1]:
+        for t in np.flatnonzero(np.linalg.norm(swing, axis=1) > 180.0 + LIMIT_TOLERANCE)[:1]:
             called = " and ".join(word for word, angle in joint.angles.items() if "xyz"[angle.axis] != joint.long)
             raise rows[t].where.error(f"{name.replace('_', ' ')}: {called} together are more than half a turn")
         for word, angle in joint.angles.items():
             values = angle.sign * degrees[name][:, angle.axis]
             low, high = angle.range
-            for t in np.flatnonzero((values < low - LENIENT) | (values > high + LENIENT))[:1]:
+            for t in np.flatnonzero((values < low - LIMIT_TOLERANCE) | (values > high + LIMIT_TOLERANCE))[:1]:
                 over = values[t] > high
                 called = word if over or not angle.opposite else angle.opposite
                 value, limit = (values[t], high) if over else (values[t], low)
@@ -258,28 +275,28 @@ def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) ->
                 )
 
 
-def _travel(body: Anatomy, name: str, rows: list[Row], posed: _Posed) -> Motion:
-    """The movement of rows: turned to where they face, and moved so that feet which bear weight stay where they are."""
+def _join_moves(body: Anatomy, name: str, rows: list[Row], placed: _Placed) -> Motion:
+    """Join placed postures into movement: turn each to where it faces, and keep feet that bear weight in place."""
     turn = rot.about_vertical(np.radians([row.face for row in rows]))
-    rotations = posed.rotations.copy()
+    rotations = placed.rotations.copy()
     rotations[:, 0] = rot.mul(turn, rotations[:, 0])
-    root = rot.mul_vec(turn, posed.root)
-    balls, tips, back = (rot.mul_vec(turn[:, None], feet) for feet in (posed.balls, posed.tips, posed.back))
-    weighed = body.centre_of_mass(rotations, root)
+    root = rot.mul_vec(turn, placed.root)
+    balls, tips, back = (rot.mul_vec(turn[:, None], feet) for feet in (placed.balls, placed.tips, placed.back))
+    centre = body.centre_of_mass(rotations, root)
     go = rot.mul_vec(turn, np.array([[row.go[0], 0.0, row.go[1]] for row in rows]) / 100.0)
     moved = np.zeros((len(rows), 3))
     for t in range(1, len(rows)):
-        held = np.minimum(posed.weight[t - 1], posed.weight[t])
+        held = np.minimum(placed.weight[t - 1], placed.weight[t])
         if not held.any():
-            held = (posed.rests[t - 1] & posed.rests[t]).astype(np.float64)
+            held = (placed.rests[t - 1] & placed.rests[t]).astype(np.float64)
         if held.any():
-            both = np.minimum(posed.weight[t - 1], posed.weight[t]) > 0.0  # else a foot rolls, and its tip stays
-            before, after = (np.where(both[:, None], balls[i] + posed.pivot[t] * back[i], tips[i]) for i in (t - 1, t))
+            both = np.minimum(placed.weight[t - 1], placed.weight[t]) > 0.0  # else the foot rolls over its tip
+            before, after = (np.where(both[:, None], balls[i] + placed.pivot[t] * back[i], tips[i]) for i in (t - 1, t))
             step = (held[:, None] * (before - after)).sum(axis=0) / held.sum()
         else:
-            step = weighed[t - 1] - weighed[t] + go[t]
+            step = centre[t - 1] - centre[t] + go[t]
         moved[t] = moved[t - 1] + step * [1.0, 0.0, 1.0]
-    # Rounded, so that a score is the same bytes on every machine.
+    # Rounded, so a score gives the same bytes on every machine.
     times = np.cumsum([0.0, *(row.seconds or 0.0 for row in rows[1:])])
     return Motion(
         body.skeleton,

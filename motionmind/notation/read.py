@@ -1,4 +1,4 @@
-"""Reading scores: from a file's lines to positions and phrases. docs/notation.md explains the notation."""
+"""Reads scores: from a file's lines to positions and phrases; docs/notation.md explains the notation."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from unicodedata import normalize
 
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import HEADINGS, anatomy_named, read_body
-from motionmind.errors import FormatError, listed, meant
+from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.formats.text import read_lines
 from motionmind.notation.score import (
-    KINDS,
     NOTHING,
     NUMBER,
+    SUPPORTS,
     Clip,
     Line,
     Phrase,
@@ -31,7 +31,7 @@ from motionmind.notation.score import (
 
 NAME = re.compile(r"[^\W_][\w-]*")
 
-# Words of a leg that stands, with the least and greatest number that may come after; `lean` has a direction between.
+# Words of a standing leg, with the least and greatest number that may follow; `lean` has a direction before its number.
 STANDING = {
     "out": (-200.0, 200.0),
     "ahead": (-200.0, 200.0),
@@ -51,32 +51,34 @@ LEAN = {
 
 
 def read_score(path: FilePath) -> Score:
-    """The score in a file.
+    """Read a score, with the scores that it includes.
 
     Raises:
-        FormatError: names file, line and word of what cannot be understood.
+        FormatError: something in it is not understood; names file, line and word.
     """
     return _read(Path(path), ())
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> Score:
+    """Read a score that those `above` include."""
     lines = [Line(Where(str(path), number), text) for number, text in enumerate(read_lines(path), start=1)]
     blocks = list(_blocks(lines))
-    includes = [_included(path, head, (*above, path.resolve())) for head, _ in blocks if _word(head) == "include"]
-    score = Score(str(path), _body(path, [head for head, _ in blocks], [other for _, _, other in includes]))
+    includes = [_read_include(path, head, (*above, path.resolve())) for head, _ in blocks if _word(head) == "include"]
+    score = Score(str(path), _find_body(path, [head for head, _ in blocks], [other for _, _, other in includes]))
     for where, name, other in includes:
         _include(score, where, name, other)
     for head, inner in blocks:
-        _heading(score, head, inner)
+        _read_block(score, head, inner)
     return score
 
 
 def _word(head: Line) -> str:
+    """Return a heading's first word."""
     return head.text.split(maxsplit=1)[0]
 
 
-def _included(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Where, str, Score]:
-    """A score that another includes, where and as what."""
+def _read_include(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Where, str, Score]:
+    """Read the score of an `include` heading; return its line, the name that it gets, and the score."""
     file, _, name = (part.strip() for part in head.text.removeprefix("include").partition(" as "))
     try:
         included = path.parent / file
@@ -90,7 +92,7 @@ def _included(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Where, s
 
 
 def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
-    """Each heading with the indented lines below it, without comments and empty lines."""
+    """Yield each heading with the indented lines below it, without comments and empty lines."""
     head: Line | None = None
     inner: list[Line] = []
     for line in lines:
@@ -112,8 +114,8 @@ def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
         yield head, inner
 
 
-def _body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
-    """The body that a score names, one that comes with MotionMind or a file beside the score; else its includes'."""
+def _find_body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
+    """Return the body that a score names, a bundled one or a file beside the score; else that of its first include."""
     for head in heads:
         rest = head.text.removeprefix("body").strip()
         if _word(head) == "body":
@@ -124,19 +126,22 @@ def _body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
     return included[0].body if included else anatomy_named("human23")
 
 
-def _heading(score: Score, head: Line, inner: list[Line]) -> None:
+def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
+    """Add a heading and its lines to the score."""
     word, _, rest = head.text.partition(" ")
     rest, where = rest.strip(), head.where
     if word in score.body.layers or word == "facings":
         if rest:
             raise where.error(f"{rest!r} after the heading {word}: positions go on lines of their own, indented")
         for line in inner:
-            _entry(score, word, line)
+            _add_entry(score, word, line)
         return
     if word not in HEADINGS:
         layers = tuple(score.body.layers)
         known = HEADINGS + layers
-        raise where.error(f"{word!r} is no heading{meant(word, known) or f'; there are {listed(known, 20)}'}")
+        raise where.error(
+            f"{word!r} is no heading{did_you_mean(word, known) or f'; there are {enumerated(known, 20)}'}"
+        )
     if inner and word not in ("phrase", "clip"):
         raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
     if word == "title":
@@ -147,36 +152,37 @@ def _heading(score: Score, head: Line, inner: list[Line]) -> None:
         name, equals, text = (part.strip() for part in rest.partition("="))
         if not equals:
             raise where.error(f"{rest!r}: write posture NAME = {' | '.join(score.body.layers)}")
-        score.postures[_new(name, score.postures, where)] = Line(where, text)
+        score.postures[_check_name(name, score.postures, where)] = Line(where, text)
     elif word in ("phrase", "clip"):
-        _phrase(score, word, rest, inner, where)
+        _add_phrase(score, word, rest, inner, where)
 
 
-def _phrase(score: Score, word: str, rest: str, inner: list[Line], where: Where) -> None:
+def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Where) -> None:
+    """Add a phrase or clip, whose heading is `word` and `rest`, to the score."""
     about = ""
     if word == "clip":
         rest, _, about = (part.strip() for part in rest.partition(":"))
-    name, bracket, open_ = rest.partition("(")
-    if bracket and (word == "clip" or not open_.endswith(")")):
+    name, bracket, arguments = rest.partition("(")
+    if bracket and (word == "clip" or not arguments.endswith(")")):
         raise where.error(f"{rest!r}: write phrase NAME, or phrase NAME (WORD, WORD)")
-    words = tuple(part.strip() for part in open_.removesuffix(")").split(",")) if bracket else ()
-    for number_, word_ in enumerate(words):
-        _new(word_, words[:number_], where)
-    name = _new(name.strip(), {n: p for n, p in score.phrases.items() if p.score is score}, where)
+    words = tuple(part.strip() for part in arguments.removesuffix(")").split(",")) if bracket else ()
+    for i, open_word in enumerate(words):
+        _check_name(open_word, words[:i], where)
+    name = _check_name(name.strip(), {n: p for n, p in score.phrases.items() if p.score is score}, where)
     if name in ("start", "tempo") or name[0].isdigit():
         raise where.error(f"{name!r} cannot be a phrase's name: a line that begins so is something else")
     if not inner:
         raise where.error(f"{word} {name} has no lines")
-    kind = Clip if word == "clip" else Phrase
-    score.phrases[name] = kind(name, score, tuple(inner), where, words, about)
+    make = Clip if word == "clip" else Phrase
+    score.phrases[name] = make(name, score, tuple(inner), where, words, about)
 
 
 def _include(score: Score, where: Where, name: str, other: Score) -> None:
-    """Take in another score's vocabulary and phrases, or all of it under a name."""
+    """Add another score's vocabulary and phrases, or all of it under a name."""
     if other.body.path != score.body.path:
         raise where.error(f"{other.path} is for {other.body.skeleton.name}, this score for {score.body.skeleton.name}")
     if name:
-        score.included[_new(name, score.included, where)] = other
+        score.included[_check_name(name, score.included, where)] = other
         return
     for layer, positions in other.positions.items():
         score.positions.setdefault(layer, {}).update(positions)
@@ -185,7 +191,8 @@ def _include(score: Score, where: Where, name: str, other: Score) -> None:
     score.included.update(other.included)
 
 
-def _new(name: str, taken: Container[str], where: Where) -> str:
+def _check_name(name: str, taken: Container[str], where: Where) -> str:
+    """Return a new name; FormatError if it is malformed, reserved or taken."""
     if not NAME.fullmatch(name):
         raise where.error(f"{name!r} cannot be a name: use letters, digits and hyphens")
     if name in (*SIDES, "neutral"):
@@ -195,43 +202,46 @@ def _new(name: str, taken: Container[str], where: Where) -> str:
     return name
 
 
-def _entry(score: Score, layer: str, line: Line) -> None:
-    """A line of a vocabulary."""
+def _add_entry(score: Score, layer: str, line: Line) -> None:
+    """Add a line of a vocabulary, or a facing, to the score."""
     name, equals, text = (part.strip() for part in line.text.partition("="))
     if not equals:
         raise line.where.error(f"{line.text!r}: write NAME = what it is")
     if layer == "facings":
         if not NUMBER.fullmatch(text):
             raise line.where.error(f"{text!r}: a facing is degrees to the left of the audience")
-        score.facings[_new(name, {}, line.where)] = number(text, name, line.where)
+        score.facings[_check_name(name, {}, line.where)] = number(text, name, line.where)
         return
     positions = score.positions.setdefault(layer, {})
     own = {known: position for known, position in positions.items() if position.path == score.path}
-    positions[_new(name, own, line.where)] = replace(_definition(score, layer, text, line.where), path=score.path)
+    position = replace(_parse_position(score, layer, text, line.where), path=score.path)
+    positions[_check_name(name, own, line.where)] = position
 
 
-def _definition(score: Score, layer: str, text: str, where: Where) -> Position:
+def _parse_position(score: Score, layer: str, text: str, where: Where) -> Position:
+    """Parse a position's definition: one part, or those of the leading limb and of the other around a slash."""
     parts = text.split("/")
     if len(parts) > 1 and not score.paired(layer):
         raise where.error(f"{text!r}: a / is for two limbs, and the {layer} is none")
     if len(parts) > 2:
         raise where.error(f"{text!r}: one / too many")
-    read = [_terms(score, layer, part, where) for part in parts]
-    if len(read) == 1:
-        return read[0]
-    for part, position in zip(parts, read, strict=True):
+    positions = [_parse_terms(score, layer, part, where) for part in parts]
+    if len(positions) == 1:
+        return positions[0]
+    for part, position in zip(parts, positions, strict=True):
         if position.lead != position.other:
             raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
-    return Position(read[0].lead, read[1].lead, True)
+    return Position(positions[0].lead, positions[1].lead, True)
 
 
-def _terms(score: Score, layer: str, text: str, where: Where) -> Position:
+def _parse_terms(score: Score, layer: str, text: str, where: Where) -> Position:
+    """Parse terms between commas and overlay them, the last on top."""
     position = NOTHING
     for term in text.split(","):
         words = term.split()
         if not words:
             raise where.error(f"{text.strip()!r}: nothing between commas" if text.strip() else "nothing is said")
-        setting = _setting(score, layer, words, where)
+        setting = _parse_setting(score, layer, words, where)
         if setting is not None:
             sided = bool(setting.get("lean left")) if score.paired(layer) else setting != mirrored(setting)
             position = Position(setting, setting, sided).over(position)
@@ -241,28 +251,33 @@ def _terms(score: Score, layer: str, text: str, where: Where) -> Position:
     return position
 
 
-def _setting(score: Score, layer: str, words: list[str], where: Where) -> Setting | None:
-    """What a term says of angles or feet; None where its words are other positions."""
+def _parse_setting(score: Score, layer: str, words: list[str], where: Where) -> Setting | None:
+    """Parse a term about angles or feet; None if its words name other positions."""
     first, numbered = words[0], len(words) > 1 and bool(NUMBER.fullmatch(words[1]))
     if words == ["neutral"]:
         return {}
     leg = score.body.leg
     stands = leg is not None and leg.hip in score.body.layers[layer]
-    if first in (KINDS[:2] if stands else KINDS[2:] if leg is None else ()):
+    if first in (SUPPORTS[:2] if stands else SUPPORTS[2:] if leg is None else ()):
         if first != "touch":
-            return {first: 1.0} | _standing(words[1:], where)
+            return {first: 1.0} | _parse_standing(words[1:], where)
         if len(words) != 3 or words[1] != "towards":
             raise where.error("touch towards DEGREES: 0 to the front, 90 to the side, 180 to the back")
         return {"touch": 1.0, "towards": number(words[2], "touch towards", where)}
     if stands and (first == "lean" or (first in STANDING and numbered)):
-        return _standing(words, where)
-    joints = score.body.layers[layer]
-    ends = [joint for joint in joints if joint.endswith(f"_{first}")]  # coxa, where there is but fore_coxa
+        return _parse_standing(words, where)
+    return _parse_angles(score, layer, words, where)
+
+
+def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> Setting | None:
+    """Parse a joint or group of joints with its angles; None if the first word is neither and no number is last."""
+    first, joints = words[0], score.body.layers[layer]
+    ends = [joint for joint in joints if joint.endswith(f"_{first}")]  # coxa, if fore_coxa is the only one
     parts = score.body.groups.get(first, {ends[0] if len(ends) == 1 else first: {}})
     if not set(parts) <= set(joints):
         if NUMBER.fullmatch(words[-1]):
-            known = [*joints, *score.body.groups, *KINDS, *STANDING]
-            raise where.error(f"{first!r} is no joint of the {layer}{meant(first, known)}")
+            known = [*joints, *score.body.groups, *SUPPORTS, *STANDING]
+            raise where.error(f"{first!r} is no joint of the {layer}{did_you_mean(first, known)}")
         return None
     setting: dict[object, float] = {}
     for name, value in _pairs(words[1:], where):
@@ -271,7 +286,7 @@ def _setting(score: Score, layer: str, words: list[str], where: Where) -> Settin
             names = {key: (key, 1.0) for key in angles}
             names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
             if name not in names:
-                hint = meant(name, names) or f"; it has {', '.join(names)}"
+                hint = did_you_mean(name, names) or f"; it has {', '.join(names)}"
                 raise where.error(f"{name!r} is no angle of the {first}{hint}")
             key, sign = names[name]
             setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
@@ -280,8 +295,8 @@ def _setting(score: Score, layer: str, words: list[str], where: Where) -> Settin
     return setting
 
 
-def _standing(words: list[str], where: Where) -> dict[object, float]:
-    """The words of a leg that stands: name and number, or `lean`, direction and number."""
+def _parse_standing(words: list[str], where: Where) -> dict[object, float]:
+    """Parse the words of a standing leg: name and number, or `lean`, direction and number."""
     setting: dict[object, float] = {}
     rest = iter(words)
     for word in rest:
@@ -290,7 +305,7 @@ def _standing(words: list[str], where: Where) -> dict[object, float]:
             raise where.error(f"lean {direction}: lean ahead, back, left or right, and how many centimetres")
         known = (*STANDING, "lean")
         if word not in known:
-            hint = meant(word, known) or f"; there are {', '.join(known)}"
+            hint = did_you_mean(word, known) or f"; there are {', '.join(known)}"
             raise where.error(f"{word!r} means nothing of a leg that stands{hint}")
         value = number(next(rest, ""), f"{word} {direction}".strip(), where)
         least, most = STANDING.get(word, (-200.0, 200.0))
@@ -302,5 +317,6 @@ def _standing(words: list[str], where: Where) -> dict[object, float]:
 
 
 def _pairs(words: list[str], where: Where) -> Iterator[tuple[str, float]]:
+    """Yield each name with the number that follows it."""
     for name, value in zip(words[::2], [*words[1::2], ""], strict=False):
         yield name, number(value, name, where)

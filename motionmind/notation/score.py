@@ -1,8 +1,8 @@
-"""What a score holds: positions, phrases, postures, and how their words are looked up.
+"""A score's contents: positions, phrases and postures, and the lookup of their words.
 
-Everything is written for the left side. A *setting* is what one limb, or the trunk, does: values by what they are of,
-either an angle, `(joint, axis)` in degrees about that axis, or a word of a leg that stands, such as `"bend"`. A
-*position* is a vocabulary's entry: the setting of the leading limb and of the other.
+Everything is written for the left side. A *setting* describes one limb, or the trunk: its keys are angles,
+`(joint, axis)` in degrees about that axis, or words of a standing leg such as `"bend"`. A *position* is an entry of the
+vocabulary: the settings of the leading limb and of the other.
 """
 
 from __future__ import annotations
@@ -12,34 +12,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from motionmind.body.anatomy import SIDES, Anatomy
-from motionmind.errors import FormatError, meant
+from motionmind.errors import FormatError, did_you_mean
 
 Setting = Mapping[object, float]
 
 NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)")
-KINDS = ("stand", "touch", "planted")  # a limb that is none of these is in the air
+SUPPORTS = ("stand", "touch", "planted")  # a limb with none of these is in the air
 
 
 @dataclass(frozen=True)
 class Where:
-    """A line of a file."""
+    """A line of a file, counted from 1."""
 
     path: str
     line: int
 
     def error(self, message: str) -> FormatError:
-        """What is wrong there."""
+        """Return a FormatError at this line."""
         return FormatError(message, path=self.path, line=self.line)
 
 
 @dataclass(frozen=True)
 class Position:
-    """An entry of a vocabulary: what the leading limb and the other one do; a trunk has but one setting, twice.
+    """An entry of a vocabulary: the settings of the leading limb and of the other; a trunk has one setting, twice.
 
     Attributes:
         lead, other: their settings.
-        sided: whether it looks different in the mirror, so that a side must lead.
-        path: the score that says so.
+        sided: whether its mirror image differs, so that a side must lead.
+        path: the score that defines it.
     """
 
     lead: Setting
@@ -48,8 +48,9 @@ class Position:
     path: str = ""
 
     def over(self, below: Position) -> Position:
-        """This position on top of another: what it does not say is as below."""
-        return Position(_over(self.lead, below.lead), _over(self.other, below.other), self.sided or below.sided)
+        """Overlay this position on another, which supplies all that this one leaves unset."""
+        lead, other = _overlay(self.lead, below.lead), _overlay(self.other, below.other)
+        return Position(lead, other, self.sided or below.sided)
 
 
 NOTHING = Position({}, {}, False)
@@ -57,7 +58,7 @@ NOTHING = Position({}, {}, False)
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a phrase as it was written."""
+    """A line of a phrase as written."""
 
     where: Where
     text: str
@@ -65,11 +66,15 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Phrase:
-    """Lines with a name; `score` is where their words are looked up.
+    """Named lines of a score.
 
     Attributes:
+        name: what calls it.
+        score: where its words are looked up.
+        lines: the lines below its heading.
+        where: its heading.
         open: words that a call fills in.
-        about: what it is, of a clip.
+        about: a clip's description.
     """
 
     name: str
@@ -81,23 +86,23 @@ class Phrase:
 
 
 class Clip(Phrase):
-    """A phrase that is movement of its own."""
+    """A phrase that is a movement in its own right."""
 
 
 @dataclass(eq=False)
 class Score:
-    """A score that was read.
+    """A score.
 
     Attributes:
         path: its file.
-        body: whose movement it is.
-        title: what it is called.
-        tempo: counts a minute.
-        positions: the vocabulary of each layer.
+        body: the body that moves.
+        title: its title.
+        tempo: counts per minute.
+        positions: the vocabulary of each layer, by name.
         facings: degrees to the left of the audience, by name.
         phrases: phrases and clips by name, in order.
         postures: single postures by name.
-        included: other scores by the name that their words have here.
+        included: other scores by the prefix of their words here.
     """
 
     path: str
@@ -112,43 +117,48 @@ class Score:
 
     @property
     def clips(self) -> list[Clip]:
-        """The clips that this score itself holds, in order."""
+        """The score's own clips, in order."""
         return [found for found in self.phrases.values() if isinstance(found, Clip) and found.score is self]
 
     def paired(self, layer: str) -> bool:
-        """Whether a layer is a pair of limbs."""
+        """Return whether a layer is a pair of limbs."""
         return self.body.paired(self.body.layers[layer][0])
 
     def cell(self, layer: str, text: str, where: Where) -> tuple[Setting, Setting]:
-        """What a cell says that the left and the right limb do; of a trunk, the same setting twice."""
+        """Return the settings of the left and the right limb in a cell; for a trunk, the same setting twice.
+
+        Raises:
+            FormatError: a word is unknown, or a side is missing or too many.
+        """
         parts = text.split("/")
         if len(parts) == 1:
-            return self._led(layer, text, where)
+            return self._led_by_side(layer, text, where)
         if len(parts) > 2 or not self.paired(layer):
             raise where.error(
                 f"{text!r}: left / right is for two limbs" if len(parts) == 2 else f"{text!r}: one / too many"
             )
         settings = []
         for part in parts:
-            position = self._words(layer, part, where)
+            position = self._combine(layer, part, where)
             if position.lead != position.other:
                 raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
             settings.append(position.lead)
         return settings[0], settings[1]
 
-    def _led(self, layer: str, text: str, where: Where) -> tuple[Setting, Setting]:
+    def _led_by_side(self, layer: str, text: str, where: Where) -> tuple[Setting, Setting]:
+        """Return the settings of the left and the right limb in a cell without a slash."""
         words = text.split()
         sides = [word for word in words if word in SIDES]
         if len(sides) > 1:
             raise where.error(f"{text!r} names two sides")
-        position = self._words(layer, " ".join(word for word in words if word not in SIDES), where)
+        position = self._combine(layer, " ".join(word for word in words if word not in SIDES), where)
         if position.sided and not sides:
             raise where.error(f"{text!r}: say which side: {text} left or {text} right")
         settings = position.lead, position.other
         return self.mirrored(layer, settings) if sides == ["right"] else settings
 
     def cell_words(self, layer: str, text: str) -> tuple[str, str]:
-        """What a cell calls that which the left and the right limb do; of a trunk, which way it goes."""
+        """Return a cell's names for what the left and the right limb do; for a trunk, with its side, twice."""
         if "/" in text:
             left, right = (" ".join(part.split()) for part in text.split("/"))
             return left, right
@@ -161,7 +171,7 @@ class Score:
         return names if side == "left" else names[::-1]
 
     def mirrored_words(self, layer: str, words: tuple[str, str]) -> tuple[str, str]:
-        """What the left and the right limb are called to do in the mirror."""
+        """Return the names of what the left and the right limb do in the mirror image."""
         if self.paired(layer):
             return words[::-1]
         opposite = {"left": "right", "right": "left"}
@@ -169,11 +179,14 @@ class Score:
         return name, name
 
     def mirrored(self, layer: str, limbs: tuple[Setting, Setting]) -> tuple[Setting, Setting]:
-        """What the left and the right limb do in the mirror; of a trunk, what it does."""
+        """Return the settings of the left and the right limb in the mirror image; for a trunk, its setting twice."""
         left, right = limbs
-        return (_leaning(right), _leaning(left)) if self.paired(layer) else (mirrored(left), mirrored(right))
+        if not self.paired(layer):
+            return mirrored(left), mirrored(right)
+        return _swap_lean(right), _swap_lean(left)
 
-    def _words(self, layer: str, text: str, where: Where) -> Position:
+    def _combine(self, layer: str, text: str, where: Where) -> Position:
+        """Overlay the positions that a cell names, the last on top."""
         position, words = NOTHING, text.split()
         if not words:
             raise where.error(f"no position of the {layer}")
@@ -182,7 +195,7 @@ class Score:
         return position
 
     def position(self, layer: str, word: str, where: Where) -> Position:
-        """The position of a layer that is called `word`."""
+        """Look up a layer's position by name, with the prefix of an included score if any; FormatError if unknown."""
         prefix, dot, name = word.rpartition(".")
         home = self._included(prefix, where) if dot else self
         known = home.positions.get(layer, {})
@@ -190,57 +203,59 @@ class Score:
             return NOTHING
         if name not in known:
             elsewhere = [other for other, names in home.positions.items() if name in names]
-            hint = meant(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
+            hint = did_you_mean(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
             raise where.error(f"{word!r} is no position of the {layer}{hint}")
         return known[name]
 
     def phrase(self, word: str, where: Where) -> Phrase:
-        """The phrase or clip that is called `word`."""
+        """Look up a phrase or clip by name, with the prefix of an included score if any; FormatError if unknown."""
         prefix, dot, name = word.rpartition(".")
         home = self._included(prefix, where) if dot else self
         if name not in home.phrases:
-            raise where.error(f"{word!r} is no phrase{meant(name, home.phrases)}")
+            raise where.error(f"{word!r} is no phrase{did_you_mean(name, home.phrases)}")
         return home.phrases[name]
 
     def _included(self, prefix: str, where: Where) -> Score:
         if prefix not in self.included:
-            raise where.error(f"{prefix!r} is no score that is included{meant(prefix, self.included)}")
+            raise where.error(f"{prefix!r} is no score that is included{did_you_mean(prefix, self.included)}")
         return self.included[prefix]
 
     def facing(self, word: str, where: Where) -> float:
-        """Degrees to the left of the audience of a facing, by name or number."""
+        """Return a facing, by name or number, in degrees to the left of the audience; FormatError if unknown."""
         if NUMBER.fullmatch(word):
             return number(word, "face", where)
         if word not in self.facings:
-            raise where.error(f"{word!r} is no facing{meant(word, self.facings)}; give one of the facings, or degrees")
+            raise where.error(
+                f"{word!r} is no facing{did_you_mean(word, self.facings)}; give one of the facings, or degrees"
+            )
         return self.facings[word]
 
 
 def mirrored(setting: Setting) -> Setting:
-    """A trunk's setting in the mirror: turns about y and z the other way."""
+    """Return a trunk's setting in the mirror image: angles about y and z are negated."""
     return {key: -value if isinstance(key, tuple) and key[1] > 0 else value for key, value in setting.items()}
 
 
-def _leaning(setting: Setting) -> Setting:
-    """What a limb does that was the other one's, in the mirror."""
+def _swap_lean(setting: Setting) -> Setting:
+    """Return the setting that a limb takes from the other in the mirror image: only a lean to the left is negated."""
     return {key: -value if key == "lean left" else value for key, value in setting.items()}
 
 
-def _over(upper: Setting, lower: Setting) -> Setting:
-    """The upper setting on top of the lower one. A leg is in the air, touches or stands: the last word counts."""
-    kinds = [kind for kind in KINDS if kind in upper]
-    return {key: value for key, value in lower.items() if not (kinds and key in KINDS)} | dict(upper)
+def _overlay(upper: Setting, lower: Setting) -> Setting:
+    """Overlay one setting on another. A support in `upper` replaces any in `lower`."""
+    replaces = any(support in upper for support in SUPPORTS)
+    return {key: value for key, value in lower.items() if not (replaces and key in SUPPORTS)} | dict(upper)
 
 
 def tempo(text: str, where: Where) -> float:
-    """Counts a minute."""
+    """Parse counts per minute, from 1 to 6000; FormatError for anything else."""
     if not NUMBER.fullmatch(text) or not 1.0 <= float(text) <= 6000.0:
         raise where.error(f"tempo {text}: give counts a minute, from 1 to 6000")
     return float(text)
 
 
 def number(text: str, what: str, where: Where) -> float:
-    """A number, written after `what`."""
+    """Parse the number written after `what`, at most 1e4 in size; FormatError for anything else."""
     if not NUMBER.fullmatch(text) or abs(float(text)) > 1e4:
         raise where.error(f"{what} {text}".rstrip() + ": a number was expected")
     return float(text)

@@ -1,4 +1,4 @@
-"""Which files a score is made of, found without reading what they say."""
+"""Finds the files that a score is made of, without parsing their content."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from motionmind.formats.text import read_lines
 
 
 def sources(path: Path) -> list[Path]:
-    """The score's file, those that it includes, and those of bodies beside them."""
+    """List a score's file, the scores that it includes, and the body files beside them; resolved paths.
+
+    Raises:
+        FormatError: a file cannot be read.
+    """
     found = [path.resolve()]
-    for score in found:  # it grows as it is read
+    for score in found:  # the list grows during the loop
         for line in read_lines(score):
             word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").partition(" ")
             file = rest.split(" as ")[0].strip()

@@ -13,7 +13,7 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Corpus, subdivided
+from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
@@ -79,7 +79,7 @@ def realise(
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: corpus.to_chains(posture.rotations) for move, posture in postures.items()}
     centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
-    halves = subdivided(keys, 1)
+    halves = subdivide_times(keys, 1)
     if within is None and not through and count != len(path) - 1:
         # A path may take more moves than there is time for; the corpus's ways are not to be hurried.
         halves = np.linspace(0.0, keys[-1], 2 * count + 1)
@@ -106,7 +106,7 @@ def realise(
     between = corpus.detail.shape[1]
     if between:
         detailed = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], poses[::2])
-        detail = natural_spline(subdivided(halves[::2], between), detail_of(corpus, detailed), times)
+        detail = natural_spline(subdivide_times(halves[::2], between), detail_of(corpus, detailed), times)
         rotations = rot.mul(rotations, rot.exp(detail))
     given = np.stack([posture.rotations for posture in postures.values()])
     if within is not None:

@@ -1,1 +1,1 @@
-"""."""
+"""Retargeting: known rigs, mappings of their joints, and movement brought onto human23."""

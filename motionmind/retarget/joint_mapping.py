@@ -1,4 +1,4 @@
-"""Which joint of a file stands for which of human23: by the names of well-known rigs, or as the user says."""
+"""Maps a file's joints onto human23's, by the names of well-known rigs or by the user's table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError
 from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares
 
-# What a skeleton must have, one joint of each line; all else goes along with the joint it hangs from.
+# A skeleton must have one joint of each tuple; any other joint of human23 moves with its parent.
 _ESSENTIAL = (
     ("pelvis",),
     *(
@@ -27,46 +27,49 @@ _ESSENTIAL = (
 
 
 def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> dict[str, str] | None:
-    """Which joints of `skeleton` stand for which of human23: {file's joint: human23's joint}.
+    """Map a skeleton's joints onto human23's: {file's joint: human23's joint}.
 
-    Several joints in a row may stand for one of human23's: it stands where the first does and turns as the last
-    does. Of human23 there must be pelvis, hips, knees, ankles, shoulders, elbows and wrists, one joint of the spine
+    Several joints in a row may map to one of human23's, which takes its place from the first and its rotation from
+    the last. A mapping must cover pelvis, hips, knees, ankles, shoulders, elbows and wrists, one joint of the spine
     (lumbar or thorax) and one of neck and head (cervical or atlantal).
 
     Args:
         skeleton: a file's own skeleton.
-        joints: the user's mapping, from `read_joint_mapping`. Names of the file's joints may lack their namespace and
-            differ in case. None to know the rig by its names: CMU (BVH and ASF), Mixamo, Biovision, Bandai-Namco, SMPL,
-            or human44.
+        joints: the user's mapping, as `read_joint_mapping` returns it. Names of the file's joints may lack their
+            namespace and differ in case. None recognises the rig by its names: CMU (BVH and ASF), Mixamo, Biovision,
+            Bandai-Namco, SMPL, or human44.
 
     Returns:
-        The mapping in the skeleton's order; None where `joints` is None and no rig has these names.
+        The mapping in the skeleton's order; None if `joints` is None and no rig has these names.
 
     Raises:
-        SkeletonError: `joints` names what is not there, or lacks an essential joint.
+        SkeletonError: `joints` names an unknown joint, or lacks an essential one.
     """
     if joints is not None:
-        return _own_mapping(skeleton, joints)
+        return _resolve(skeleton, joints)
     known = known_rig(skeleton)
     return None if known is None else known[1]
 
 
 def is_human44(skeleton: Skeleton) -> bool:
-    """Whether the skeleton has human44's joints, by names as known rigs are; on human23 it would lose some of them."""
+    """Return whether the skeleton has human44's joints, by name; human23 would lose some of them."""
     known = known_rig(skeleton)
     return known is not None and known[0].name == "human44"
 
 
 def filled_joints(mapping: Mapping[str, str]) -> list[str]:
-    """The joints of human23 for which a mapping has no source: they go along with the joint they hang from."""
+    """Return the joints of human23 that nothing maps to; they move with their parents."""
     return [name for name in human23().names if name not in set(mapping.values())]
 
 
 def read_joint_mapping(path: str | Path) -> dict[str, str]:
-    """A user's mapping {file's joint: human23's joint} from a TOML or JSON file (by suffix; TOML is taken else).
+    """Read a user's mapping from a file: JSON if its suffix is `.json`, TOML otherwise.
 
-    TOML: `Hips = "pelvis"`, one a line; names with other characters than letters, digits, - and _ in quotes. The
-    lines may stand under `[joints]`. JSON: one object, or one under "joints".
+    TOML has lines such as `Hips = "pelvis"`, alone or under `[joints]`; names with characters other than letters,
+    digits, - and _ need quotes. JSON has one object, alone or under "joints".
+
+    Returns:
+        {file's joint: human23's joint}.
 
     Raises:
         FormatError: the file cannot be read, or names a joint that human23 does not have.
@@ -78,25 +81,29 @@ def read_joint_mapping(path: str | Path) -> dict[str, str]:
     except OSError as error:
         raise FormatError(f"cannot be read: {error.strerror or error}", path=path) from None
     except (ValueError, RecursionError) as error:  # of either parser, and of UTF-8
-        raise FormatError(f"no mapping of joints: {error}", path=path) from None
+        raise FormatError(f"not a joint mapping: {error}", path=path) from None
     if isinstance(table, dict) and isinstance(table.get("joints"), dict):
         table = table["joints"]
     if not isinstance(table, dict) or not table:
-        raise FormatError('no mapping of joints: it must hold lines such as Hips = "pelvis"', path=path)
+        raise FormatError('not a joint mapping: it must hold lines such as Hips = "pelvis"', path=path)
     for source, target in table.items():
         if not isinstance(target, str):
             raise FormatError(
-                f"{source!r} must be given the name of a joint of human23, as text (a name with a dot in it needs "
-                "quotes)",
+                f"{source!r} must be given the name of a joint of human23, as text (a name with a dot needs quotes)",
                 path=path,
             )
         if target not in human23().names:
-            raise FormatError(f"{source!r}: {_unknown(target, human23().names, 'human23')}", path=path)
+            raise FormatError(f"{source!r}: {_describe_unknown(target, human23().names, 'human23')}", path=path)
     return table
 
 
 def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
-    """The first rig whose names the skeleton has, all essential ones at least, and its mapping."""
+    """Recognise a rig by its joints' names.
+
+    Returns:
+        The first of `RIGS` of which the skeleton has all essential joints, and its mapping {file's joint: human23's
+        joint} in the skeleton's order; None if there is none.
+    """
     plain = plain_names(skeleton.names)
     for rig in RIGS:
         spine = spine_shares([name for name in rig.spine if name in plain])
@@ -104,7 +111,7 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
         order = list(table)
         found = sorted((order.index(name), i) for i, name in enumerate(plain) if name in table)
         mapping: dict[int, str] = {}
-        for _, i in found:  # in the table's order, so that the first of two that are not in a row counts
+        for _, i in found:  # in the table's order: of two joints not in a row the first counts
             target = table[plain[i]]
             if all(in_a_row(skeleton, i, other) for other, taken in mapping.items() if taken == target):
                 mapping[i] = target
@@ -113,24 +120,25 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
     return None
 
 
-def _own_mapping(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:
+def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:
+    """Resolve and check the user's mapping; return it by the skeleton's own names, in their order."""
     plain = plain_names(skeleton.names)
     mapping: dict[int, str] = {}
     for source, target in joints.items():
         if target not in human23().names:
-            raise SkeletonError(f"mapping of {source!r}: {_unknown(target, human23().names, 'human23')}")
-        same = [i for i, name in enumerate(skeleton.names) if name == source]
-        same = same or [i for i, name in enumerate(plain) if [name] == plain_names([source])]
-        if len(same) != 1:
-            raise SkeletonError(f"mapping to {target}: {_unknown(source, skeleton.names, skeleton.name)}")
-        if mapping.get(same[0], target) != target:
-            raise SkeletonError(f"mapping of {source!r}: it is given both {mapping[same[0]]} and {target}")
-        mapping[same[0]] = target
+            raise SkeletonError(f"mapping of {source!r}: {_describe_unknown(target, human23().names, 'human23')}")
+        matches = [i for i, name in enumerate(skeleton.names) if name == source]
+        matches = matches or [i for i, name in enumerate(plain) if [name] == plain_names([source])]
+        if len(matches) != 1:
+            raise SkeletonError(f"mapping to {target}: {_describe_unknown(source, skeleton.names, skeleton.name)}")
+        if mapping.get(matches[0], target) != target:
+            raise SkeletonError(f"mapping of {source!r}: it is given both {mapping[matches[0]]} and {target}")
+        mapping[matches[0]] = target
     for i, target in mapping.items():
         for other, taken in mapping.items():
             if taken == target and not in_a_row(skeleton, i, other):
                 names = f"{skeleton.names[i]!r} and {skeleton.names[other]!r}"
-                raise SkeletonError(f"{names} both stand for {target}, but neither hangs from the other")
+                raise SkeletonError(f"{names} both map to {target}, but neither descends from the other")
     missing = _missing(mapping.values())
     if missing:
         raise SkeletonError(f"the mapping onto human23 lacks {', '.join(missing)}")
@@ -138,19 +146,21 @@ def _own_mapping(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str
 
 
 def _missing(targets: Iterable[str]) -> list[str]:
-    there = set(targets)
-    return [" or ".join(choice) for choice in _ESSENTIAL if not there & set(choice)]
+    """Name the essential joints of human23 that `targets` lacks."""
+    present = set(targets)
+    return [" or ".join(choice) for choice in _ESSENTIAL if not present & set(choice)]
 
 
 def in_a_row(skeleton: Skeleton, a: int, b: int) -> bool:
-    """Whether of the joints `a` and `b` (indices) one hangs from the other, or both are the same."""
+    """Return whether one of the joints `a` and `b` (indices) is the other or descends from it."""
     low, high = max(a, b), min(a, b)
     while low > high:
         low = skeleton.parents[low]
     return low == high
 
 
-def _unknown(name: str, names: Iterable[str], where: str) -> str:
+def _describe_unknown(name: str, names: Iterable[str], where: str) -> str:
+    """Say that there is no joint `name`, with the closest known name or all of them."""
     close = {known.lower(): known for known in names}
     match = difflib.get_close_matches(name.lower(), close, n=1)
     hint = f"did you mean {close[match[0]]!r}?" if match else f"its joints are {', '.join(names)}"

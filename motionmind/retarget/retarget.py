@@ -1,17 +1,17 @@
-"""Movement from one skeleton to another: onto human23 where the joints map to it.
+"""Retargets movement onto human23.
 
-A joint of human23 takes the rotation in space of the file's joint that stands for it, times a constant: its
-*alignment*, where human23's axes lie in the frame of the file's joint. So the same movement has the same rotations,
-whatever body and whatever axes it was recorded on. Proportions stay the performer's.
+Each joint of human23 takes the global rotation of the file's joint that maps to it, times a constant *alignment*: the
+orientation of human23's axes in the frame of the file's joint. The same movement so has the same rotations, whatever
+body and axes it was recorded on. Proportions stay the performer's.
 
 Alignments are read from the zero pose (all rotations 0), where the axes of a file's joints are the world's. In most
-files it is a body that stands upright, with arms and legs held in some way:
+files it is a body that stands upright, with arms and legs in some position:
 
 - the trunk (with clavicles) stands upright and faces one way: human23's axes are up, left and ahead. The slopes of
   single bones there are anatomy, not posture, and are not copied;
-- limbs (hip, knee, shoulder, elbow, wrist) are turned the smallest way from human23's bone to the file's, seen from
-  the joint above, as arms that hang or legs that are spread are turned;
-- feet stand flat, so an ankle is turned about the shank only, toes as the ankle.
+- limbs (hip, knee, shoulder, elbow, wrist) take the smallest rotation from human23's bone to the file's, relative to
+  the parent joint: arms hang, or legs are spread, by such rotations;
+- feet stand flat, so an ankle is rotated about the shank only, and toes as the ankle.
 
 Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.frames`).
 """
@@ -46,66 +46,84 @@ Movement = TypeVar("Movement", Motion, Posture)
 
 _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "fingers"}
 
-# Metres below which two joints are in one place; radians up to which a trunk that leans counts as upright; the share
-# of a foot's length that must be across the shank for the foot to stand on its sole.
-_NOWHERE = 1e-6
-_LEANS = np.radians(25.0)
-_POINTED = 0.4
+_SAME_PLACE = 1e-6  # metres below which two joints coincide
+_LEANS = np.radians(25.0)  # the largest lean of a trunk that counts as upright
+_POINTED = 0.4  # the share of a foot's length that lies across the shank if the foot stands on its sole
 
 _UP = np.array([0.0, 1.0, 0.0])
 
-# Y up from Z up: z becomes y, and what faced -y faces +z.
+# From z up to y up: z becomes y, and a body that faced -y faces +z.
 _Z_UP = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
 
 
 def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, up: str | None = None) -> Movement:
-    """The movement on human23's joints, with the performer's proportions.
+    """Retarget movement to human23's joints, with the performer's proportions.
 
-    Forward kinematics gives the file's joint positions again, exactly except where several joints of the file became
+    Forward kinematics reproduces the file's joint positions exactly, except where several joints of the file became
     one: there a bent chain has become a straight bone. (CMU, where three joints of the spine become two: neck and
     arms are 21 mm off on average in 20 clips of a dancer, 65 mm at most; 8 mm and 32 mm in 9 clips of karate; the
-    legs are exact.) Joints that the file lacks, such as toes or fingers, go along with the joint they hang from, at
-    human23's place scaled by the length of the legs. Movement that is on human23 already is returned as it is; what
-    came from there to human44, with the joints that are new there at rest, comes back as it was.
+    legs are exact.) Joints that the file lacks, such as toes or fingers, move with their parents, at human23's place
+    scaled by the length of the legs. Movement on human23 is returned unchanged; movement taken from there to human44,
+    whose new joints stay at rest, comes back unchanged.
 
     Args:
-        movement: on the file's own skeleton.
-        joints: {file's joint: human23's joint} as for `joint_mapping`; None to know the rig by its names.
-        up: "y" or "z", the vertical in the file. None takes z where the zero pose stands along z, unless the
-            movement itself stands along y; y otherwise.
+        movement: a motion or posture on the file's own skeleton.
+        joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
+        up: "y" or "z", the vertical in the file. None takes z if the zero pose stands along z, unless the movement
+            itself stands along y; y otherwise.
+
+    Returns:
+        The movement on human23, y up, in metres.
 
     Raises:
-        SkeletonError: the skeleton does not map to human23, or stands in its zero pose in no way that can be read.
+        SkeletonError: the skeleton does not map to human23, or its zero pose does not show how the body stands.
         MotionMindError: `up` is neither "y" nor "z".
     """
     if up not in (None, "y", "z"):
         raise MotionMindError(f'up must be "y" or "z", not {up!r}')
     if joints is None and up != "z" and human23().difference(movement.skeleton) is None:
         return movement
-    fit = _fit(movement.skeleton, joints)
-    named: dict[str, Any] = {}
+    fit = _fit_human23(movement.skeleton, joints)
+    renamed: dict[str, Any] = {}
     if isinstance(movement, Motion) and movement.insertions:
         mapping = joint_mapping(movement.skeleton, joints) or {}
-        named["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
+        renamed["insertions"] = tuple(one.renamed(mapping) for one in movement.insertions)
     upright = _Z_UP if (up or _vertical(fit, movement)) == "z" else rot.IDENTITY
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns, :]
     turned = rot.mul(rot.mul(upright, turned), fit.alignment)
     rotations = rot.normalise(fit.skeleton.local_rotations(turned))
     root = movement.skeleton.positions(movement.rotations, movement.root)[..., fit.pelvis, :]
-    return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=rot.mul_vec(upright, root), **named)
+    return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=rot.mul_vec(upright, root), **renamed)
+
+
+def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) -> Movement:
+    """Retarget movement to human23 if its joints map there; return it unchanged otherwise.
+
+    Args:
+        movement: a motion or posture.
+        joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
+
+    Returns:
+        The movement on human23 or on its own skeleton. On human44, which has joints that human23 lacks, it stays
+        unless `joints` is given.
+
+    Raises:
+        SkeletonError: as `to_human23`.
+    """
+    known = joint_mapping(movement.skeleton) is not None and not is_human44(movement.skeleton)
+    return to_human23(movement, joints) if known or joints is not None else movement
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """human23 in the frames of a file's skeleton.
+    """human23 fitted to a file's skeleton.
 
     Attributes:
-        turns: for each joint of human23 the index of the file's joint whose rotation it takes [23].
-        pelvis: index of the file's joint where the pelvis stands.
-        alignment: where human23's axes lie in the frames of those joints, quaternions [23, 4].
+        turns: for each joint of human23, index of the file's joint whose rotation it takes [23].
+        pelvis: index of the file's joint at the pelvis's place.
+        alignment: orientation of human23's axes in the frames of those joints, quaternions [23, 4].
         skeleton: human23 with the file's proportions.
-        up: direction of the trunk in the pelvis' source's frame [3] where that frame's zero pose stands; 0 where
-            it does not.
+        up: direction of the trunk in the frame of the pelvis's source [3]; 0 if the zero pose does not stand.
     """
 
     turns: Indices
@@ -117,20 +135,27 @@ class _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Sources:
-    """For each joint of human23 the file's joint where it stands and the one it turns with [23]; -1 for none."""
+    """The joints of a file that human23's map to.
+
+    Attributes:
+        skeleton: the file's.
+        stands: for each joint of human23, index of the file's joint that gives its place [23]; -1 for none.
+        turns: the same of the joint that gives its rotation [23].
+        zero: the file's joints in the zero pose [J, 3], metres.
+    """
 
     skeleton: Skeleton
     stands: list[int]
     turns: list[int]
-    zero: Floats  # the file's joints in the zero pose [J, 3], metres
+    zero: Floats
 
     def place(self, joint: str) -> Floats | None:
-        """Where a joint of human23 stands in the zero pose [3]."""
+        """Return the place of a joint of human23 in the zero pose [3]; None if it has no source."""
         index = self.stands[human23().index(joint)]
         return None if index < 0 else self.zero[index]
 
     def far_end(self, joint: str) -> Floats:
-        """From a joint of human23 to the furthest point that hangs from it in the zero pose [3]; 0 for none."""
+        """Return the vector from a joint of human23 to its furthest descendant in the zero pose [3]; 0 for none."""
         top = self.turns[human23().index(joint)]
         reach = np.zeros(3)
         for i in range(len(self.zero)):
@@ -140,33 +165,35 @@ class _Sources:
         return reach
 
 
-def _fit(skeleton: Skeleton, joints: Mapping[str, str] | None) -> _Fit:
+def _fit_human23(skeleton: Skeleton, joints: Mapping[str, str] | None) -> _Fit:
+    """Fit human23 to a file's skeleton; SkeletonError if its joints do not map there."""
     rig: Rig | None = None
     if joints is not None:
         mapping = joint_mapping(skeleton, joints) or {}
     else:
         known = known_rig(skeleton)
         if known is None:
-            raise SkeletonError(f"the joints of {skeleton.name} are none that map to human23: give a mapping")
+            raise SkeletonError(f"the joints of {skeleton.name} do not map to human23: give a mapping")
         rig, mapping = known
-    sources = _sources(skeleton, mapping)
-    if rig is not None and rig.frames and _agree(sources, rig.frames):
-        alignment = _inherit({name: rig.frames[name] for name in rig.frames if name in mapping.values()})
+    sources = _find_sources(skeleton, mapping)
+    if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
+        alignment = _inherit_alignments({name: rig.frames[name] for name in rig.frames if name in mapping.values()})
         up = np.zeros(3)
     else:
-        stance = _stance(sources)
-        alignment = _standing(sources, stance, rig)
-        up = rot.mul_vec(stance, _UP)
+        body_axes = _body_axes(sources)
+        alignment = _align_standing(sources, body_axes, rig)
+        up = rot.mul_vec(body_axes, _UP)
     turns = list(sources.turns)
     for i, parent in enumerate(human23().parents):
         turns[i] = turns[parent] if turns[i] < 0 else turns[i]
     return _Fit(np.array(turns), sources.stands[0], alignment, _proportions(sources, alignment), up)
 
 
-def _sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
+def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
+    """Find the file's joints for each of human23's; SkeletonError if the mapping reverses a chain."""
     body = human23()
     stands, turns = [-1] * len(body), [-1] * len(body)
-    for i, name in enumerate(skeleton.names):  # in topological order: the first of a row, then the last
+    for i, name in enumerate(skeleton.names):  # in topological order: the first of a row stands, the last turns
         if name in mapping:
             joint = body.index(mapping[name])
             stands[joint] = i if stands[joint] < 0 else stands[joint]
@@ -183,15 +210,15 @@ def _sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
         ):
             low, high = skeleton.names[turns[parent]], skeleton.names[turns[joint]]
             raise SkeletonError(
-                f"{low!r} stands for {body.names[parent]} and {high!r} for {body.names[joint]}, but {low!r} hangs "
+                f"{low!r} maps to {body.names[parent]} and {high!r} to {body.names[joint]}, but {low!r} hangs "
                 f"from {high!r}"
             )
     zero = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
     return _Sources(skeleton, stands, turns, zero)
 
 
-def _inherit(alignment: Mapping[str, Floats]) -> Floats:
-    """Alignments of all joints [23, 4]: those without one take that of the joint they hang from."""
+def _inherit_alignments(alignment: Mapping[str, Floats]) -> Floats:
+    """Return alignments of all joints [23, 4]; those without one take their parent's."""
     body = human23()
     out = np.zeros((len(body), 4))
     for i, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):
@@ -199,8 +226,8 @@ def _inherit(alignment: Mapping[str, Floats]) -> Floats:
     return out
 
 
-def _agree(sources: _Sources, frames: Mapping[str, Floats]) -> bool:
-    """Whether arms and legs lie in the zero pose where a rig's table of frames says, within 30 degrees.
+def _zero_pose_matches(sources: _Sources, frames: Mapping[str, Floats]) -> bool:
+    """Return whether the limbs' directions in the zero pose match a rig's table of frames, within 30 degrees.
 
     Other rigs use the same names with a zero pose that stands.
     """
@@ -212,88 +239,88 @@ def _agree(sources: _Sources, frames: Mapping[str, Floats]) -> bool:
 
 
 def _limb_bones(sources: _Sources) -> Iterator[tuple[str, Floats, Floats]]:
-    """Joint of human23, its bone in the file's zero pose [3], and in human23's rest pose [3]; downwards."""
+    """Yield each limb joint, its bone in the zero pose [3] and in human23's rest pose [3]; parents first."""
     for side in ("left", "right"):
         for joint, child in _LIMBS.items():
             start, end = sources.place(f"{side}_{joint}"), sources.place(f"{side}_{child}")
-            if start is not None and end is not None and np.linalg.norm(end - start) > _NOWHERE:
+            if start is not None and end is not None and np.linalg.norm(end - start) > _SAME_PLACE:
                 yield f"{side}_{joint}", end - start, human23().offsets[human23().index(f"{side}_{child}")]
 
 
-def _stance(sources: _Sources) -> Floats:
-    """Rotation [4] from human23's axes to the axes up, left and ahead of the body in the file's zero pose."""
+def _body_axes(sources: _Sources) -> Floats:
+    """Return the rotation [4] from human23's axes to the body's axes left, up and ahead in the file's zero pose."""
 
     def place(joint: str) -> Floats:
         found = sources.place(joint)
-        assert found is not None  # what is essential is there
+        assert found is not None  # mappings have all essential joints
         return found
 
     hips, shoulders = ([place(f"{side}_{joint}") for side in ("left", "right")] for joint in ("hip", "shoulder"))
     up = shoulders[0] + shoulders[1] - hips[0] - hips[1]
     left = _unit(hips[0] - hips[1]) + _unit(shoulders[0] - shoulders[1])
     ahead = np.cross(left, up)
-    if np.linalg.norm(ahead) < _NOWHERE:
+    if np.linalg.norm(ahead) < _SAME_PLACE:
         raise SkeletonError(
             f"{sources.skeleton.name}: with all rotations 0, hips and shoulders do not show where up and left are"
         )
     up, ahead = _unit(up), _unit(ahead)
-    seen = np.stack([np.cross(up, ahead), up, ahead], axis=-1)
-    # A body that leans by a few degrees in its zero pose is built so: its axes are the nearest of the world's.
-    square = np.where(np.abs(seen) == np.max(np.abs(seen), axis=0), np.sign(seen), 0.0)
-    if np.linalg.det(square) > 0.5 and np.trace(square.T @ seen) > 1.0 + 2.0 * np.cos(_LEANS):
-        seen = square
-    return rot.from_matrix(seen)
+    axes = np.stack([np.cross(up, ahead), up, ahead], axis=-1)
+    # A lean of a few degrees in the zero pose is the rig's: the axes are then the nearest of the world's.
+    square = np.where(np.abs(axes) == np.max(np.abs(axes), axis=0), np.sign(axes), 0.0)
+    if np.linalg.det(square) > 0.5 and np.trace(square.T @ axes) > 1.0 + 2.0 * np.cos(_LEANS):
+        axes = square
+    return rot.from_matrix(axes)
 
 
-def _standing(sources: _Sources, stance: Floats, rig: Rig | None) -> Floats:
-    """Alignments [23, 4] for a zero pose that stands: the rules at the head of this module."""
+def _align_standing(sources: _Sources, body_axes: Floats, rig: Rig | None) -> Floats:
+    """Return alignments [23, 4] for a zero pose that stands, by the rules in this module's docstring."""
     body = human23()
-    found: dict[str, Floats] = {"pelvis": stance}
+    alignment: dict[str, Floats] = {"pelvis": body_axes}
     bones = {joint: (bone, rest) for joint, bone, rest in _limb_bones(sources)}
     for name, parent in zip(body.names[1:], body.parents[1:], strict=True):
-        above = found[body.names[parent]]
-        found[name] = above
+        above = alignment[body.names[parent]]
+        alignment[name] = above
         if name in bones:
             bone, rest = bones[name]
-            found[name] = rot.mul(rot.between(rot.mul_vec(above, rest), bone), above)
+            alignment[name] = rot.mul(rot.between(rot.mul_vec(above, rest), bone), above)
         elif name.endswith("_ankle"):
-            found[name] = _foot(sources, name, above)
+            alignment[name] = _align_ankle(sources, name, above)
         elif name == "cervical" and rig is not None and rig.neck_leans:
-            found[name] = rot.mul(rot.between(rot.mul_vec(stance, _UP), _neck(sources)), above)
+            alignment[name] = rot.mul(rot.between(rot.mul_vec(body_axes, _UP), _neck_bone(sources)), above)
     for name, twist in rig.twists.items() if rig is not None else ():
-        found[name] = rot.mul(found[name], rot.from_axis_angle([1.0, 0.0, 0.0], twist))
-    return np.array([found[name] for name in body.names])
+        alignment[name] = rot.mul(alignment[name], rot.from_axis_angle([1.0, 0.0, 0.0], twist))
+    return np.array([alignment[name] for name in body.names])
 
 
-def _neck(sources: _Sources) -> Floats:
-    """From the joint that the neck turns in to the head [3]; up where they are in one place."""
+def _neck_bone(sources: _Sources) -> Floats:
+    """Return the vector from the neck's joint to the head in the zero pose [3]; up if they coincide."""
     head = sources.place("atlantal")
     bone = _UP if head is None else head - sources.zero[sources.turns[human23().index("cervical")]]
-    return bone if np.linalg.norm(bone) > _NOWHERE else _UP
+    return bone if np.linalg.norm(bone) > _SAME_PLACE else _UP
 
 
-def _foot(sources: _Sources, ankle: str, shank: Floats) -> Floats:
-    """Alignment [4] of an ankle below a shank with the alignment `shank` [4]."""
+def _align_ankle(sources: _Sources, ankle: str, shank: Floats) -> Floats:
+    """Return the alignment [4] of an ankle below a shank with the alignment `shank` [4]."""
     toes = ankle.replace("ankle", "toes")
     start, end = sources.place(ankle), sources.place(toes)
     bone = sources.far_end(ankle) if start is None or end is None else end - start
     length = np.linalg.norm(bone)
-    if length < _NOWHERE:
+    if length < _SAME_PLACE:
         return shank
     down, ahead = rot.mul_vec(shank, np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]))
     level = bone - (bone @ down) * down
-    if np.linalg.norm(level) < _POINTED * length:  # a foot that hangs down has no sole to stand on: a bone like others
+    if np.linalg.norm(level) < _POINTED * length:  # a foot that points down does not stand: align it like other bones
         rest = human23().offsets[human23().index(toes)]
         return rot.mul(rot.between(rot.mul_vec(shank, rest), bone), shank)
     if level @ ahead < -_POINTED * length:
         raise SkeletonError(
-            f"{sources.skeleton.name}: {ankle} points backwards with all rotations 0; are left and right exchanged?"
+            f"{sources.skeleton.name}: {ankle} points backwards with all rotations 0; are left and right swapped?"
         )
     return rot.mul(rot.between(ahead, level), shank)
 
 
 def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
-    """human23 with offsets and tips, in metres, as they are in the file's zero pose."""
+    """Return human23 with the offsets and tips of the file's zero pose, in metres."""
     body = human23()
     legs = [
         np.linalg.norm(bone) / np.linalg.norm(rest) for joint, bone, rest in _limb_bones(sources) if "knee" in joint
@@ -301,7 +328,7 @@ def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
     scale = float(np.mean(legs)) if legs else 1.0
     places, offsets, tips = np.zeros((23, 3)), np.zeros((23, 3)), np.zeros((23, 3))
     for i, (name, parent) in enumerate(zip(body.names, body.parents, strict=True)):
-        seen = rot.inv(alignment[parent])
+        into_parent = rot.inv(alignment[parent])
         found = sources.place(name)
         if parent < 0:
             places[i] = sources.zero[sources.stands[0]]
@@ -310,17 +337,17 @@ def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
             places[i] = places[parent] + rot.mul_vec(alignment[parent], scale * body.offsets[i])
         else:
             places[i] = found
-        offsets[i] = rot.mul_vec(seen, places[i] - places[parent])
+        offsets[i] = rot.mul_vec(into_parent, places[i] - places[parent])
         if np.any(body.tips[i]):
             tip = rot.mul_vec(rot.inv(alignment[i]), sources.far_end(name))
-            tips[i] = tip if np.linalg.norm(tip) > _NOWHERE else scale * body.tips[i]
-    if np.allclose(offsets, body.offsets, atol=_NOWHERE) and np.allclose(tips, body.tips, atol=_NOWHERE):
+            tips[i] = tip if np.linalg.norm(tip) > _SAME_PLACE else scale * body.tips[i]
+    if np.allclose(offsets, body.offsets, atol=_SAME_PLACE) and np.allclose(tips, body.tips, atol=_SAME_PLACE):
         return body
     return Skeleton(body.name, body.names, body.parents, offsets, tips)
 
 
 def _vertical(fit: _Fit, movement: Motion | Posture) -> str:
-    """ "z" where the zero pose stands along z, unless the movement stands along y; else "y"."""
+    """Return "z" if the zero pose stands along z, unless the movement stands along y; else "y"."""
     if fit.up[2] < 0.7:
         return "y"
     turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns[0], :]
@@ -330,16 +357,4 @@ def _vertical(fit: _Fit, movement: Motion | Posture) -> str:
 
 def _unit(v: Floats) -> Floats:
     length = np.linalg.norm(v)
-    return v / length if length > _NOWHERE else np.zeros(3)
-
-
-_Movement = TypeVar("_Movement", Motion, Posture)
-
-
-def own_skeleton(movement: _Movement, joints: Mapping[str, str] | None = None) -> _Movement:
-    """The movement on human23 where its joints map there, by `joints` or by known names; as it is where they do not.
-
-    Movement on human44, which has joints that human23 lacks, stays there too, unless `joints` is given.
-    """
-    known = joint_mapping(movement.skeleton) is not None and not is_human44(movement.skeleton)
-    return to_human23(movement, joints) if known or joints is not None else movement
+    return v / length if length > _SAME_PLACE else np.zeros(3)

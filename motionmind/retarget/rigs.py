@@ -1,12 +1,12 @@
-"""Rigs: how the joints of well-known files are called, and how their axes lie in the body.
+"""Well-known rigs: their joints' names, and the orientation of their axes in the body.
 
-Names are written here without case, punctuation or namespace, as `plain_names` gives them: "mixamorig:LeftUpLeg" is
-"leftupleg". Several joints in a row may stand for one of human23's: it stands where the first does and turns as the
-last does.
+Names are written here without case, punctuation or namespace, as `plain_names` returns them: "mixamorig:LeftUpLeg" is
+"leftupleg". Several joints in a row may map to one of human23's, which takes its place from the first and its rotation
+from the last.
 
 Sources of the names: the CMU Motion Capture Database's ASF files and their conversion to BVH by B. Hahne
 (cgspeed.com); Mixamo's and Autodesk HumanIK's rigs (the same but for the namespace); Biovision's own names, in use
-since the format's first files; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its kin.
+since the format's first files; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its variants.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ class Rig:
     """A family of skeletons that share their joints' names.
 
     Attributes:
-        name: what the rig is called.
-        joints: plain name of a file's joint -> the joint of human23 that it stands for, without the spine. Of
-            names for one joint that do not hang from each other, the first that a skeleton has counts.
-        spine: plain names of all joints from the pelvis to the one that carries the arms, upwards. As many as a
-            skeleton has are shared out among lumbar and thorax.
-        marks: plain names without which a skeleton is not of this rig, whatever else it has.
-        frames: for rigs whose zero pose is no standing body, where human23's axes lie in each joint's own frame:
-            joint of human23 -> quaternion [4]. Empty where the zero pose stands.
-        neck_leans: whether the slope of the neck in the zero pose is posture, so that a neck and head at rest are
-            turned upright from it, and not anatomy.
-        twists: joint of human23 -> radians by which human23's axes are turned about +x in the file's, once the
-            bones' directions agree: what the direction of a bone cannot tell.
+        name: the rig's name.
+        joints: by plain name of a file's joint, the joint of human23 that it maps to; without the spine. Of names for
+            one joint that do not descend from each other, the first that a skeleton has counts.
+        spine: plain names of all joints from the pelvis upwards to the one that carries the arms. Those that a
+            skeleton has are divided between lumbar and thorax.
+        marks: plain names that every skeleton of this rig has.
+        frames: for rigs whose zero pose does not stand, by joint of human23, the orientation of its axes in the file's
+            joint's own frame, quaternions [4]. Empty if the zero pose stands.
+        neck_leans: whether the slope of the neck in the zero pose is posture, not anatomy: a neck and head at rest are
+            then turned upright from it.
+        twists: by joint of human23, radians by which its axes are turned about +x in the file's, once the bones'
+            directions agree; a bone's direction does not determine its twist.
     """
 
     name: str
@@ -51,26 +51,26 @@ class Rig:
 
 
 def plain_names(names: Sequence[str]) -> list[str]:
-    """The names without what varies from file to file: namespaces, a common prefix, case, punctuation."""
+    """Strip from names what varies from file to file: namespaces, a common prefix, case, punctuation."""
     bare = [re.split(r"[:|]", name)[-1] or name for name in names]
-    # "Character1_Hips", "Character1_Spine": what all share, if it ends where a word does.
+    # "Character1_Hips", "Character1_Spine": the common prefix, if it ends at a word's end.
     first = re.match(r".*[^A-Za-z0-9]", bare[0])
     prefix = first[0] if first and all(name.startswith(first[0]) for name in bare) else ""
     return [re.sub(r"[^a-z0-9]", "", name.removeprefix(prefix).lower()) for name in bare]
 
 
 def spine_shares(chain: Sequence[str]) -> dict[str, str]:
-    """Which joints of a spine, listed upwards, are the lumbar's, and which the thorax's.
+    """Divide a spine's joints, listed upwards, between human23's lumbar and thorax: {name: "lumbar" or "thorax"}.
 
-    The last is always the thorax, since it carries the arms. Of an odd number the lumbar has the more: so the
-    thorax stands where human23's does in CMU's spines of three (0.24 m and 0.23 m above the pelvis).
+    The last joint, which carries the arms, is always the thorax's. Of an odd number the lumbar gets one more: in CMU's
+    spines of three the thorax is then as high as human23's (0.24 m and 0.23 m above the pelvis).
     """
     upper = max(1, len(chain) // 2)
     return {name: "lumbar" if i < len(chain) - upper else "thorax" for i, name in enumerate(chain)}
 
 
 def _both_sides(sided: Mapping[str, str]) -> dict[str, str]:
-    """Names for left and right: "{side}" is the word, "{s}" its initial."""
+    """Expand names for left and right: "{side}" is the word, "{s}" its initial."""
     return {
         name.format(side=side, s=side[0]): f"{side}_{joint}"
         for side in ("left", "right")
@@ -79,7 +79,7 @@ def _both_sides(sided: Mapping[str, str]) -> dict[str, str]:
 
 
 def _axes(x: str, y: str, pitch: float = 0.0) -> Floats:
-    """Quaternion [4] that takes +x and +y to signed axes such as "-z"; first `pitch` degrees about +x."""
+    """Return the quaternion [4] that takes +x and +y to signed axes such as "-z", after `pitch` degrees about +x."""
     columns = [(-1.0 if name[0] == "-" else 1.0) * np.eye(3)["xyz".index(name[1])] for name in (x, y)]
     turned = rot.from_matrix(np.stack([*columns, np.cross(*columns)], axis=-1))
     return rot.mul(turned, rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(pitch)))
@@ -101,7 +101,7 @@ _HUMANIK = {
         "{side}arm": "shoulder",
         "{side}forearm": "elbow",
         "{side}hand": "wrist",
-        "{side}fingerbase": "wrist",  # CMU's hand; its {side}hand only rolls the forearm
+        "{side}fingerbase": "wrist",  # CMU's hand; its {side}hand only twists the forearm
         "{side}handmiddle1": "fingers",
         "{side}handindex1": "fingers",
         "{side}handend": "fingers",
@@ -109,11 +109,11 @@ _HUMANIK = {
 )
 _HUMANIK_SPINE = ("lowerback", "spine", "spine1", "spine2", "spine3", "spine4", "spine5")
 
-# CMU's neck has two bones, too. The upper one stands where human23's cervical joint does, and the head strays half as
-# far from its place as when both are joined (16 mm instead of 23 mm in five clips of karate).
+# CMU's neck, too, has two bones. The upper one is where human23's cervical joint is, and taking it alone keeps the head
+# closer to its place than joining both (16 mm off instead of 23 mm, in five clips of karate).
 _CMU_BVH = {name: joint for name, joint in _HUMANIK.items() if name != "neck"}
 
-# lwrist only rolls the forearm: the joint that the hand turns in is lhand.
+# lwrist only twists the forearm; the hand's joint is lhand.
 _CMU_ASF = {
     "root": "pelvis",
     "upperneck": "cervical",
@@ -173,11 +173,11 @@ _BANDAI = {"hips": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sid
     }
 )
 
-# Bandai's zero pose is no body that stands: in each joint's frame the bone lies along +x (right limbs: -x) and the
-# hinge of knee and elbow is y. Where human23's +x (to the left) and +y (up) lie follows from that for limbs, for the
-# trunk from where hips and shoulders are attached. The sense of the hinges is the movement's: knees turn about +y,
-# elbows about -y. With the soles flat on the floor (where the feet of walk, kick and slash rest most of the time) the
-# bone from ankle to toes points 39.6 degrees down, the toes' own x axis 23.0 degrees.
+# Bandai's zero pose does not stand: in each joint's frame the bone lies along +x (right limbs: -x), and the hinge of
+# knee and elbow is y. For limbs this gives human23's +x (left) and +y (up); for the trunk they follow from where hips
+# and shoulders are attached. The sense of the hinges is taken from the movement: knees turn about +y, elbows about -y.
+# With the soles flat on the floor (where the feet of walk, kick and slash rest most of the time) the bone from ankle to
+# toes points 39.6 degrees down, the toes' own x axis 23.0 degrees.
 _TRUNK, _LEG = _axes("+z", "+x"), {"left": ("+y", "-x"), "right": ("+y", "+x")}
 _ARM = {"left": _axes("+x", "+y"), "right": _axes("+x", "-y")}
 _BANDAI_FRAMES = (
@@ -190,13 +190,13 @@ _BANDAI_FRAMES = (
 )
 
 # CMU's elbows are hinges about (0, -0.866, 0.5) in the zero pose of the left arm, 30 degrees off the vertical (the
-# axis of lradius is "180 -30 -90" in the ASF files, and so the BVH's LeftForeArm turns). The hand is not turned with
-# them: its palm is down in that pose. Necks are as they were when the performer was measured: that of subject 05 leans
-# back by 22 degrees, and forward by as much in all movement; that of 135 is straight.
+# axis of lradius is "180 -30 -90" in the ASF files, and the BVH's LeftForeArm turns about it). The hand is not twisted
+# with them: its palm is down in that pose. Necks are as measured on the performer: subject 05's leans back by 22
+# degrees, and forward by as much in all movement; subject 135's is straight.
 _CMU_TWISTS = {f"{side}_{joint}": np.radians(-30.0) for side in ("left", "right") for joint in ("shoulder", "elbow")}
 
-# At rest SMPL stands as human23 does, all axes the world's. spine2 is as high above the pelvis as human23's thorax, and
-# of four fingers the middle one is taken.
+# At rest SMPL stands like human23, all axes the world's. spine2 is as high above the pelvis as human23's thorax; the
+# middle finger represents all four.
 _SMPL = {
     "pelvis": "pelvis",
     "spine1": "lumbar",
@@ -222,8 +222,8 @@ _SMPL = {
 _OWN = {name.replace("_", ""): name for name in human23().names}
 _OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
 
-# Of human44's rows only the spine's are joined; the turn of the axial joint goes to the head, as it does in the body. A
-# fist is folded further than the fingers of human23 can be: they turn with the first row of knuckles, as toes do.
+# Of human44's rows only the spine's are joined; the axial joint's rotation goes to the head, as in the body. A fist
+# folds further than human23's fingers can: they turn with the first row of knuckles, as toes do.
 _HUMAN44 = _OWN | {
     "lumbarmiddle": "lumbar",
     "lumbarupper": "lumbar",

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from motionmind._typing import Ints
-from motionmind.errors import MotionMindError, listed
+from motionmind.errors import MotionMindError, enumerated
 from motionmind.variation.seams import Candidate, Join
 
 Decision = Literal["open", "approved", "discarded"]
@@ -155,7 +155,7 @@ class State:
         for seam in self.seams:
             if seam.number == number:
                 return seam
-        there = listed([str(number) for number in sorted(seam.number for seam in self.seams)], 60)
+        there = enumerated([str(number) for number in sorted(seam.number for seam in self.seams)], 60)
         raise MotionMindError(f"no seam {number}; there are {there or 'none'}")
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.motion import Motion, Posture
-from motionmind.errors import NoPathError, SkeletonError, meant
+from motionmind.errors import NoPathError, SkeletonError, did_you_mean
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween.certificate import Bridge, Wait
@@ -213,7 +213,7 @@ def check_asked(alternatives: int, asked: Mapping[str, Any]) -> None:
     known = signature(Engine.tween).parameters.keys() - {"self", "a", "b", "unlike"}
     for name in asked:
         if name not in known:
-            raise TypeError(f"seams are not smoothed by an argument {name!r}{meant(name, known)}")
+            raise TypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
 
 
 def smooth(

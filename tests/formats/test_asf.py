@@ -315,7 +315,7 @@ def test_no_asf_or_too_many(tmp_path: Path) -> None:
         ("length 50", "length fifty", "toy.asf:20: 'fifty' where a number"),
         ("direction 0 2 0", "direction 0 2", "toy.asf:19: 2 numbers where three"),
         ("0 0 20 XYZ", "0 0 20 XYY", "toy.asf:21: 'XYY' where an order of axes"),
-        ("dof rx ry rz", "dof rx rq rz", "toy.asf:22: 'RQ' is no channel"),
+        ("dof rx ry rz", "dof rx rq rz", "toy.asf:22: 'RQ' is not a channel"),
         ("dof rx ry rz", "dof rx rx rz", "toy.asf:22: the channel RX twice"),
         ("order TX TY TZ RX RY RZ", "", "toy.asf:12: the root has no order"),
         ("name head", "name back", "toy.asf:27: a second bone 'back'"),

@@ -23,7 +23,7 @@ from motionmind.body.human import human23, human44
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.formats import read_motion, write_motion
-from motionmind.formats.npz import smpl_bodies
+from motionmind.formats._smpl import smpl_bodies
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score

@@ -346,19 +346,19 @@ Frame Time: 1
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("HIERARCHY", "HIERARCHI", ":1: no BVH file"),
+        ("HIERARCHY", "HIERARCHI", ":1: not a BVH file"),
         ("OFFSET 0 50 0", "OFFSET 0 fifty 0", ":8: 'fifty' where a number"),
         ("OFFSET 0 50 0", "OFFSET 0 nan 0", ":8: 'nan' where a number"),
         ("OFFSET 0 50 0", "", "joint 'Spine' has no OFFSET"),
         ("CHANNELS 3 Z", "CHANNELS three Z", ":9: 'three' where the number of channels of 'Spine'"),
-        ("CHANNELS 3 Zrotation", "CHANNELS 3 Wrotation", ":9: 'WROTATION' is no channel"),
-        ("CHANNELS 3 Zrotation", "CHANNELS 4 Zrotation", ":10: 'END' is no channel"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 3 Wrotation", ":9: 'WROTATION' is not a channel"),
+        ("CHANNELS 3 Zrotation", "CHANNELS 4 Zrotation", ":10: 'END' is not a channel"),
         ("6 Xposition Yposition", "6 Xposition Xposition", ":5: joint 'Hips' has the channel XPOSITION twice"),
         ("JOINT Leg", "JOINT Spine", ":15: a second joint named 'Spine'"),
         ("JOINT Leg", "ROOT Leg", ":15: a second ROOT"),
         ("JOINT Spine\n  {", "JOINT Spine\n", ":8: 'OFFSET' where the '{' of JOINT Spine was expected"),
         ("JOINT Spine", "JOINT", ":6: a JOINT without a name"),
-        ("    }\n  }\n}\nMOTION", "    }\n  }\nMOTION", "the hierarchy is not whole: 1 '}' missing"),
+        ("    }\n  }\n}\nMOTION", "    }\n  }\nMOTION", "the hierarchy is incomplete: 1 '}' missing"),
         ("MOTION", "MOTI", "'MOTI' where ROOT"),
         ("Frames: 3", "", "no line 'Frames: ...'"),
         ("Frames: 3", "Frames: x", ":26: 'x' where the number of frames"),
@@ -375,7 +375,7 @@ Frame Time: 1
         ("21 31", "21 3_1", ":29: '3_1' where a number"),
         (SMALL[SMALL.index("0 90 0 10") :], "", "no frames after the header"),
         (SMALL[SMALL.index("MOTION") :], "", "no line MOTION"),
-        (SMALL, "", ":1: no BVH file"),
+        (SMALL, "", ":1: not a BVH file"),
     ],
 )
 def test_a_fault_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -505,7 +505,7 @@ def test_a_leaf_without_tip_has_an_end_site(tmp_path: Path) -> None:
 def test_uneven_times_cannot_be_written(tmp_path: Path) -> None:
     motion = wandering(human23(), 3, seed=2)
     uneven = Motion(motion.skeleton, motion.rotations, motion.root, np.array([0.0, 0.1, 0.3]))
-    with pytest.raises(MotionMindError, match=r"even in time; frame 1 is 0\.05 s off a step of 0\.15 s"):
+    with pytest.raises(MotionMindError, match=r"evenly spaced in time; frame 1 is 0\.05 s off a step of 0\.15 s"):
         write_bvh(tmp_path / "a.bvh", uneven)
     assert list(tmp_path.iterdir()) == []
 
@@ -513,7 +513,7 @@ def test_uneven_times_cannot_be_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["", "a{b", "a\nb", " a", "# a"])
 def test_names_that_bvh_cannot_hold(tmp_path: Path, name: str) -> None:
     skeleton = Skeleton("s", (name,), (-1,), np.zeros((1, 3)))
-    with pytest.raises(MotionMindError, match="no joint name that BVH can hold"):
+    with pytest.raises(MotionMindError, match="not a joint name that BVH can hold"):
         write_bvh(tmp_path / "a.bvh", Motion(skeleton, np.array([[[0, 0, 0, 1.0]]]), np.zeros((1, 3)), np.zeros(1)))
 
 

@@ -15,8 +15,8 @@ from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.formats import lossy_fields, read_motion, write_motion
+from motionmind.formats._smpl import smpl_bodies
 from motionmind.formats.bvh import read_bvh
-from motionmind.formats.npz import smpl_bodies
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
 
@@ -66,7 +66,7 @@ def test_frames_a_second(target: str, convert: Run) -> None:
     if target != "json":
         refused = convert("in.json", f"out.{target}")
         assert refused.code == 2
-        assert "needs frames that are even in time; frame 2 is" in refused.err
+        assert "needs frames evenly spaced in time; frame 2 is" in refused.err
         assert not Path(f"out.{target}").exists()
     assert convert("in.json", f"out.{target}", "--fps", 10).out.startswith(f"out.{target}: 8 frames")
     assert read_motion(f"out.{target}").fps == pytest.approx(10.0)

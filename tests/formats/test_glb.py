@@ -410,7 +410,7 @@ def test_names_of_any_script(tmp_path: Path) -> None:
 def test_what_glb_cannot_hold_is_said(tmp_path: Path) -> None:
     motion = wandering(human23(), 3)
     far = Motion(motion.skeleton, motion.rotations, motion.root + 1e7, motion.times, name="far")
-    with pytest.raises(MotionMindError, match=r"far: root: GLB has no place for 1e\+07 metres"):
+    with pytest.raises(MotionMindError, match=r"far: root: GLB cannot hold 1e\+07 metres"):
         write_glb(tmp_path / "a.glb", far)
     late = Motion(motion.skeleton, motion.rotations, motion.root, np.array([0.0, 1e6, 1e6 + 0.01]), name="late")
     with pytest.raises(MotionMindError, match=r"late: frame 2 is 0\.01 s after the one before it, at 1e\+06 s: too cl"):

@@ -235,7 +235,10 @@ POSTURE_FAULTS = [
         ": rotations: human23 has no joint 'left_kne'; did you mean left_knee?",
     ),
     (turned("pelvis", [0, 0, 0, 1], "left_knee"), ": rotations: no left_knee; every joint of human23 needs one"),
-    (swap("skeleton", "human45"), ": skeleton 'human45' has no description here; only human23 and human44 go by"),
+    (
+        swap("skeleton", "human45"),
+        ": skeleton 'human45' has no description here",
+    ),
     (swap("skeleton", 3), ": skeleton: expected str | object, got int"),
     (swap("skeleton", {"name": "x", "joints": []}), ": skeleton 'x' has no joints"),
     (swap("skeleton", {"name": "x"}), ": skeleton: there is no field joints"),
@@ -250,8 +253,8 @@ def test_faults_of_a_posture(posture: Path, change: Callable[[dict], dict], mess
 @pytest.mark.parametrize(
     ("joints", "message"),
     [
-        ([("a", None), ("b", "c")], "the parent 'c' of 'b' does not stand before it"),
-        ([("b", "a"), ("a", None)], "the parent 'a' of 'b' does not stand before it"),
+        ([("a", None), ("b", "c")], "the parent 'c' of 'b' is not listed before it"),
+        ([("b", "a"), ("a", None)], "the parent 'a' of 'b' is not listed before it"),
         ([("a", None), ("a", "a")], "names a more than once"),
         ([("a", None), ("b", None)], "parent of 'b' must stand before it"),
     ],
@@ -265,7 +268,7 @@ def test_faults_of_a_skeleton(posture: Path, joints: list[tuple[str, str | None]
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (swap("times", []), ": times: a motion has one frame at least"),
+        (swap("times", []), ": times: a motion has at least one frame"),
         (swap("times", [0, 1, 2]), ": root has 4 frames, times has 3"),
         (swap("times", [0, 1, 1, 2]), ": times: 1 of frame 2 is not after 1"),
         (swap("times", [0, 1, 2, 1e300]), ": times is 1e+300, beyond"),
@@ -294,7 +297,7 @@ def test_a_plan_as_it_was_written_before_is_an_insertion(motion: Path) -> None:
 def test_a_zero_quaternion_is_named_with_its_frame(motion: Path) -> None:
     content = json.loads(motion.read_text())
     content["rotations"][2][1] = [0, 0, 0, 0]
-    assert ": the rotation of left_hip in frame 2 is zero, which is no rotation" in fails(motion, content)
+    assert ": the rotation of left_hip in frame 2 is zero, which is not a rotation" in fails(motion, content)
 
 
 @pytest.mark.parametrize(
@@ -302,13 +305,13 @@ def test_a_zero_quaternion_is_named_with_its_frame(motion: Path) -> None:
     [
         (b"", ":1: the JSON is cut short"),
         (b'{\n"format": "motionmind-posture",\n"ver', ":3: the JSON is cut short"),
-        (b'{"format": "motionmind-posture",\n "version": NaN}', ":2: NaN is no number that JSON can hold (column 13)"),
-        (b'{"version": -Infinity}', ":1: -Infinity is no number that JSON can hold"),
+        (b'{"format": "motionmind-posture",\n "version": NaN}', ":2: NaN is not a number JSON can hold (column 13)"),
+        (b'{"version": -Infinity}', ":1: -Infinity is not a number JSON can hold"),
         (b'{"version": 1,}', " at column 15"),
         (b"[]", ": expected object, got list"),
-        (b"\xff\xfe", ": this is no JSON"),
+        (b"\xff\xfe", ": not valid JSON"),
         (b"[" * 100_000, ""),
-        (b'{"a":' * 100_000, ": lists in lists without end"),
+        (b'{"a":' * 100_000, ": lists nested too deeply"),
     ],
 )
 def test_what_is_no_json(tmp_path: Path, content: bytes, message: str) -> None:
@@ -449,7 +452,7 @@ def test_the_same_bytes_in_any_process(tmp_path: Path) -> None:
 import sys, numpy as np
 from motionmind.formats import write_motion
 from motionmind.body.motion import Motion
-from motionmind.body.skeleton import human23
+from motionmind.body.human import human23
 rotations = np.full((2, 23, 4), 0.5)
 motion = Motion(human23(), rotations, np.ones((2, 3)) / 3, np.arange(2) / 3)
 for suffix in (".json", ".bvh", ".txt"):

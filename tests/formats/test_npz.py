@@ -22,7 +22,8 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import npz, read_motion, write_motion, write_posture
-from motionmind.formats.npz import read_npz, smpl_bodies, write_npz
+from motionmind.formats._smpl import joints_without_place, smpl_bodies
+from motionmind.formats.npz import read_npz, write_npz
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
 
@@ -138,10 +139,10 @@ def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:
     found = arrays()
     del found["mocap_framerate"]
     saved(tmp_path / "a.npz", found)
-    with pytest.raises(FormatError, match="no array 'mocap_framerate': say how many frames a second"):
+    with pytest.raises(FormatError, match="no array 'mocap_framerate': say how many frames per second"):
         read_motion(tmp_path / "a.npz")
     assert read_motion(tmp_path / "a.npz", fps=60).fps == pytest.approx(60.0)
-    with pytest.raises(FormatError, match="'fps' must be one number of frames a second, not -1"):
+    with pytest.raises(FormatError, match="'fps' must be one number of frames per second, not -1"):
         read_npz(tmp_path / "a.npz", fps=-1)
 
 
@@ -251,7 +252,7 @@ def test_the_same_motion_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytes
 def test_what_cannot_be_written(tmp_path: Path) -> None:
     motion = moving(human23(), 3)
     uneven = Motion(motion.skeleton, motion.rotations, motion.root, np.array([0.0, 0.1, 0.3]))
-    with pytest.raises(MotionMindError, match="AMASS needs frames that are even in time"):
+    with pytest.raises(MotionMindError, match="AMASS needs frames evenly spaced in time"):
         write_npz(tmp_path / "a.npz", uneven)
     with pytest.raises(SkeletonError, match="none that map to human23"):
         write_npz(tmp_path / "a.npz", moving(Skeleton("dot", ("dot",), (-1,), np.zeros((1, 3)))))
@@ -260,14 +261,14 @@ def test_what_cannot_be_written(tmp_path: Path) -> None:
 
 def test_what_has_no_place_is_what_turns(tmp_path: Path) -> None:
     motion = moving(human44())
-    assert set(npz.joints_without_place(motion)) == {
+    assert set(joints_without_place(motion)) == {
         *(f"{side}_toes_{row}" for side in ("left", "right") for row in ("middle", "end")),
         *("lumbar_middle", "cervical_middle", "axial"),
     }
     still = Motion(human44(), np.tile(rot.IDENTITY, (1, 44, 1)), np.zeros((1, 3)), np.zeros(1))
-    assert npz.joints_without_place(still) == []
+    assert joints_without_place(still) == []
     for body in (human23(), *smpl_bodies().values()):
-        assert npz.joints_without_place(moving(body)) == []
+        assert joints_without_place(moving(body)) == []
 
 
 # --- files that are none --------------------------------------------------------------------------------------------
@@ -298,7 +299,7 @@ def fails(path: Path) -> str:
         ("poses", np.full((5, 156), "text"), "'poses' holds no numbers"),
         ("poses", np.zeros((5, 156), dtype=complex), "'poses' holds no numbers"),
         ("poses", np.array([{"a": 1}]), "'poses' cannot be read: .*pickle"),
-        ("mocap_framerate", np.array(0.0), "'mocap_framerate' must be one number of frames a second, not 0"),
+        ("mocap_framerate", np.array(0.0), "'mocap_framerate' must be one number of frames per second, not 0"),
         ("mocap_framerate", np.array(1e9), "must be one number"),
         ("mocap_framerate", np.array([30.0, 60.0]), r"not \[30\. 60\.\]"),
     ],
@@ -322,7 +323,7 @@ def test_no_zips(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     for data in (b"", b"no zip", b"\x80\x04]q\x00.", np.lib.format.magic(1, 0)):
         path.write_bytes(data)
-        assert fails(path) == "no .npz file, which is a zip of numpy's arrays"
+        assert fails(path) == "not an .npz file, which is a zip of numpy arrays"
     assert "there is no such file" in fails(tmp_path / "none.npz")
     whole = saved(path, arrays()).read_bytes()
     for cut in range(2, len(whole), 97):
@@ -342,7 +343,7 @@ def test_what_would_fill_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for name in ("poses.npy", "poses"):
         bomb = packed(tmp_path / "bomb.npz", header.getvalue(), name)
         assert bomb.stat().st_size < 10_000
-        assert fails(bomb) == "'poses' is larger than movement is"
+        assert fails(bomb) == "'poses' is too large to be movement"
 
 
 @settings(max_examples=150)
@@ -370,7 +371,7 @@ def test_small_numbers_do_not_swell_on_reading(tmp_path: Path, monkeypatch: pyte
     found = arrays(frames=100)
     found["poses"] = np.zeros((100, 156), dtype=np.uint8)
     monkeypatch.setattr(npz, "_LARGEST_ARRAY", 8 * found["poses"].size - 1)
-    assert fails(saved(tmp_path / "a.npz", found)) == "'poses' is larger than movement is"
+    assert fails(saved(tmp_path / "a.npz", found)) == "'poses' is too large to be movement"
 
 
 def test_no_rate_is_written_that_could_not_be_read(tmp_path: Path) -> None:

@@ -107,10 +107,10 @@ def test_lengths_far_from_one_are_said_once(tmp_path: Path) -> None:
     [
         ("", ": no posture: write"),
         ("# nothing", ": no posture: write"),
-        ("{}", ":1: a posture that names no joint"),
+        ("{}", ":1: a posture without joints"),
         ("{pelvis, 0, 0, 0, 1; left hip, 0, 0, 0, 1", ":1: the posture's '}' is missing"),
-        ("pelvis, 0, 0, 0, 1}", ":1: 'pelvis, 0, 0, 0, 1' may not stand here"),
-        ("{{pelvis, 0, 0, 0, 1}", ":1: '{' may not stand here"),
+        ("pelvis, 0, 0, 0, 1}", ":1: 'pelvis, 0, 0, 0, 1' may not appear here"),
+        ("{{pelvis, 0, 0, 0, 1}", ":1: '{' may not appear here"),
         ("{pelvis, 0, 0, 0, 1;\nleft hop, 0, 0, 0, 1}", ":2: toy has no joint 'left hop'; did you mean left_hip?"),
         ("{pelvis, 0, 0, 1}", ":1: 3 numbers for 'pelvis', where the four"),
         ("{pelvis 0 0 0 1}", ":1: toy has no joint 'pelvis 0 0 0 1'"),

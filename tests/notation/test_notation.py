@@ -793,7 +793,7 @@ def test_a_phrase_that_goes_on_is_mirrored_where_it_stands(folder: Path, said: l
 def test_a_layer_of_another_phrase_is_laid_over_line_by_line(folder: Path, said: list[str], other: list[str]) -> None:
     text = f"{in_phrase('q', said)}{in_phrase('r', other)}phrase both\n  q, with arms head of r\n"
     score = read_score(write(folder, VOCABULARY + text))
-    q, r, both = (phrases.play(score.phrases[name]) for name in ("q", "r", "both"))
+    q, r, both = (phrases.play_phrase(score.phrases[name]) for name in ("q", "r", "both"))
     r += [r[-1]] * len(q)
     for upper, lower, whole in zip(r, q, both, strict=False):
         for layer, name in enumerate(score.body.layers):

@@ -22,7 +22,7 @@ from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.notation.stance import Feet, Stance, place
+from motionmind.notation.stance import Feet, Stance, place_legs
 
 SIDES = ("left", "right")
 SIGN = (1.0, -1.0)
@@ -47,7 +47,7 @@ class Case:
         return HUMAN.rotations(self.angles)
 
     def placed(self) -> Stance:
-        return place(HUMAN, HUMAN.leg, self.rotations, self.feet)  # type: ignore[arg-type]
+        return place_legs(HUMAN, HUMAN.leg, self.rotations, self.feet)  # type: ignore[arg-type]
 
     def pick(self, rows: list[int]) -> Case:
         chosen = {field.name: getattr(self.feet, field.name)[rows] for field in fields(Feet)}
@@ -258,7 +258,7 @@ def check_knees(case: Case, stance: Stance) -> None:
 
 
 def check_weight(case: Case, stance: Stance) -> None:
-    assert stance.astray.max() < 1e-6
+    assert stance.imbalance.max() < 1e-6
     centre = HUMAN.centre_of_mass(stance.rotations, stance.root)[:, [0, 2]]
     np.testing.assert_allclose(centre, support(case.feet) + case.feet.lean, atol=1e-6)
 
@@ -307,7 +307,7 @@ CHECKS = {
 @pytest.mark.parametrize("law", CHECKS)
 def test_a_law_holds_for_random_postures(law: str, many: Case) -> None:
     stance = many.placed()
-    reached = np.flatnonzero((stance.short == 0.0).all(axis=1))
+    reached = np.flatnonzero((stance.shortfall == 0.0).all(axis=1))
     assert len(reached) > 250
     chosen = many.pick(list(reached))
     CHECKS[law](chosen, Stance(*(getattr(stance, field.name)[reached] for field in fields(stance))))
@@ -317,7 +317,7 @@ def test_a_law_holds_for_random_postures(law: str, many: Case) -> None:
 @settings(max_examples=40)
 def test_all_laws_hold_for_any_posture(case: Case) -> None:
     stance = case.placed()
-    assume((stance.short == 0.0).all())
+    assume((stance.shortfall == 0.0).all())
     for check in CHECKS.values():
         check(case, stance)
 
@@ -335,9 +335,9 @@ def test_the_mirror_image_is_placed_as_the_mirror_image(many: Case) -> None:
     feet = Feet(**{field.name: getattr(many.feet, field.name)[:, ::-1] for field in fields(Feet)})
     feet = replace(feet, lean=many.feet.lean * [-1.0, 1.0])
     stance = many.placed()
-    mirrored = place(HUMAN, HUMAN.leg, rot.mirror(many.rotations)[:, partner], feet)  # type: ignore[arg-type]
-    reached = (stance.short == 0.0).all(axis=1)
-    np.testing.assert_array_equal(reached, (mirrored.short == 0.0).all(axis=1))
+    mirrored = place_legs(HUMAN, HUMAN.leg, rot.mirror(many.rotations)[:, partner], feet)  # type: ignore[arg-type]
+    reached = (stance.shortfall == 0.0).all(axis=1)
+    np.testing.assert_array_equal(reached, (mirrored.shortfall == 0.0).all(axis=1))
     np.testing.assert_allclose(mirrored.root[reached], (stance.root * [-1.0, 1.0, 1.0])[reached], atol=1e-6)
     off = rot.angle(mirrored.rotations, rot.mirror(stance.rotations)[:, partner])
     assert off[reached].max() < 1e-4  # a straight knee's angle is known to the root of the height's 1e-7
@@ -351,8 +351,8 @@ def _other(name: str) -> str:
 def test_a_leg_too_short_for_its_place_says_by_how_much() -> None:
     case = Case({"pelvis": np.zeros((2, 3))}, feet_of(2, stands=1.0, weight=50.0, out=[[190.0, 0.0], [10.0, 10.0]]))
     stance = case.placed()
-    assert stance.short[0].max() > 0.0
-    np.testing.assert_array_equal(stance.short[1], 0.0)
+    assert stance.shortfall[0].max() > 0.0
+    np.testing.assert_array_equal(stance.shortfall[1], 0.0)
 
 
 def test_a_foot_that_stays_above_the_floor_says_by_how_much() -> None:
@@ -360,7 +360,7 @@ def test_a_foot_that_stays_above_the_floor_says_by_how_much() -> None:
     feet = feet_of(1, stands=[[0.0, 1.0]], touches=[[1.0, 0.0]], weight=50.0, heel=48.0)
     stance = Case({"left_knee": np.array([[70.0, 0.0, 0.0]])}, feet).placed()
     lowest = lowest_of(stance, "left")[0]
-    assert stance.short[0, 0] == pytest.approx(lowest, abs=1e-6)
+    assert stance.shortfall[0, 0] == pytest.approx(lowest, abs=1e-6)
     assert lowest > 0.05
 
 
@@ -371,7 +371,7 @@ def test_between_two_straight_legs_the_weight_is_found() -> None:
         stance = Case(
             {"cervical": np.array([[0.0, turn, 0.0]]), "atlantal": np.array([[3.0, turn, 2.0]])}, feet
         ).placed()
-        assert stance.astray.max() < 1e-6
+        assert stance.imbalance.max() < 1e-6
 
 
 def test_a_foot_without_weight_does_not_move_the_body() -> None:
@@ -525,7 +525,7 @@ def _bent(case: Case) -> Case:
 
 
 def test_the_body_is_where_a_general_solver_puts_it(many: Case) -> None:
-    reached = np.flatnonzero((_bent(many).placed().short == 0.0).all(axis=1))
+    reached = np.flatnonzero((_bent(many).placed().shortfall == 0.0).all(axis=1))
     for row in reached[::16]:
         case = _bent(many.pick([row]))
         stance = case.placed()
@@ -570,7 +570,7 @@ def test_a_stance_with_a_name_is_what_a_general_solver_finds(name: str) -> None:
     angles["pelvis"][0] = named.pelvis
     case = _bent(Case(angles, feet_of(1, **named.feet)))
     stance = case.placed()
-    np.testing.assert_array_equal(stance.short, 0.0)
+    np.testing.assert_array_equal(stance.shortfall, 0.0)
     for check in CHECKS.values():
         check(case, stance)
     np.testing.assert_allclose(Oracle(case).root(), stance.root[0], atol=2e-4)

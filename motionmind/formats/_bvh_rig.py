@@ -1,4 +1,4 @@
-"""Where the joints of a BVH file stand: from places that change with time to a skeleton whose offsets do not."""
+"""Normalises a BVH rig: joints may move against their parents there; a skeleton needs constant offsets."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import listed
+from motionmind.errors import enumerated
 from motionmind.formats.units import bone_span
 from motionmind.geometry import rotations as rot
 
-# As shares of the body's span: what counts as standing still (exporters print 6 digits), and what is more than the
-# give of a joint or the stretch of a rig.
+# Shares of the body's span: below the first a joint counts as still (exporters print 6 digits); above the second it
+# moves by more than a joint gives or a rig stretches.
 _STILL = 1e-4
 _TRAVEL = 1e-2
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A tree of joints that may each move against its parent, as BVH allows.
+    """Movement as a BVH file places it: each joint may move against its parent.
 
     Attributes:
-        skeleton: the file's tree, with its OFFSETs, in its unit of length.
+        skeleton: the file's tree with its OFFSETs, in the file's unit.
         rotations: local quaternions [T, J, 4].
-        places: for each joint that has position channels, its place in its parent's frame [T, 3].
+        places: by joint with position channels, its place in its parent's frame [T, 3], in the file's unit.
     """
 
     skeleton: Skeleton
@@ -34,20 +34,20 @@ class Placed:
     places: dict[int, Floats]
 
     def stray(self, joint: int) -> float:
-        """How far the joint moves against its parent, along the axis on which that is most."""
+        """Return the joint's range of movement against its parent, along the axis of the largest; the file's unit."""
         return float(np.max(np.ptp(self.places[joint], axis=0))) if joint in self.places else 0.0
 
     def turn(self, joint: int) -> float:
-        """The largest angle in radians between the joint's first rotation and any other."""
+        """Return the largest angle, radians, between the joint's first rotation and any other."""
         return float(np.max(rot.angle(self.rotations[:1, joint], self.rotations[:, joint])))
 
     def place(self, joint: int) -> Floats:
-        """Places [T, 3] of any joint in its parent's frame."""
+        """Return the joint's places in its parent's frame [T, 3], in the file's unit."""
         still = np.broadcast_to(self.skeleton.offsets[joint], (len(self.rotations), 3))
         return self.places.get(joint, still)
 
     def mean_offsets(self) -> Floats:
-        """Mean place of each joint [J, 3]; 0 for the root."""
+        """Return the joints' mean places in their parents' frames [J, 3], in the file's unit; 0 for the root."""
         offsets = np.array(self.skeleton.offsets)
         for joint, place in self.places.items():
             offsets[joint] = place.mean(axis=0)
@@ -57,14 +57,14 @@ class Placed:
 
 @dataclass(frozen=True)
 class NormalisedRig:
-    """A BVH file's movement on a skeleton of constant offsets, in the file's unit, and what was mended to have it so.
+    """A BVH file's movement on a skeleton of constant offsets, with the repairs this took.
 
     Attributes:
         skeleton: offsets and tips in the file's unit.
         rotations: local quaternions [T, J, 4].
         root: places of the root [T, 3] in the file's unit.
-        notes: what was mended, in words.
-        strays: joints whose place was not constant, and by how much at most, in the file's unit.
+        notes: the repairs in words.
+        strays: joints whose place was not constant, each with its largest distance from the mean, in the file's unit.
     """
 
     skeleton: Skeleton
@@ -73,16 +73,19 @@ class NormalisedRig:
     notes: list[str]
     strays: list[tuple[str, float]]
 
-    def mended(self, scale: float) -> Iterator[str]:
-        """What was mended, in words, lengths in millimetres if one unit is `scale` metres."""
+    def repairs(self, scale: float) -> Iterator[str]:
+        """Describe the repairs, with lengths in millimetres if one unit is `scale` metres."""
         yield from self.notes
         if self.strays:
             far = [f"{name} (by up to {1000.0 * scale * stray:.1f} mm)" for name, stray in self.strays]
-            yield f"joints that move against their parents are kept at their mean place: {listed(far)}"
+            yield f"joints that move against their parents are kept at their mean place: {enumerated(far)}"
 
 
 def normalise(body: Placed) -> NormalisedRig:
-    """The movement with constant offsets that is nearest to `body`."""
+    """Reduce `body` to constant offsets: each joint's mean place.
+
+    Position channels that the file adds to OFFSETs are resolved, and the joint that carries the body becomes the root.
+    """
     notes: list[str] = []
     if _are_added(body):
         offsets = body.skeleton.offsets
@@ -101,7 +104,7 @@ def normalise(body: Placed) -> NormalisedRig:
 
 
 def _are_added(body: Placed) -> bool:
-    """Whether most of the joints that stand still say: channels near 0, at an OFFSET that is not."""
+    """Return whether position channels add to OFFSETs: most still joints have channels near 0 but nonzero OFFSETs."""
     added = replaced = 0
     for joint, place in body.places.items():
         offset = body.skeleton.offsets[joint]
@@ -113,10 +116,10 @@ def _are_added(body: Placed) -> bool:
 
 
 def _new_root(body: Placed, span: float) -> int:
-    """The joint that should be the root in place of the file's; 0, the file's own, where none should.
+    """Find the joint that should replace the file's root; 0 if none should.
 
-    It moves against its parent by more than a rig's stretch, and all of the body that moves hangs from it. What
-    else there is must be joints on the way to it, or less than half of the body and still.
+    It moves against its parent by more than a rig stretches, and everything that moves descends from it. All other
+    joints are its ancestors, or still and fewer than half of the body.
     """
     skeleton = body.skeleton
     far = [joint for joint in body.places if joint > 0 and body.stray(joint) > _TRAVEL * span]
@@ -132,7 +135,7 @@ def _new_root(body: Placed, span: float) -> int:
 
 
 def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """From the root down to the joint's parent."""
+    """Return the joints from the root down to the joint's parent."""
     chain: list[int] = []
     while (joint := skeleton.parents[joint]) >= 0:
         chain.append(joint)
@@ -140,7 +143,7 @@ def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint itself and all that hang from it, in order."""
+    """Return the joint and its descendants, in order."""
     found = {joint}
     for child in range(joint + 1, len(skeleton)):
         if skeleton.parents[child] in found:
@@ -149,7 +152,7 @@ def _descendants(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
-    """The part of the body below `top`, with `top` as root: all above it is in its rotation and place."""
+    """Make `top` the root: fold the transforms of its ancestors into its own, and drop all that is not below it."""
     old = body.skeleton
     above, kept = _ancestors(old, top), _descendants(old, top)
     turned: Floats = np.broadcast_to(rot.IDENTITY, (len(body.rotations), 4))
@@ -170,8 +173,8 @@ def _fold(body: Placed, top: int, span: float, notes: list[str]) -> Placed:
     name = old.names[top]
     aside = [old.names[joint] for joint in range(len(old)) if joint not in new and joint not in above]
     if aside:
-        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {listed(aside)}")
+        notes.append(f"{name} is taken as the root; what stands still beside it is left out: {enumerated(aside)}")
     walking = [old.names[joint] for joint in above if body.stray(joint) > _STILL * span]
     if walking:
-        notes.append(f"{name} is taken as the root, at its own place; the path of {listed(walking)} itself is lost")
+        notes.append(f"{name} is taken as the root, at its own place; the path of {enumerated(walking)} itself is lost")
     return Placed(skeleton, rotations, {**{new[j]: p for j, p in body.places.items() if j in new}, 0: root})
