@@ -61,8 +61,7 @@ def measure(
             raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
     found = measure(motion, engine, path)
     if as_json:
-        report = MeasureReport.of(engine.corpus.name, len(motion), found)
-        click.echo(json.dumps(msgspec.to_builtins(report)))
+        click.echo(json.dumps(msgspec.to_builtins(MeasureReport.of(engine.corpus.name, len(motion), found))))
         return
     seconds = motion.times[-1] - motion.times[0]
     click.echo(f"{file}: {count(len(motion), 'frame')} in {seconds:.2f} s, beside {engine.corpus.name}")

@@ -349,12 +349,12 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
 def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
     code = (
         "import sys, numpy as np; sys.path.insert(0, sys.argv[1])\n"
-        "from test_grammar import corpus, grammar, price, solve, Rules\n"
+        "from test_grammar import corpus, grammar, build_model, solve, Rules\n"
         "for seed in range(3):\n"
         "    body = corpus(seed)\n"
         "    for budget in (5, 100_000):\n"
         "        a, b = body.states[[0, -1]].astype(np.int64)\n"
-        "        found = solve(price(grammar(seed), 'conditional', 1.0, 0.1), a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
+        "        found = solve(build_model(grammar(seed), 'conditional', 1.0, 0.1), a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
         "        print(repr(found.cost), repr(found.lower_bound), found.path.tobytes().hex(), found.expansions)\n"
     )
     processes = [
