@@ -8,6 +8,8 @@ from motionmind.discretize.protocol import Discretization
 from motionmind.discretize.spec import KINDS, from_spec, make_discretization, to_spec
 from motionmind.discretize.states import StateSpace
 
+make = make_discretization  # its former name, which the package's own table of names still has
+
 __all__ = [
     "KINDS",
     "Codebook",

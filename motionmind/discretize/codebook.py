@@ -50,7 +50,8 @@ class Codebook:
     A cover needs a sixth fewer states at the same tolerance, but with the same number of states it has the same error
     and branching: the two trade along one curve. A cover compares every pair of samples (6e9 per joint at 78,000
     postures), this method only N times S. Leaders depend on the order in which clips are read; this method sorts the
-    samples first. States are numbered in the order in which they were opened: state 0 is the sample nearest to the mean.
+    samples first. States are numbered in the order in which they were opened: state 0 is the sample nearest to the
+    mean.
 
     Attributes:
         tolerance: degrees, 0.01 to 180.

@@ -58,7 +58,7 @@ def samples(names: Sequence[str], rotations: Floats) -> Floats:
 
 
 def joints_meant(name: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the joints that `name` means: that joint, or for a name without side ("hip") both sides."""
+    """Return the indices of the joints that `name` means: that joint, or both sides for a name without side ("hip")."""
     exact = [j for j, joint in enumerate(names) if joint == name]
     return exact or [j for j, joint in enumerate(names) if joint in {side + name for side in SIDES}]
 

@@ -19,8 +19,8 @@ SAME = 1e-5
 # angles often lie exactly midway between two states: without a margin the last bit would decide. The margin is far
 # above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME / 2) = 1.25e-11).
 _TIE = 1e-12
-# Doubles in the largest block of cosines: 1 MB, which stays in the processor's cache. The fastest from 1/8 to 8 MB, and 4
-# to 6 times as fast as 2 MB and more.
+# Doubles in the largest block of cosines: 1 MB, which stays in the processor's cache. It is the fastest of 1/8 to 8 MB,
+# and 4 to 6 times as fast as 2 MB and more.
 _BLOCK = 1 << 17
 
 
@@ -125,7 +125,7 @@ class StateSpace:
         return self.centres[self.starts[j] : self.starts[j + 1]]
 
     def label(self, joint: int | str, state: int) -> str:
-        """Return the label of a state, such as "devant 90", or "state 17" if it has none; MotionMindError if no such state."""
+        """Return the label of a state, or "state 17" if it has none; MotionMindError if there is no such state."""
         j = self.index(joint) if isinstance(joint, str) else joint
         if not 0 <= state < self.sizes[j]:
             raise MotionMindError(f"{self.names[j]} has states 0 to {self.sizes[j] - 1}, no state {state}")

@@ -354,7 +354,8 @@ def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
         "    body = corpus(seed)\n"
         "    for budget in (5, 100_000):\n"
         "        a, b = body.states[[0, -1]].astype(np.int64)\n"
-        "        found = solve(build_model(grammar(seed), 'conditional', 1.0, 0.1), a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
+        "        model = build_model(grammar(seed), 'conditional', 1.0, 0.1)\n"
+        "        found = solve(model, a, b, Rules(0.7, 0.4, 3, 8, budget))\n"
         "        print(repr(found.cost), repr(found.lower_bound), found.path.tobytes().hex(), found.expansions)\n"
     )
     processes = [
