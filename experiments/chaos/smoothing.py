@@ -17,7 +17,7 @@ import numpy as np
 from motionmind import Engine, Piece, Variation, flow_of, own_skeleton, read_motion, vary
 from motionmind.chaos.baselines import chunk_shuffled
 from motionmind.chaos.reorder import runs
-from motionmind.variation.seams import judge
+from motionmind.variation.seams import judge_transitions
 
 PIECES = (("ballet", "jump"), ("macarena", "macarena"), ("karate", "heian-shodan"), ("medley", "medley"))
 FLOWS = ("lorenz", "rossler")
@@ -37,7 +37,7 @@ def piece_of(engine: Engine, clip: str) -> Piece:
 def measure(variations: list[Variation]) -> dict[str, object]:
     """Abrupt transitions before and after in 100 moves, the share that was solved, and what by."""
     seams = [seam for variation in variations for seam in variation.seams]
-    joins = [seam.join for seam in seams if seam.join and seam.join.is_abrupt]
+    joins = [seam.transition for seam in seams if seam.transition and seam.transition.is_abrupt]
     found = [seam.insertion for seam in seams if seam.insertion]
     moves = sum(len(variation.postures) - 1 for variation in variations)
     after = moves + sum(way.moves - 1 for way in found)
@@ -71,7 +71,7 @@ def shuffled(variations: list[Variation], engine: Engine) -> float | None:
         lengths = runs(variation.postures[: len(variation.piece)])
         for order in (chunk_shuffled(lengths, rng) for _ in range(SHUFFLES)):
             pairs = [(int(i), int(k)) for i, k in pairwise(order) if k != i + 1]
-            found += [join.is_abrupt for join in judge(variation.piece, pairs, engine, posturewise=False)]
+            found += [join.is_abrupt for join in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
     return round(float(np.mean(found)), 3) if found else None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import engine, pairs, posture, recorded
-from motionmind.metrics import arrival_spread, find_habits
+from motionmind.metrics import arrival_spread, learn_habits
 
 BUDGET = 20_000  # nodes; what is not proven by then is as good as it matters here
 SHOWN = (0.0, 0.5, 1.0)
@@ -33,7 +33,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 def work(data: str | None, corpus: str, kind: str, novelty: float, count: int, seed: int) -> list[Row]:
     """Tweens between the same pairs of postures of a corpus, all with one novelty."""
     found = engine(data, corpus, kind)
-    habits = find_habits(found.grammar)
+    habits = learn_habits(found.grammar)
     moves, spread, bridged, unattested = [], [], [], []
     cliches, frequency, likely = [], [], []
     made: set[tuple[int, int, int]] = set()

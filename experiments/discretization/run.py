@@ -14,7 +14,7 @@ from motionmind import Engine, make_discretization
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.summary import joinable
-from motionmind.metrics import angular_jerk, find_habits
+from motionmind.metrics import angular_jerk, learn_habits
 
 BUDGET = 20_000
 EXPERTS = {"ballet": "ballet", "karate": "karate"}
@@ -41,7 +41,7 @@ def work(data: str | None, name: str, kind: str, degrees: float, count: int, see
     rest = np.setdiff1d(np.arange(len(whole.clips)), apart)
     unseen = Engine.learn(part(whole, rest), make_discretization(kind, degrees))
     own, other = errors(found, whole, seed), errors(unseen, part(whole, apart), seed)
-    habits = find_habits(found.grammar)
+    habits = learn_habits(found.grammar)
     moves, attested, bridges, likely, proven = [], [], [], [], []
     began = perf_counter()
     for a, b in pairs(whole, count, seed):

@@ -17,7 +17,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.chaos.reorder import itinerary
 from motionmind.metrics import angular_jerk, angular_speed
 from motionmind.metrics.measure import at_rate
-from motionmind.variation.seams import judge
+from motionmind.variation.seams import judge_transitions
 
 FLOWS, NUDGES, LENGTH = ("lorenz", "rossler"), (0.1, 0.3, 1.0), 200
 RULES: dict[str, dict[str, Any]] = {
@@ -49,7 +49,7 @@ def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row
     out: list[Row] = []
     for number in order:
         piece, pair = pairs[number]
-        (join,) = judge(piece, [pair], found, posturewise=False)
+        (join,) = judge_transitions(piece, [pair], found, posturewise=False)
         if not join.is_abrupt:
             continue
         row: Row = {

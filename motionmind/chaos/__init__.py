@@ -1,1 +1,1 @@
-"""Variations by chaos: a piece wrapped around a strange attractor and read along another trajectory."""
+"""Chaotic reordering: a piece is wrapped around a strange attractor and read along another trajectory."""

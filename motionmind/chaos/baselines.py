@@ -1,4 +1,4 @@
-"""What a chaotic reordering is to be held against: shuffles, Dabby's mapping, Cunningham's quadrants.
+"""Baselines for chaotic reordering: shuffles, Dabby's mapping, Cunningham's quadrants.
 
 Indices are those of a piece's postures, as in `motionmind.chaos.reorder`.
 """
@@ -11,21 +11,29 @@ from numpy.random import Generator
 from motionmind._typing import Floats, Ints
 from motionmind.body.limbs import sided_parts
 from motionmind.body.skeleton import Skeleton
-from motionmind.chaos.reorder import checked, runs
+from motionmind.chaos.reorder import check_sites, runs
 from motionmind.errors import MotionMindError
 
 
 def shuffled(count: int, rng: Generator) -> Ints:
-    """The piece's postures in random order [N]: every permutation is as likely."""
+    """Return `count` postures in random order [N], drawn uniformly from all permutations."""
     return np.asarray(rng.permutation(count), dtype=np.int64)
 
 
 def chunk_shuffled(lengths: Ints, rng: Generator) -> Ints:
-    """The piece cut into chunks of the given lengths [R], which add up to N, and the chunks put in random order [N].
+    """Cut a piece of N postures into chunks and put these in random order.
 
-    With the runs of a variation it keeps as much of the piece's order, in stretches as long, and nothing else of the
-    variation. Where the piece is cut is random too, as the lengths are taken in random order; and no chunk follows the
-    one that it follows in the piece, so that `runs` are those lengths again. All such orders are as likely.
+    Given the lengths of a variation's runs, the result keeps as much of the piece's order as the variation does, in
+    stretches as long, and nothing else of it. The lengths are taken in random order, so the cuts are random too. No
+    chunk follows the one that it follows in the piece, so `runs` returns the lengths again. The result is drawn
+    uniformly from all such orders.
+
+    Args:
+        lengths: lengths of the chunks [R], which add up to N.
+        rng: the random generator.
+
+    Returns:
+        Indices of postures [N].
 
     Raises:
         MotionMindError: a length is less than 1.
@@ -35,23 +43,29 @@ def chunk_shuffled(lengths: Ints, rng: Generator) -> Ints:
         raise MotionMindError(f"a chunk has 1 posture at least, not {lengths.min()}")
     cuts = np.cumsum(rng.permutation(lengths))
     order = rng.permutation(len(lengths))
-    while len(lengths) > 1 and len(runs(order)) < len(lengths):  # about one in e is without a succession
+    while len(lengths) > 1 and len(runs(order)) < len(lengths):  # about one order in e has no succession
         order = rng.permutation(len(lengths))
     chunks = np.split(np.arange(lengths.sum()), cuts[:-1]) if len(lengths) else []
     return np.concatenate([*(chunks[chunk] for chunk in order), np.zeros(0, dtype=np.int64)])
 
 
 def dabby(sites: Floats, points: Floats) -> Ints:
-    """Index [L] of the site [N, d] with the smallest first coordinate that is not less than the point's [L, d].
+    """Map each point to the site with the smallest first coordinate that is not less than the point's.
 
-    That is Dabby's mapping; what comes past the largest it leaves open, and here it is the site with the largest. Of
-    equal sites the one with the lowest index is taken. Source: Dabby, "Musical variations from a chaotic mapping",
-    Chaos 6:95 (1996).
+    This is the mapping of Dabby, "Musical variations from a chaotic mapping", Chaos 6:95 (1996). It leaves open what
+    comes past the largest site; here it is that site. Of equal sites the one with the lowest index is taken.
+
+    Args:
+        sites: [N, d], in the flow's coordinates.
+        points: [L, d].
+
+    Returns:
+        Indices of sites [L].
 
     Raises:
-        MotionMindError: there is no site, or points and sites are no finite numbers of the same dimension.
+        MotionMindError: there is no site, or sites and points are not finite numbers of the same dimension.
     """
-    sites, points = checked(sites, points)
+    sites, points = check_sites(sites, points)
     order = np.argsort(sites[:, 0], kind="stable")
     ascending = sites[order, 0]
     place = np.searchsorted(ascending, np.minimum(points[:, 0], ascending[-1]), side="left")
@@ -59,9 +73,17 @@ def dabby(sites: Floats, points: Floats) -> Ints:
 
 
 def quadrants(skeleton: Skeleton, count: int, rng: Generator) -> Ints:
-    """Body parts shuffled separately, after Merce Cunningham: the posture that each joint is taken from [N, J].
+    """Shuffle the postures of each part of the body separately, after Merce Cunningham.
 
     Every part (see `sided_parts`) goes through the piece in a random order of its own; its joints stay together.
+
+    Args:
+        skeleton: the body, J joints.
+        count: postures of the piece, N.
+        rng: the random generator.
+
+    Returns:
+        The posture that each joint is taken from [N, J].
     """
     indices = np.empty((count, len(skeleton)), dtype=np.int64)
     for joints in sided_parts(skeleton).values():

@@ -1,7 +1,7 @@
 """Chaotic flows dx/dt = f(x): a registry, and the type for any other.
 
-Steps are a sixtieth to a hundredth of a turn around the attractor: a trajectory of which each 11th point is kept goes
-round in six to ten. The double scroll is what Chua's circuit has for an attractor: one flow.
+Steps are a sixtieth to a hundredth of a turn around the attractor, so a trajectory of which each 11th point is kept
+goes round in six to ten points. The flow `chua` is Chua's circuit, whose attractor is the double scroll.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ Field = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A flow dx/dt = field(x, *parameters) in d dimensions, and how to follow it.
+    """A flow dx/dt = field(x, *parameters) in d dimensions, with defaults for its integration.
 
     Attributes:
-        name: what it is called.
-        field: from a point [d] and each parameter to the rate of change, a tuple or array [d]. It is compiled by numba
-            if it can be, and called as it is otherwise, which takes some hundred times as long. Compiled code does
-            not hear of exceptions: it should not raise any.
+        name: its name.
+        field: a function from a point [d] and each parameter to the rate of change, a tuple or array [d]. Numba
+            compiles it if it can; otherwise it is called as it is, which takes some hundred times as long. It should
+            not raise exceptions, which do not get out of compiled code.
         start: a point in the attractor's basin [d].
-        step: of the integration, in units of time; a sixtieth to a hundredth of a turn around the attractor.
-        transient: steps from a start until the trajectory is taken to be on the attractor.
-        parameters: by their names, in the order in which the field takes them.
-        dimensions: the coordinates' names [d]; x1, x2 and so on where none are given.
-        about: its equations, and where they are from.
+        step: the step of the integration, in the flow's units of time.
+        transient: steps from a start until the trajectory counts as being on the attractor.
+        parameters: parameters by name, in the order in which the field takes them.
+        dimensions: names of the coordinates [d]; by default x1, x2 and so on.
+        about: the equations and their source.
     """
 
     name: str
@@ -62,16 +62,20 @@ class Flow:
 
     @property
     def label(self) -> str:
-        """The name with the parameters: "lorenz (sigma 16, rho 45, beta 4)"."""
+        """The name and the parameters, such as "lorenz (sigma 16, rho 45, beta 4)"."""
         values = ", ".join(f"{name} {value:g}" for name, value in self.parameters.items())
         return f"{self.name} ({values})" if values else self.name
 
 
 def flow_of(name: str, **parameters: float) -> Flow:
-    """The flow of this name, with some parameters other than usual.
+    """Return the registered flow of this name.
+
+    Args:
+        name: one of `FLOWS`.
+        parameters: values for some of its parameters; the others keep their defaults.
 
     Raises:
-        MotionMindError: there is no flow or no parameter of that name, or a value is no finite number.
+        MotionMindError: there is no flow or no parameter of that name, or a value is not a finite number.
     """
     if name not in FLOWS:
         raise MotionMindError(f"no flow {name!r}; there are {', '.join(sorted(FLOWS))}")
@@ -99,7 +103,7 @@ def _chua(x: Floats, alpha: float, beta: float, inner: float, outer: float) -> t
 
 
 def _duffing(x: Floats, damping: float, drive: float, frequency: float) -> tuple[float, ...]:
-    # The last two are attracted by the unit circle and go round it evenly.
+    # The last two coordinates are attracted by the unit circle and go round it at a constant rate.
     fade = 1.0 - x[2] * x[2] - x[3] * x[3]
     return (
         x[1],

@@ -1,9 +1,12 @@
-"""A piece wrapped around an attractor, and reordered along another trajectory.
+"""Chaotic reordering: a piece is wrapped around an attractor and read along another trajectory.
 
-The piece's N postures are dealt out along a trajectory, one to each point: its *sites*. Another trajectory is read
-through the sites' Voronoi cells: at each of its points the posture of the nearest site comes. The same trajectory gives
-the piece back; one that begins nearby stays with the piece until the two part, as fast as the flow's largest Lyapunov
-exponent says, and then passes from stretch to stretch of it.
+The piece's N postures are placed along a trajectory x, one at each point: its *sites*. A second trajectory y is read
+through the sites' Voronoi cells: its n-th posture is that of the nearest site,
+
+    index[n] = argmin over i of |x[i] - y[n]|.
+
+The same trajectory gives the piece back. One that begins nearby stays with the piece until the two diverge, at the rate
+of the flow's largest Lyapunov exponent, and then moves from stretch to stretch of it.
 
 Source: Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800 (1998).
 """
@@ -21,17 +24,17 @@ from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError
 
 _FAR = 1e150  # beyond it squares of distances overflow
-_ROUNDING = 1e-12  # by how much two distances may differ, as a part of them, where the nearer one is looked for exactly
+_ROUNDING = 1e-12  # relative; where two distances differ by less, the nearer site is found exactly
 
 
 @dataclass(frozen=True, eq=False)
 class Itinerary:
-    """A reordering, and the trajectories that it comes from.
+    """A reordering of a piece, and the trajectories that it comes from.
 
     Attributes:
-        sites: where the piece's postures lie [N, d].
-        points: the other trajectory [L, d].
-        indices: the posture of the piece that comes at each point [L].
+        sites: the sites of the piece's postures [N, d], in the flow's coordinates.
+        points: the variation's trajectory [L, d].
+        indices: the posture of the piece at each point [L].
     """
 
     sites: Floats
@@ -50,19 +53,19 @@ def itinerary(
     step: float | None = None,
     transient: int | None = None,
 ) -> Itinerary:
-    """A reordering of `count` postures, `length` postures long, as many as the piece where None.
+    """Reorder a piece along a trajectory that begins near its own.
 
-    The nudge is added once the transient is over, to where the piece's own trajectory begins: so the variation begins
-    at the piece's first postures and leaves them gradually, the later the smaller the nudge. Added before the
-    transient, any nudge at all would be any other trajectory on the attractor: for that, call `trajectory` with
+    The nudge is added after the transient, to the first point of the piece's own trajectory. So the variation begins
+    with the piece's first postures and leaves them gradually, the later the smaller the nudge. Added before the
+    transient, any nudge would lead to some unrelated trajectory on the attractor; for that, call `trajectory` with
     another start, and `reorder`.
 
     Args:
-        flow: what to follow.
+        flow: the flow.
         count: postures of the piece, N.
-        length: postures of the variation, L.
-        nudge: added to the first point, in the flow's own coordinates [d]; a number is added to the first of them.
-        start: see `trajectory`, as are `every`, `step` and `transient`.
+        length: postures of the variation, L; None for as many as the piece has.
+        nudge: the offset of the first point, in the flow's own coordinates [d]; a number is for the first of them.
+        start: see `trajectory`, as for `every`, `step` and `transient`.
 
     Raises:
         MotionMindError: an argument is out of range, or a trajectory diverges or settles.
@@ -84,22 +87,29 @@ def itinerary(
 
 
 def reorder(sites: Floats, points: Floats) -> Ints:
-    """Index [L] of the site [N, d] nearest to each point [L, d]; of equally near ones the lowest.
+    """Map each point to the nearest site; of equally near sites to the one with the lowest index.
+
+    Args:
+        sites: [N, d].
+        points: [L, d].
+
+    Returns:
+        Indices of sites [L].
 
     Raises:
-        MotionMindError: there is no site, or points and sites are no finite numbers of the same dimension.
+        MotionMindError: there is no site, or sites and points are not finite numbers of the same dimension.
     """
-    sites, points = checked(sites, points)
+    sites, points = check_sites(sites, points)
     from scipy.spatial import cKDTree
 
-    # Of sites that coincide the first stands for all; where the first coordinates differ, no sites do.
+    # The first of coinciding sites stands for all; if all first coordinates differ, no sites coincide.
     labels = np.arange(len(sites))
     if len(np.unique(sites[:, 0])) < len(sites):
         labels = np.sort(np.unique(sites, axis=0, return_index=True)[1])
     tree = cKDTree(sites[labels], balanced_tree=False, compact_nodes=False)
     if len(labels) == 1:
         return np.full(len(points), labels[0], dtype=np.int64)
-    # Points that are near each other ask for the same part of the tree: one after another they take half the time.
+    # Points near each other search the same part of the tree: in that order they take half the time.
     order = cKDTree(points, leafsize=64, balanced_tree=False, compact_nodes=False).indices
     distances, found = tree.query(points[order], k=2)
     indices = np.empty(len(points), dtype=np.int64)
@@ -111,12 +121,16 @@ def reorder(sites: Floats, points: Floats) -> Ints:
     return indices
 
 
-def checked(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Sites [N, d] and points [L, d] that can be compared: finite numbers, one site at least; else MotionMindError."""
+def check_sites(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Return sites [N, d] and points [L, d] as arrays that can be compared.
+
+    Raises:
+        MotionMindError: there is no site, or sites and points are not finite numbers of the same dimension.
+    """
     sites, points = np.asarray(sites, dtype=np.float64), np.asarray(points, dtype=np.float64)
     if sites.ndim != 2 or points.ndim != 2 or sites.shape[1] != points.shape[1] or sites.size == 0:
         raise MotionMindError(
-            f"points of shape {list(points.shape)} cannot be told by sites of shape {list(sites.shape)}: "
+            f"points of shape {list(points.shape)} cannot be compared with sites of shape {list(sites.shape)}: "
             "that takes sites [N, d], one at least, and points [L, d]"
         )
     if not (np.abs(sites) < _FAR).all() or not (np.abs(points) < _FAR).all():
@@ -125,7 +139,11 @@ def checked(sites: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 
 def runs(indices: Ints) -> Ints:
-    """Lengths [R] of the stretches in which the piece's order survives: i, i + 1, i + 2 and so on; they add up to L."""
+    """Return the lengths [R] of the stretches that keep the piece's order: i, i + 1, i + 2 and so on.
+
+    Args:
+        indices: postures of the piece [L]; the lengths add up to L.
+    """
     indices = np.asarray(indices)
     broken = np.flatnonzero(np.diff(indices) != 1) + 1
     return np.diff(np.concatenate([[0], broken, [len(indices)]]) if len(indices) else np.zeros(1, dtype=np.int64))

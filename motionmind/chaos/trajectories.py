@@ -1,11 +1,18 @@
-"""Trajectories of flows by the fourth-order Runge-Kutta method with a fixed step, and whether they are chaotic.
+"""Trajectories of flows by the fourth-order Runge-Kutta method with a fixed step, and a test that they are chaotic.
 
-A flow's largest Lyapunov exponent is the rate at which neighbouring trajectories part; that it is positive is what
-makes the flow chaotic. It is found by Benettin's method: two trajectories, the second brought back to a small distance
-from the first, along the direction that it has, after every step; the mean of the logarithms by which the distance
-grew. Every trajectory is held against it, by a sequential test: it is taken for chaotic as soon as the distance has
-grown e^20-fold in all, and refused if it has not within 200,000 steps. On a fixed point it shrinks, around a limit
-cycle it stays within a factor, and where motion only shears it grows as time does, which takes 5e8 turns to get there.
+One step of length h from x takes
+
+    k1 = f(x), k2 = f(x + h/2 k1), k3 = f(x + h/2 k2), k4 = f(x + h k3),  x + h/6 (k1 + 2 k2 + 2 k3 + k4).
+
+A flow's largest Lyapunov exponent is the rate at which neighbouring trajectories diverge; a flow is chaotic if it is
+positive. Benettin's method follows two trajectories and, after every step, brings the second back to a small distance
+d0 from the first along their difference. With d_n the distance after the n-th step, the exponent after N steps is
+
+    (1 / (N h)) sum over n of log(d_n / d0).
+
+Every trajectory must pass a sequential test of it: it counts as chaotic as soon as the sum reaches 20 nats, and is
+refused if that takes more than 200,000 steps. Near a fixed point the distance shrinks, around a limit cycle it stays
+within a factor, and under mere shear it grows linearly in time, which would take 5e8 turns to pass.
 
 Source: Benettin, Galgani and Strelcyn, "Kolmogorov entropy and numerical experiments", Phys. Rev. A 14:2338 (1976).
 """
@@ -30,11 +37,11 @@ Loop = Callable[..., tuple[Any, Any]]
 Step = Callable[[Floats, float, tuple[float, ...], Floats, Floats], None]
 
 _FAR = 1e9  # farther from the origin than any attractor: the trajectory has left for infinity
-_APART = 1e-8  # how far Benettin's second trajectory is put from the first, against 1 + |x|
-_ENOUGH = 20.0  # nats that the distance must grow by in a chaotic flow
+_APART = 1e-8  # distance of Benettin's second trajectory from the first, relative to 1 + |x|
+_ENOUGH = 20.0  # nats by which the distance must grow in a chaotic flow
 _PATIENCE = 200_000  # steps within which it must
-_LONG = 10_000  # steps in which what nears a fixed point comes to stand still
-_STILL = 1e-9  # of the speed at the flow's own start: what is slower stands still
+_LONG = 10_000  # steps in which a trajectory that nears a fixed point comes to rest
+_STILL = 1e-9  # relative to the speed at the flow's own start: slower points are at rest
 
 
 def trajectory(
@@ -46,19 +53,22 @@ def trajectory(
     step: float | None = None,
     transient: int | None = None,
 ) -> Floats:
-    """Points [count, d] of the trajectory from a start, `every` steps apart; the transient's end is the first.
+    """Follow a flow's trajectory from a start; the first point is the end of the transient.
 
     Args:
-        flow: what to follow.
-        start: where it begins [d]; the flow's own start where None.
+        flow: the flow.
+        start: the start [d]; None for the flow's own.
         count: points, 1 at least.
-        every: one of so many steps is kept. To skip m points is `every = m + 1`: Chaos 8:800 skips 10, CU-CS-844-97
-            takes each tenth, so skips 9.
-        step: of the integration, in the flow's units of time; the flow's own where None.
-        transient: steps that are dropped before the first point; the flow's own where None.
+        every: steps from each point to the next. To skip m points is `every = m + 1`: Bradley and Stuart, Chaos 8:800
+            (1998), skip 10; their report CU-CS-844-97 (1997) takes each tenth, so skips 9.
+        step: the step of the integration, in the flow's units of time; None for the flow's own.
+        transient: steps to drop before the first point; None for the flow's own.
+
+    Returns:
+        Points [count, d] in the flow's coordinates.
 
     Raises:
-        MotionMindError: an argument is out of range, the trajectory leaves for infinity, or it settles: on a fixed
+        MotionMindError: an argument is out of range, the trajectory diverges to infinity, or it settles: on a fixed
             point, or into an orbit that neighbours do not leave (see above).
     """
     if count < 1:
@@ -79,12 +89,20 @@ def largest_exponent(
     step: float | None = None,
     transient: int | None = None,
 ) -> float:
-    """The flow's largest Lyapunov exponent by Benettin's method, in nats per unit of time (1 bit is 0.693 nats).
+    """Estimate the flow's largest Lyapunov exponent by Benettin's method.
 
     With a million steps, some ten thousand turns, it is within about one percent for the flows here.
 
+    Args:
+        flow: the flow.
+        start: see `trajectory`, as for `step` and `transient`.
+        steps: steps of the integration.
+
+    Returns:
+        Nats per unit of the flow's time (1 bit is 0.693 nats).
+
     Raises:
-        MotionMindError: an argument is out of range, or the trajectory leaves for infinity.
+        MotionMindError: an argument is out of range, or the trajectory diverges to infinity.
     """
     if steps < 1:
         raise MotionMindError(f"an exponent needs 1 step at least, not {steps}")
@@ -95,7 +113,7 @@ def largest_exponent(
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A flow from a start with a step, its arguments checked; `compiled` is None where its field cannot be."""
+    """A flow from a start with a step, its arguments checked; `compiled` is None if its field cannot be compiled."""
 
     flow: Flow
     compiled: Step | None
@@ -122,7 +140,7 @@ class _Run:
             raise MotionMindError(
                 f"the transient of {flow.name} is a whole number of steps, 0 at least, not {transient!r}"
             )
-        # Compiled code would read past the end of an array without a word, so the field is tried as it is.
+        # Compiled code would silently read past the end of an array, so the field is first called uncompiled.
         try:
             shape = np.shape(flow.field(begin.copy(), *flow.parameters.values()))
         except (TypeError, IndexError, ValueError, ArithmeticError) as error:
@@ -136,17 +154,18 @@ class _Run:
         return tuple(self.flow.parameters.values())
 
     def settled(self) -> Floats:
-        """Where the transient ends [d]."""
+        """The point at which the transient ends [d]."""
         return self.follow(self.start, 2, self.transient)[1] if self.transient else self.start
 
     def follow(self, start: Floats, count: int, every: int) -> Floats:
+        """Points [count, d] from `start` on, `every` steps apart."""
         points, kept = self._call(_follow, _follow_compiled, start, count, every)
         if kept < count:
             raise self._diverged(kept * every)
         return np.asarray(points)
 
     def growth(self, start: Floats, steps: int, enough: float) -> tuple[float, int]:
-        """Nats by which neighbours part, and in how many steps."""
+        """Nats by which neighbours of `start` diverge, and the number of steps it took."""
         growth, used = self._call(_part, _part_compiled, start, steps, enough)
         if np.isnan(growth):
             raise self._diverged(used)
@@ -162,9 +181,10 @@ class _Run:
             raise MotionMindError(f"{self.flow.label}: its field fails after {_written(start)}: {error}") from error
 
     def check(self, start: Floats) -> None:
-        """MotionMindError unless the flow is chaotic where it begins; with tiny steps that would take long to see.
+        """Raise MotionMindError unless the flow is chaotic from `start`.
 
-        Neighbours part on the way to a fixed point, too, if it is a saddle: so it is also seen where that leads.
+        The test takes the flow's own step at least: with tiny ones it would take long. Neighbours diverge also on the
+        way to a fixed point that is a saddle, so the trajectory must not come to rest either.
         """
         run = replace(self, step=max(self.step, self.flow.step))
         growth, used = run.growth(start, _PATIENCE, _ENOUGH)
@@ -183,6 +203,7 @@ class _Run:
             )
 
     def speed(self, point: Floats) -> float:
+        """The norm of the rate of change at a point [d]."""
         return float(np.linalg.norm(self.flow.field(point.copy(), *self.parameters)))
 
     def _diverged(self, steps: int) -> MotionMindError:
@@ -202,9 +223,9 @@ def _written(point: Sequence[float] | Floats) -> str:
 
 @cache
 def _compiled(field: Field, parameters: int) -> Step | None:
-    """A step of the field, with so many parameters, as a pointer; None where numba cannot compile it.
+    """A step of the field, with so many parameters, as a pointer; None if numba cannot compile it.
 
-    Only those of our own fields are kept on disk, where what they are compiled from is known.
+    Only steps of this package's own fields are cached on disk: their source is known.
     """
     from numba import types
     from numba.core.errors import NumbaError
@@ -223,7 +244,7 @@ def _compiled(field: Field, parameters: int) -> Step | None:
 
 
 def _step_of(field: Field) -> Step:
-    """One step of length h, for which x [d] moves on; y and total [d] are room to work in."""
+    """A function that moves x [d] on by one Runge-Kutta step of length h; y and total [d] are scratch arrays."""
 
     def step(x: Floats, h: float, parameters: tuple[float, ...], y: Floats, total: Floats) -> None:
         k = field(x, *parameters)
@@ -249,7 +270,7 @@ def _step_of(field: Field) -> Step:
 
 @either
 def _near(x: Floats) -> bool:
-    """Whether a point is where an attractor can be; one that is not a number is not."""
+    """Whether a point [d] is near enough to the origin for an attractor; NaN is not."""
     near = True
     for i in range(len(x)):
         near = near and abs(x[i]) < _FAR
@@ -259,7 +280,7 @@ def _near(x: Floats) -> bool:
 def _follow(
     step: Step, parameters: tuple[float, ...], start: Floats, h: float, count: int, every: int
 ) -> tuple[Floats, int]:
-    """Points [count, d] from `start` on, `every` steps apart, and how many there are: fewer where it diverged."""
+    """Points [count, d] from `start` on, `every` steps apart, and their number: fewer if the trajectory diverged."""
     d = len(start)
     x, y, total = start.copy(), np.empty(d), np.empty(d)
     points = np.empty((count, d))
@@ -276,9 +297,9 @@ def _follow(
 def _part(
     step: Step, parameters: tuple[float, ...], start: Floats, h: float, steps: int, enough: float
 ) -> tuple[float, int]:
-    """Nats by which a neighbour of `start` parts from its trajectory within `steps`, or as soon as they are `enough`.
+    """Nats by which a neighbour of `start` diverges from its trajectory, and the number of steps made.
 
-    Also the number of steps made; nan where the trajectory diverged.
+    It stops after `steps`, or as soon as the nats are `enough`. NaN nats: the trajectory went to infinity.
     """
     d = len(start)
     x, other, y, total = start.copy(), start.copy(), np.empty(d), np.empty(d)
@@ -295,7 +316,7 @@ def _part(
         for i in range(d):
             square += (other[i] - x[i]) ** 2
         distance = np.sqrt(square)
-        if distance == 0.0:  # they have met, to the last digit: as far as numbers go, nothing parts here
+        if distance == 0.0:  # the two have met, to the last digit, and can never diverge again
             return -np.inf, n + 1
         grown += np.log(distance / apart)
         if grown >= enough:

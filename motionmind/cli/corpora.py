@@ -130,7 +130,7 @@ def build(
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.store import place_for
-    from motionmind.discretize import make
+    from motionmind.discretize import make_discretization
     from motionmind.notation.compose import motions
     from motionmind.notation.read import read_score
     from motionmind.retarget.retarget import own_skeleton
@@ -138,7 +138,7 @@ def build(
 
     place = place_for(name, home)
     others = mixture(mix)
-    discretization = make(discretize, *tolerances(tolerance, 15.0))
+    discretization = make_discretization(discretize, *tolerances(tolerance, 15.0))
     mapping = read_mapping(joints)
     names = clip_names(files)
 

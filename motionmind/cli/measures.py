@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,9 +41,10 @@ def measure(
     corpus's states. The range is from the 5th to the 95th percentile of the corpus's clips, in pieces as long, or of a
     tenth of it; what is beyond it is marked.
     """
+    import msgspec
     import numpy as np
 
-    from motionmind.metrics.measure import measure
+    from motionmind.metrics.measure import MeasureReport, measure
     from motionmind.retarget.retarget import own_skeleton
     from motionmind.tween.engine import Engine
     from motionmind.tween.narrative import read_report
@@ -61,8 +61,7 @@ def measure(
             raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
     found = measure(motion, engine, path)
     if as_json:
-        figures = {name: {k: _number(v) for k, v in asdict(figure).items()} for name, figure in found.items()}
-        click.echo(json.dumps({"corpus": engine.corpus.name, "frames": len(motion), "figures": figures}))
+        click.echo(json.dumps(msgspec.to_builtins(MeasureReport.of(engine.corpus.name, len(motion), found))))
         return
     seconds = motion.times[-1] - motion.times[0]
     click.echo(f"{file}: {count(len(motion), 'frame')} in {seconds:.2f} s, beside {engine.corpus.name}")
@@ -77,8 +76,3 @@ def _line(name: str, figure: Figure, width: int) -> str:
     low, high = ("-" if math.isnan(number) else f"{number:.4g}" for number in (figure.low, figure.high))
     unit = f" ({figure.unit})" * bool(figure.unit)
     return f"{name:{width}}  {figure.value:8.4g} {beyond}  {low:>6} to {high:8}  {figure.about}{unit}"
-
-
-def _number(value: Any) -> Any:
-    """What JSON can hold: null for what has no value."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value

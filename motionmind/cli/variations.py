@@ -168,7 +168,7 @@ def vary(
             transient=transient,
             length=length,
             alternatives=alternatives,
-            told=interruption.told,
+            on_progress=interruption.told,
             watch=interruption.watch,
             **wishes,
         )
@@ -262,7 +262,7 @@ def review(
         wishes, engine = asked(options), _engine(smooth, home)
         with interruption:
             smoothed = found.smooth(
-                engine, alternatives=alternatives, told=interruption.told, watch=interruption.watch, **wishes
+                engine, alternatives=alternatives, on_progress=interruption.told, watch=interruption.watch, **wishes
             )
         if smoothed is found and not interruption.asked:
             is_left = any(seam.is_abrupt for seam in found.seams)

@@ -1,4 +1,4 @@
-"""States learned from the movement itself, as few as an angular tolerance allows."""
+"""Codebooks: states learned from the movement itself, few for a given angular tolerance."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from motionmind.discretize.protocol import check_range, per_joint_values, sample
 from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.geometry import rotations as rot
 
-# Rounds of centring. On the dance in the table below, at 5 Hz and 15 degrees, the first takes 19 % off the mean error,
-# five take 31 %, five more another 1 %.
+# Rounds of centring. On the dance in the table below, at 5 Hz and 15 degrees, one round reduces the mean error by 19 %,
+# five by 31 %, and five more by another 1 %.
 _ROUNDS = 5
 
 
@@ -22,14 +22,14 @@ _ROUNDS = 5
 class Codebook:
     """A learned codebook: every orientation of the corpus lies within `tolerance` degrees of its state.
 
-    For each joint: states are opened by farthest-point traversal (Gonzalez, "Clustering to minimize the maximum
-    intercluster distance", Theor. Comput. Sci. 38:293, 1985) until no sample is further than the tolerance from
-    all of them; then each is moved to the mean of its samples, wholly or part of the way, as long as none of them
-    is left outside the tolerance (Lloyd's step under a constraint), a few times over.
+    For each joint, farthest-point traversal (Gonzalez, "Clustering to minimize the maximum intercluster distance",
+    Theor. Comput. Sci. 38:293, 1985) opens states until every sample is within the tolerance of one of them. Then, a
+    few times over, each state moves to the mean of its samples, wholly or part of the way, as far as all of them stay
+    within the tolerance (Lloyd's step under a constraint).
 
-    Why this and not leader clustering or a greedy set cover. Twenty clips of one dancer, 23 joints, the pelvis
-    without its heading, means over joints; "out" is distinct successors per state, "joinable" the share of 2000
-    posture pairs that every joint can join by attested transitions:
+    The reasons for this rather than leader clustering or a greedy set cover are measured on twenty clips of one dancer
+    (23 joints, the pelvis without its heading, means over joints). "out" is the number of distinct successors of a
+    state, "joinable" the share of 2000 pairs of postures that attested transitions of every joint can join:
 
         postures, tolerance      method                      most  total   out  mean error  joinable
         5 Hz, 784, 15 degrees    leader, in order of time     199    828  4.53        5.55     0.913
@@ -47,10 +47,11 @@ class Codebook:
         10 Hz, 1560, 5 degrees   greedy cover, centred        888   3879  5.66        1.72     0.849
                                  farthest point, centred      929   4252  5.51        1.55     0.824
 
-    A cover needs a sixth fewer states at the same tolerance, but at the same number of states it errs as much and
-    branches as much: the two trade along one curve. The cover wants every pair of samples (6e9 per joint at 78,000
-    postures), this N times S; and the leaders depend on the order in which clips are read, this does not: samples
-    are sorted first. States are numbered in the order they were opened: state 0 is the sample nearest to the mean.
+    A cover needs a sixth fewer states at the same tolerance, but with the same number of states it has the same error
+    and branching: the two trade along one curve. A cover compares every pair of samples (6e9 per joint at 78,000
+    postures), this method only N times S. Leaders depend on the order in which clips are read; this method sorts the
+    samples first. States are numbered in the order in which they were opened: state 0 is the sample nearest to the
+    mean.
 
     Attributes:
         tolerance: degrees, 0.01 to 180.
@@ -65,19 +66,27 @@ class Codebook:
         check_range("tolerance in degrees", {"": self.tolerance, **self.per_joint}, 0.01, 180.0)
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
-        """The states for `names` [J] that cover `rotations` [N, J, 4]; see `Discretization.fit`."""
+        """Learn the states for `names` [J] that cover `rotations` [N, J, 4]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         tolerances = per_joint_values(names, self.tolerance, self.per_joint)
         centres = [codebook(rotations[:, j], tolerances[j]) for j in range(len(names))]
         return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=tolerances)
 
     def to_spec(self) -> dict[str, object]:
-        """The tolerances, as `from_spec` reads them."""
+        """Return the tolerances, as `from_spec` reads them."""
         return {"kind": self.kind, "tolerance": self.tolerance, "per_joint": dict(self.per_joint)}
 
 
 def codebook(rotations: Floats, tolerance: float) -> Floats:
-    """Centres [S, 4] within `tolerance` degrees of every one of one joint's `rotations` [N, 4]."""
+    """Learn the states of one joint.
+
+    Args:
+        rotations: orientations of the joint [N, 4].
+        tolerance: degrees.
+
+    Returns:
+        Centres [S, 4]; every orientation is within the tolerance of one of them.
+    """
     q = rot.canonical(rotations)
     q = q[np.lexsort(q.T)]
     limit = float(np.cos(0.5 * np.radians(tolerance)))
@@ -87,18 +96,27 @@ def codebook(rotations: Floats, tolerance: float) -> Floats:
         centres = _centred(q, centres, limit)
     states, _ = nearest(q, centres)
     centres = centres[np.unique(states)]
-    # Crowds on both sides of a border could pull two centres onto one point. Opened states never meet: they are
-    # samples further apart than the tolerance.
+    # Many samples on both sides of a border could pull two centres onto one point. Opened states never coincide: they
+    # are samples further apart than the tolerance.
     return centres if len(distinct(centres)) == len(centres) else opened
 
 
 def farthest_points(q: Floats, limit: float) -> Floats:
-    """Members [S, 4] of `q` [N, 4] such that |q . member| >= `limit` for all q: each is the farthest from those
-    before it, the first the one nearest to the mean. They lie further apart than the limit."""
-    # Coordinates in rows: a product with one centre then runs along memory (twice as fast).
+    """Choose members of `q` by farthest-point traversal, until each sample has a member within the limit.
+
+    The first is the sample nearest to the mean, each next one the sample farthest from all before it. They lie further
+    apart than the limit. The mean rotation is the eigenvector of the largest eigenvalue of the samples' scatter matrix:
+    Markley, Cheng, Crassidis and Oshman, "Averaging quaternions", J. Guid. Control Dyn. 30:1193 (2007).
+
+    Args:
+        q: unit quaternions [N, 4].
+        limit: cosine of half the angle that is allowed between a sample and the nearest member.
+
+    Returns:
+        Members of `q` [S, 4], in the order in which they were chosen.
+    """
+    # Coordinates in rows: a product with one centre then reads memory in order (twice as fast).
     rows = np.ascontiguousarray(q.T)
-    # The mean rotation is the largest eigenvector of the samples' scatter: Markley et al., "Averaging quaternions",
-    # J. Guid. Control Dyn. 30:1193 (2007).
     mean = np.linalg.eigh(rows @ q)[1][:, -1]
     chosen = [int(np.argmax(np.abs(mean @ rows)))]
     closest = np.abs(q[chosen[0]] @ rows)
@@ -113,8 +131,9 @@ def farthest_points(q: Floats, limit: float) -> Floats:
 
 
 def _centred(q: Floats, centres: Floats, limit: float) -> Floats:
-    """`centres` [S, 4], each moved to the mean of the samples `q` [N, 4] it is nearest to, or as far towards it
-    as keeps them all within the limit: a half, a quarter of the way, or not at all."""
+    """`centres` [S, 4], each moved towards the mean of those samples `q` [N, 4] that are nearest to it.
+
+    It moves all the way, a half, a quarter or not at all: the most that keeps all of them within the limit."""
     states, _ = nearest(q, centres)
     # One hemisphere per cell: within it the normalised sum is the mean to third order in the cell's radius.
     signed = q * np.where(np.sum(q * centres[states], axis=-1) < 0.0, -1.0, 1.0)[:, None]

@@ -1,4 +1,4 @@
-"""States that an expert named, from a library file."""
+"""Expert libraries as a discretization: states that an expert named."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from motionmind.files import FilePath
 
 @dataclass(frozen=True)
 class ExpertLibrary:
-    """The states of a library, all of them and no others, whether the corpus visits them or not.
+    """All states of a library and no others, whether the corpus visits them or not.
 
-    An orientation belongs to the nearest state, however far: `StateSpace.distance` tells how far, and what lies
-    beyond the tolerance is not in the expert's vocabulary.
+    An orientation belongs to the nearest state, however far. `StateSpace.distance` returns the angle; beyond the
+    tolerance an orientation is not in the expert's vocabulary.
 
-    A joint that the library does not list gets the states of a learned codebook, without names. A single state
-    would freeze the joint without a word, and to refuse would ask for names for thumbs before those for hips can
-    be tried; this way nothing that moves is lost, and `StateSpace.labels` shows which joints still want names.
+    A joint that the library does not list gets the states of a learned codebook, without labels. A single state would
+    silently freeze the joint, and an error would demand names for thumbs before names for hips can be tried. This way
+    no movement is lost, and `StateSpace.labels` shows which joints still need names.
 
     Attributes:
         library: the states, by joint.
-        tolerance: degrees, 0.01 to 180: within which a named state stands for an orientation, and the codebook's
-            tolerance for joints that are not listed.
+        tolerance: degrees, 0.01 to 180, within which a named state stands for an orientation; also the tolerance of
+            the codebooks for joints that are not listed.
         per_joint: degrees for single joints; "hip" means both hips.
     """
 
@@ -47,11 +47,21 @@ class ExpertLibrary:
         tolerance: float = 30.0,
         per_joint: Mapping[str, float] | None = None,
     ) -> ExpertLibrary:
-        """From a file, or the bundled library of that name; see `read_library`."""
+        """Read a library from a file, or the bundled one of that name.
+
+        Args:
+            name_or_path: see `read_library`.
+            tolerance: degrees.
+            per_joint: degrees for single joints.
+
+        Raises:
+            FormatError: there is no such library, or the file cannot be read as one.
+            MotionMindError: a tolerance is out of range.
+        """
         return cls(read_library(name_or_path), tolerance, per_joint or {})
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
-        """The library's states for `names` [J]; see `Discretization.fit`."""
+        """Return the library's states for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         tolerances = per_joint_values(names, self.tolerance, self.per_joint)
         tables = self.library.tables_of(names)
@@ -68,9 +78,9 @@ class ExpertLibrary:
         return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=tolerances, labels=labels)
 
     def to_spec(self) -> dict[str, object]:
-        """The whole library, so that a manifest can be read where its file is not; as `from_spec` reads it.
+        """Return the whole library, as `from_spec` reads it: a manifest must be readable without the library's file.
 
-        Whoever stores it must keep the order of keys: it numbers the states.
+        The order of its keys numbers the states, and must be kept.
         """
         return {
             "kind": self.kind,

@@ -1,4 +1,4 @@
-"""States on a grid: of quaternion coefficients, as in the papers, or of Euler angles. Only cells that occur."""
+"""Grids of states, in quaternion coefficients as in the papers or in Euler angles: those cells that occur."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-# Beyond a step of 1 a quaternion can round to zero; beyond a third of a turn cells overlap more than they divide.
+# With a step above 1 a quaternion can round to zero; cells wider than a third of a turn overlap more than they divide.
 _WIDEST_STEP = 0.9
 _WIDEST_CELL = 120.0
 
 
 @dataclass(frozen=True)
 class QuaternionGrid:
-    """Rounding of quaternion coefficients to multiples of `step`, as in Bradley and Stuart, Chaos 8:800 (1998).
+    """A grid of quaternion coefficients, which are rounded to multiples of `step`.
 
-    A state is a cell that some orientation of the corpus falls into, made a unit quaternion again; an orientation
-    belongs to the nearest state. Rounding is off by step / 2 in each of four coefficients, so by `step` at most in
-    all, which turns a unit vector by asin(step) and the rotation by twice that: `step = sin(tolerance / 2)` keeps
-    every orientation of the corpus within `tolerance` of its state.
+    The method is that of Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800
+    (1998). A state is a cell that some orientation of the corpus falls into, normalised to a unit quaternion; an
+    orientation belongs to the nearest state. Rounding errs by step / 2 at most in each of four coefficients, so by
+    `step` at most in all. That turns a unit vector by asin(step) at most and the rotation by twice that, so
+    `step = sin(tolerance / 2)` keeps every orientation of the corpus within `tolerance` of its state.
 
     Attributes:
-        step: the grid's step, a number without unit, 0.00001 to 0.9.
+        step: the grid's step, without unit, 0.00001 to 0.9.
         per_joint: steps for single joints; "hip" means both hips.
     """
 
@@ -42,18 +43,18 @@ class QuaternionGrid:
 
     @staticmethod
     def step_for(tolerance: float) -> float:
-        """The step that keeps every orientation within `tolerance` degrees of its state."""
+        """Return the widest step that keeps every orientation within `tolerance` degrees of its state."""
         return min(_WIDEST_STEP, float(np.sin(0.5 * np.radians(tolerance))))
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
-        """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
+        """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         steps = per_joint_values(names, self.step, self.per_joint)
         centres = [self._cells(rotations[:, j], steps[j]) for j in range(len(names))]
         return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=np.degrees(2.0 * np.arcsin(steps)))
 
     def to_spec(self) -> dict[str, object]:
-        """The steps, as `from_spec` reads them."""
+        """Return the steps, as `from_spec` reads them."""
         return {"kind": self.kind, "step": self.step, "per_joint": dict(self.per_joint)}
 
     @staticmethod
@@ -64,18 +65,18 @@ class QuaternionGrid:
 
 @dataclass(frozen=True)
 class EulerGrid:
-    """Rounding of Euler angles to multiples of `degrees`: "5-degree steps" is `EulerGrid(5)`.
+    """A grid of Euler angles, which are rounded to multiples of `degrees`: "5-degree steps" is `EulerGrid(5)`.
 
-    A state is a cell that some orientation of the corpus falls into; an orientation belongs to the nearest state,
-    by the angle between the rotations and not between their Euler angles, which near gimbal lock say little.
+    A state is a cell that some orientation of the corpus falls into. An orientation belongs to the nearest state, by
+    the angle between the rotations, not between their Euler angles, which mean little near gimbal lock.
 
-    With three errors of up to h = degrees / 2 the half angle between an orientation and its cell's has a cosine of
-    at least cos(h/2)^3 - sin(h/2)^2 (the first and last axis may meet, the middle one stands square on both),
-    hence an angle of at most sqrt(5) h: `degrees = tolerance * 2 / sqrt(5)` keeps every orientation of the corpus
+    With three errors of up to h = degrees / 2, the half angle between an orientation and its cell's centre has a cosine
+    of at least cos(h/2)^3 - sin(h/2)^2 (the first and last axis may coincide, the middle one is perpendicular to both).
+    So the angle is at most sqrt(5) h, and `degrees = tolerance * 2 / sqrt(5)` keeps every orientation of the corpus
     within `tolerance` of its state.
 
     Attributes:
-        degrees: the cells' width, 0.001 to 120.
+        degrees: width of the cells, 0.001 to 120.
         order: the axes of the intrinsic turns, x, y and z once each (see `rotations.from_euler`).
         per_joint: widths for single joints; "hip" means both hips.
     """
@@ -92,30 +93,30 @@ class EulerGrid:
 
     @staticmethod
     def degrees_for(tolerance: float) -> float:
-        """The width that keeps every orientation within `tolerance` degrees of its state."""
+        """Return the greatest width, degrees, that keeps every orientation within `tolerance` degrees of its state."""
         return min(_WIDEST_CELL, float(tolerance * 2.0 / np.sqrt(5.0)))
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
-        """The cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
+        """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
         rotations = samples(names, rotations)
         widths = per_joint_values(names, self.degrees, self.per_joint)
         centres = [self._cells(rotations[:, j], np.radians(widths[j])) for j in range(len(names))]
         return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=widths * np.sqrt(5.0) / 2.0)
 
     def to_spec(self) -> dict[str, object]:
-        """The widths and the order, as `from_spec` reads them."""
+        """Return the widths and the order, as `from_spec` reads them."""
         return {"kind": self.kind, "degrees": self.degrees, "order": self.order, "per_joint": dict(self.per_joint)}
 
     def _cells(self, q: Floats, width: float) -> Floats:
-        # The canonical one of q and -q: both have the same angles, but perhaps not to the last bit.
+        # The canonical one of q and -q: their angles are equal, but perhaps not to the last bit.
         cells = np.unique(np.rint(rot.to_euler(self.order, rot.canonical(q)) / width), axis=0)
         return _occurring(q, rot.from_euler(self.order, cells * width))
 
 
 def _occurring(q: Floats, cells: Floats) -> Floats:
-    """Those of `cells` [S, 4] that are the nearest to some of `q` [N, 4]: a state that nothing visits is none.
+    """Those of `cells` [S, 4] that are the nearest to some of `q` [N, 4]; the others would never be visited.
 
-    Taking the others away changes nobody's nearest state.
+    Removing the others changes no sample's nearest state.
     """
     cells = distinct(rot.canonical(cells))
     return cells[np.unique(nearest(q, cells)[0])]

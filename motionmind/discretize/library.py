@@ -1,6 +1,6 @@
 """Expert libraries: files in which a person names the states of a body's joints.
 
-A library is TOML:
+A library is a TOML file:
 
     format = "motionmind-library"
     version = 1
@@ -11,11 +11,11 @@ A library is TOML:
 
     [hip]                                    # both hips; written for the left one
     "rest" = ""                              # the identity: as in the skeleton's rest
-    "devant 90 turned out" = "x -90, y 45"   # turns in degrees, each about the axes as the last has left them
+    "devant 90 turned out" = "x -90, y 45"   # turns in degrees, each about the axes as the last one has left them
     "as recorded" = [0.0, 0.0, 0.383, 0.924] # or a quaternion x, y, z, w
 
-A table is called after a joint, or after a pair of joints without their side. A pair is written for the left; the
-right has the same states in a mirror (x and -x exchanged).
+A table is named after a joint, or after a pair of joints without side. A pair is written for the left joint; the right
+one has the mirrored states (x and -x exchanged).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from motionmind.geometry import rotations as rot
 
 FORMAT = "motionmind-library"
 VERSION = 1
-# Two states of a joint that lie closer than this many degrees are one state with two names.
+# Two states of a joint that are closer than this many degrees are one state with two names.
 SAME_DEGREES = 0.01
 
 _TEXTS = ("title", "author", "licence", "skeleton")
@@ -46,14 +46,16 @@ _TEXTS = ("title", "author", "licence", "skeleton")
 
 @dataclass(frozen=True)
 class Library:
-    """States that people named, by joint or pair of joints.
+    """Named states, by joint or pair of joints.
 
     Attributes:
-        tables: per joint, or pair of joints ("hip"), the orientation of each state by name, as written: turns, or
-            a quaternion x, y, z, w. Order is kept: it numbers the states.
-        title, author, licence: what it is, whose, and under which terms.
-        skeleton: the skeleton whose rest the orientations start from.
-        path: where it was read from, for messages.
+        tables: for each joint, or pair of joints ("hip"), the orientation of each state by name, as written: turns, or
+            a quaternion x, y, z, w. Their order numbers the states.
+        title: its title.
+        author: its author.
+        licence: its licence.
+        skeleton: the skeleton whose rest posture the orientations start from.
+        path: the file that it was read from, for messages.
     """
 
     tables: Mapping[str, Mapping[str, str | tuple[float, ...]]]
@@ -65,7 +67,7 @@ class Library:
     _rotations: dict[str, Floats] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Check it all, so that what is built can be used; FormatError names table and entry."""
+        """Check everything; FormatError names the table and the entry at fault."""
         if not self.tables:
             raise FormatError("no joint has a table of states", path=self.path)
         for text in (*(getattr(self, key) for key in _TEXTS), *self.tables):
@@ -76,13 +78,14 @@ class Library:
             self.tables_of(BODIES[self.skeleton]().names)
 
     def rotations(self, table: str) -> Floats:
-        """Orientations [S, 4] of the states in `table`, as written: for the left, where it is a pair."""
+        """Return the orientations [S, 4] of the states in `table`, as written: of a pair, the left joint's."""
         return self._rotations[table]
 
     def tables_of(self, names: Sequence[str]) -> dict[int, str]:
-        """The table of each joint in `names` that has one, by the joint's index.
+        """Return the table of each joint in `names` that has one, by the joint's index.
 
-        FormatError where a table means none of the joints, or a joint is meant twice.
+        Raises:
+            FormatError: a table means none of the joints, or a joint is meant twice.
         """
         owner: dict[int, str] = {}
         for table in self.tables:
@@ -97,12 +100,12 @@ class Library:
         return owner
 
     def of_joint(self, table: str, joint: str) -> Floats:
-        """Orientations [S, 4] that `table` gives to `joint`, in a mirror where it is the right one of a pair."""
+        """Return the orientations [S, 4] that `table` gives to `joint`, mirrored for the right one of a pair."""
         q = self.rotations(table)
         return rot.mirror(q) if table != joint and joint.startswith("right_") else q
 
     def _check_text(self, text: str) -> None:
-        """JSON can carry halves of characters, which no file in UTF-8 can hold."""
+        """Refuse lone surrogates, which JSON can hold and a file in UTF-8 cannot."""
         try:
             text.encode()
         except UnicodeEncodeError:
@@ -153,7 +156,15 @@ class Library:
 
 
 def parse_library(text: str, *, path: str = "library") -> Library:
-    """The library that the TOML `text` describes; every fault is a FormatError that names table and entry."""
+    """Parse the TOML text of a library file.
+
+    Args:
+        text: the TOML.
+        path: where it is from, for messages.
+
+    Raises:
+        FormatError: it is not a library; the message names the table and the entry at fault.
+    """
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -162,7 +173,7 @@ def parse_library(text: str, *, path: str = "library") -> Library:
 
 
 def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -> Library:
-    """The library in `data`, the mapping that TOML or JSON of a library file gives."""
+    """Make a library of `data`, the mapping that the TOML or JSON of a library gives; FormatError if it is not one."""
     if data.get("format") != FORMAT:
         raise FormatError(f'not a library of states: it must say format = "{FORMAT}"', path=path)
     version = data.get("version")
@@ -186,7 +197,7 @@ def library_from_mapping(data: Mapping[str, object], *, path: str = "library") -
 
 
 def library_to_mapping(library: Library) -> dict[str, object]:
-    """The same as plain JSON values; the inverse of `library_from_mapping`."""
+    """Return the library as plain JSON values; the inverse of `library_from_mapping`."""
     head: dict[str, object] = {"format": FORMAT, "version": VERSION}
     head.update({key: getattr(library, key) for key in _TEXTS})
     for table, entries in library.tables.items():
@@ -195,9 +206,16 @@ def library_to_mapping(library: Library) -> dict[str, object]:
 
 
 def library_path(name_or_path: FilePath) -> Path:
-    """The file of a library: a path that ends in .toml as it is, or that of the bundled one of that name."""
+    """Return the path of a library file.
+
+    Args:
+        name_or_path: a path that ends in .toml, which is returned as it is, or the name of a bundled library.
+
+    Raises:
+        FormatError: no bundled library has that name.
+    """
     path = Path(name_or_path)
-    # A bare word is a name: a folder that happens to be called so must not change what is read.
+    # A bare word is a name, even if a folder is called so.
     if path.suffix == ".toml" or len(path.parts) != 1:
         return path
     folder = bundled("discretization")
@@ -210,7 +228,11 @@ def library_path(name_or_path: FilePath) -> Path:
 
 
 def read_library(name_or_path: FilePath) -> Library:
-    """The library in a file, or the bundled one of that name ("human23")."""
+    """Read the library in a .toml file, or the bundled one of that name ("human23").
+
+    Raises:
+        FormatError: there is no such library, or the file is not one; the message names the table and entry at fault.
+    """
     path = library_path(name_or_path)
     try:
         text = read_bytes(path).decode("utf-8-sig")
@@ -220,22 +242,22 @@ def read_library(name_or_path: FilePath) -> Library:
 
 
 def write_library(path: FilePath, library: Library) -> None:
-    """Write a library as a person would: turns where hundredths of a degree are exact, else quaternions.
+    """Write a library as a person would: in turns where hundredths of a degree are exact, else in quaternions.
 
-    The same states come back with `read_library`; comments of a file that was read are not kept.
+    `read_library` reads the same states; the comments of a file that was read are not kept.
     """
     write_atomically(path, format_library(library).encode())
 
 
 def format_library(library: Library) -> str:
-    """The text of a library file; the inverse of `parse_library`."""
+    """Return the text of a library file; the inverse of `parse_library`."""
     lines = [f'format = "{FORMAT}"', f"version = {VERSION}"]
     lines += [f"{key} = {_quoted(getattr(library, key))}" for key in _TEXTS]
     for table, entries in library.tables.items():
         lines += ["", f"[{table if _bare(table) else _quoted(table)}]"]
         for (name, value), q in zip(entries.items(), library.rotations(table), strict=True):
             turns = value if isinstance(value, str) else format_turns(q)
-            # A quaternion as it was given: normalised again and again, it would creep.
+            # A quaternion as it was given: normalised at every reading and writing, it would drift.
             text = f"[{', '.join(repr(float(v)) for v in value)}]" if turns is None else _quoted(turns)
             lines.append(f"{_quoted(name)} = {text}")
     return "\n".join(lines) + "\n"

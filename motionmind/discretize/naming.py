@@ -1,6 +1,6 @@
-"""Libraries of joint states made from scores: what their writers called each orientation is the state's name.
+"""Libraries of joint states made from scores: each state is named after the words that the score has for it.
 
-A start for an expert, who edits the file from there.
+Such a library is a draft for an expert to edit.
 """
 
 from __future__ import annotations
@@ -19,26 +19,27 @@ from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played
 from motionmind.notation.score import Score
 
-_Named = list[tuple[str, Floats]]  # what orientations were called, most frequent first
+_Named = list[tuple[str, Floats]]  # names and rotations [4], most frequent first
 
 
 def name_states(
     scores: Iterable[Score], tolerance: float, per_joint: Mapping[str, float] | None = None, *, stage: bool = False
 ) -> Library:
-    """The states of all joints that the scores' clips move, so that every posture is near a state with a name.
+    """Name states for all joints in the scores' clips; every posture is then near a state with a name.
 
-    In the order of how often they occur, an orientation becomes a state unless one lies within the tolerance already
-    (leader clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). Orientations are kept in whole degrees, so
-    that a posture may be a degree further off than the tolerance.
+    From the most frequent on, each orientation becomes a state unless a state lies within the tolerance already (leader
+    clustering: Hartigan, "Clustering Algorithms", 1975, chapter 3). Orientations are rounded to whole degrees, so a
+    posture may be a degree further off than the tolerance.
 
     Args:
-        scores: all on the same body.
+        scores: scores for the same body.
         tolerance: degrees.
         per_joint: degrees for single joints, or pairs of joints.
-        stage: whether the pelvis' states tell where the body faces, as in a corpus whose facing is `stage`.
+        stage: whether the pelvis' states include the heading, as in a corpus whose facing is `stage`.
 
     Raises:
-        MotionMindError: there is no clip to name states after, scores are on several bodies, or a tolerance is none.
+        MotionMindError: there is no clip to name states after, scores are for several bodies, or a tolerance is out of
+            range.
     """
     scores, per_joint = list(scores), per_joint or {}
     check_range("tolerance in degrees", {"": tolerance, **per_joint}, 0.01, 180.0)
@@ -66,7 +67,7 @@ def name_states(
 
 
 def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Floats]]:
-    """Joint, name and rotation of every joint in every posture; a right one's as in the mirror."""
+    """Joint, name and rotation [4] of every joint in every posture; a right joint's rotation mirrored."""
     body = score.body
     layers = {joint: index for index, joints in enumerate(body.layers.values()) for joint in joints}
     for rows, motion in played(score):
@@ -85,7 +86,7 @@ def _orientations(score: Score, stage: bool) -> Iterable[tuple[str, str, Floats]
 
 
 def _leaders(named: _Named, width: float) -> _Named:
-    """Orientations of which no two lie within `width` radians, and of which each that is named is that near to one."""
+    """Orientations of which no two lie within `width` radians, but all that are `named` within it of one of them."""
     chosen: _Named = []
     for name, turned in named:
         if not chosen or rot.angle(np.stack([kept for _, kept in chosen]), turned).min() > width:
@@ -94,7 +95,7 @@ def _leaders(named: _Named, width: float) -> _Named:
 
 
 def _table(body: Anatomy, joint: str, named: _Named) -> dict[str, str]:
-    """States as a library has them: turns by name, those of one name numbered."""
+    """A library's table: turns by name, where states of the same name are numbered."""
     times, out = Counter[str](), dict[str, str]()
     for name, turned in named:
         turns = _turns(body.joints[joint], turned)
@@ -106,11 +107,11 @@ def _table(body: Anatomy, joint: str, named: _Named) -> dict[str, str]:
 
 
 def _turns(joint: Joint, turned: Floats) -> str:
-    """A rotation [4] in whole degrees about the axes, the bone's own length last, or first where it is outermost."""
+    """A rotation [4] as turns in whole degrees, the one about the bone last, or first if that axis is the outermost."""
     order = "yxz" if joint.outer else "xzy" if joint.long == "y" and not joint.rest else "yzx"
     first, middle, last = np.round(np.degrees(rot.to_euler(order, turned)))
-    # The same rotation has another name beyond the right angle; the one that turns less is easier to read.
-    ways = np.array([[first, middle, last], [first + 180.0, 180.0 - middle, last + 180.0]])
-    ways = (ways + 179.0) % 360.0 - 179.0
-    degrees = min(ways, key=lambda way: np.abs(way).sum())
+    # A rotation has two triples of Euler angles; the one that turns less is easier to read.
+    triples = np.array([[first, middle, last], [first + 180.0, 180.0 - middle, last + 180.0]])
+    triples = (triples + 179.0) % 360.0 - 179.0
+    degrees = min(triples, key=lambda triple: np.abs(triple).sum())
     return ", ".join(f"{axis} {angle:g}" for axis, angle in zip(order, degrees, strict=True) if angle)

@@ -1,4 +1,4 @@
-"""What every kind of discretization can do, and the settings per joint that they share."""
+"""The protocol of all discretizations, and the per-joint settings that they share."""
 
 from __future__ import annotations
 
@@ -20,23 +20,35 @@ class Discretization(Protocol):
 
     @property
     def kind(self) -> str:
-        """Which kind this is, such as "codebook"."""
+        """The name of the kind, such as "codebook"."""
         ...
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
-        """The states for the joints `names` [J], given the orientations `rotations` [N, J, 4] of a corpus.
+        """Divide each joint's orientations into states.
 
         The same orientations give the same states, whatever the order of the postures or the joints.
+
+        Args:
+            names: names of the joints [J].
+            rotations: unit quaternions x, y, z, w of a corpus's postures [N, J, 4].
+
+        Raises:
+            MotionMindError: there are no postures or joints, or a quaternion is not a unit quaternion.
+            SkeletonError: a per-joint setting is for no joint of `names`.
         """
         ...
 
     def to_spec(self) -> dict[str, object]:
-        """What a manifest keeps of this: plain JSON values from which `from_spec` makes it again."""
+        """Return plain JSON values for a manifest, from which `from_spec` makes the discretization again."""
         ...
 
 
 def samples(names: Sequence[str], rotations: Floats) -> Floats:
-    """`rotations` [N, J, 4] as `fit` may use them; MotionMindError where there are none, or they are none."""
+    """Check the arguments of `fit`, and return `rotations` as float64 [N, J, 4].
+
+    Raises:
+        MotionMindError: there are no postures or joints, or a quaternion is not a unit quaternion.
+    """
     if len(names) == 0 or len(set(names)) != len(names):
         raise MotionMindError("a discretization needs joints, each named once")
     rotations = checked_rotations(names, rotations)
@@ -46,19 +58,24 @@ def samples(names: Sequence[str], rotations: Floats) -> Floats:
 
 
 def joints_meant(name: str, names: Sequence[str]) -> list[int]:
-    """Indices of the joints that `name` means: itself, or without a side ("hip") the left and the right one."""
+    """Return the indices of the joints that `name` means: that joint, or both sides for a name without side ("hip")."""
     exact = [j for j, joint in enumerate(names) if joint == name]
     return exact or [j for j, joint in enumerate(names) if joint in {side + name for side in SIDES}]
 
 
 def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str, float]) -> Floats:
-    """`value`, or what `per_joint` says, for each joint [J].
+    """Return the value for each joint [J]: its own in `per_joint`, or else the default.
 
-    A name without its side means both sides, unless that side is named too. A name that means no joint is a
-    SkeletonError that suggests the nearest one.
+    Args:
+        names: names of the joints [J].
+        value: the default.
+        per_joint: values by joint. A name without side means both sides, unless a side is named too.
+
+    Raises:
+        SkeletonError: a name in `per_joint` means no joint; the message suggests the nearest one.
     """
     values = np.full(len(names), float(value))
-    # Sideless names first, so that a side of its own has the last word.
+    # Names without side first, so that a named side overrides them.
     for exact in (False, True):
         for name, own in per_joint.items():
             joints = joints_meant(name, names)
@@ -71,13 +88,23 @@ def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str,
 
 
 def nameable(names: Sequence[str]) -> list[str]:
-    """What `joints_meant` understands: every joint, and every pair of joints without its side."""
+    """Return the names that `joints_meant` understands: every joint, and every pair of joints without its side."""
     pairs = [name.removeprefix("left_") for name in names if name.startswith("left_")]
     return list(dict.fromkeys([*names, *pairs]))
 
 
 def check_range(what: str, values: Mapping[str, float], low: float, high: float) -> None:
-    """MotionMindError unless all of `values`, by joint ("" for the default), are numbers from `low` to `high`."""
+    """Check that values are numbers within a range.
+
+    Args:
+        what: the name of the setting, for the message.
+        values: by joint; "" is the default.
+        low: the smallest value allowed.
+        high: the largest value allowed.
+
+    Raises:
+        MotionMindError: a value is not a number, or out of range.
+    """
     for joint, value in values.items():
         number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if not number or not low <= value <= high:

@@ -1,4 +1,4 @@
-"""Discretizations by name, and as plain values that a manifest keeps."""
+"""Specifications of discretizations: by name, and as plain values for manifests."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from motionmind.errors import FormatError, MotionMindError, did_you_mean
 
 KINDS = ("codebook", "quaternion", "euler")
 
-# What a specification of each kind may say besides its kind.
+# The keys of each kind of specification besides "kind".
 _KEYS = {
     "codebook": ("tolerance", "per_joint"),
     "quaternion": ("step", "per_joint"),
@@ -24,18 +24,28 @@ _KEYS = {
 }
 
 
-def make(kind: str, tolerance: float = 15.0, per_joint: Mapping[str, float] | None = None) -> Discretization:
-    """The discretization that `kind` names: codebook, quaternion, euler, or else a library by name or .toml file.
+def make_discretization(
+    kind: str, tolerance: float = 15.0, per_joint: Mapping[str, float] | None = None
+) -> Discretization:
+    """Make a discretization by name.
 
-    `tolerance` and `per_joint` are degrees and mean the same for every kind but the last: no orientation of the
-    corpus lies further than that from its state. The grids get the widest step that keeps this promise, for
-    quaternions sin(tolerance / 2), since a small rotation moves a coefficient by about half its angle. For a library
-    it is how far off an orientation counts as one that the library has no name for.
+    For every kind but a library, no orientation of the corpus is further than the tolerance from its state. Grids get
+    the widest step for which this holds; for quaternions that is sin(tolerance / 2), as a small rotation changes a
+    coefficient by about half its angle. In a library, an orientation further off than the tolerance has no name.
+
+    Args:
+        kind: codebook, quaternion, euler, or else the name or .toml file of a library.
+        tolerance: degrees.
+        per_joint: degrees for single joints.
+
+    Raises:
+        MotionMindError: a tolerance is out of range.
+        FormatError: there is no such kind or library.
     """
     per_joint = dict(per_joint or {})
     if kind == "codebook":
         return Codebook(tolerance, per_joint)
-    # Checked here, in degrees: a grid would complain about a step that nobody wrote.
+    # Checked here, in degrees: a grid's message would be about a step that nobody wrote.
     checked = Codebook(tolerance, per_joint)
     if kind == "quaternion":
         step = QuaternionGrid.step_for
@@ -53,15 +63,19 @@ def make(kind: str, tolerance: float = 15.0, per_joint: Mapping[str, float] | No
 
 
 def to_spec(discretization: Discretization) -> dict[str, object]:
-    """What a manifest keeps of a discretization: plain JSON values."""
+    """Return a discretization as plain JSON values, which a manifest keeps."""
     return discretization.to_spec()
 
 
 def from_spec(spec: str | Mapping[str, object]) -> Discretization:
-    """The discretization that `to_spec` described, from the mapping or its JSON text.
+    """Make the discretization of a specification; the inverse of `to_spec`.
 
-    `{"kind": "codebook", "tolerance": 15, "per_joint": {"left_hip": 10}}`; kinds are codebook, quaternion, euler
-    and library, and a library may be given whole or by name. FormatError where it says anything else.
+    Args:
+        spec: a mapping or its JSON text: `{"kind": "codebook", "tolerance": 15, "per_joint": {"left_hip": 10}}`. Kinds
+            are codebook, quaternion, euler and library; a library may be given whole or by name.
+
+    Raises:
+        FormatError: it is not a specification, or a value is out of range.
     """
     if isinstance(spec, str):
         try:
@@ -88,7 +102,7 @@ def from_spec(spec: str | Mapping[str, object]) -> Discretization:
 
 
 def _make(kind: str, options: dict[str, object]) -> Discretization:
-    # The classes check what they are given; the casts only say what it ought to be.
+    # The classes check their arguments; the casts only satisfy the type checker.
     per_joint = cast("Mapping[str, float]", options.get("per_joint", {}))
     if kind == "codebook":
         return Codebook(cast("float", options.get("tolerance", Codebook.tolerance)), per_joint)

@@ -1,4 +1,4 @@
-"""StateSpace: every joint's states as orientations, and the way from orientations to states and back."""
+"""The state space of a body: every joint's states as orientations, and the mapping between the two."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from motionmind.geometry import rotations as rot
 # Two orientations that turn into each other by less than this many radians are one state.
 SAME = 1e-5
 # Cosines of half angles that differ by less than this are a tie. BLAS adds in an order of its own, and a score's
-# angles often lie exactly midway between two states: without a margin the last bit would choose. It is far above
-# rounding (1e-16) and below what sets two states apart (1 - cos(SAME / 2) = 1.25e-11).
+# angles often lie exactly midway between two states: without a margin the last bit would decide. The margin is far
+# above rounding (1e-16) and below the difference between distinct states (1 - cos(SAME / 2) = 1.25e-11).
 _TIE = 1e-12
-# Doubles in the largest block of cosines: 1 MB, so that it stays near the processor. Of 1/8 to 8 MB the fastest, 4 to 6
-# times as fast as 2 MB and more.
+# Doubles in the largest block of cosines: 1 MB, which stays in the processor's cache. It is the fastest of 1/8 to 8 MB,
+# and 4 to 6 times as fast as 2 MB and more.
 _BLOCK = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
-    """The states of every joint: what an orientation is called, and what orientation a state stands for.
+    """The states of every joint, each represented by an orientation, its centre.
 
-    The states of joint j are `centres[starts[j]:starts[j + 1]]`, so that all of them are one array, which a file
-    can hold and memory can map.
+    The states of joint j are `centres[starts[j]:starts[j + 1]]`: all states are one array, which can be memory-mapped
+    from a file.
 
     Attributes:
         names: the joints [J].
         centres: unit quaternions x, y, z, w [S_0 + ... + S_(J-1), 4], canonical sign, joint after joint.
-        starts: where each joint's states begin in `centres` [J + 1], the last entry being their number.
+        starts: index of each joint's first state in `centres` [J + 1]; the last entry is the number of states.
         kind: the kind of discretization that made them, such as "codebook".
         tolerances: degrees [J] within which a state stands for an orientation. All kinds but the expert library
-            keep every orientation they were fitted to within it; there, what lies further off is not in the
-            vocabulary.
-        labels: per joint [J] the names of its states [S_j], or nothing where nobody named them.
+            keep every orientation that they were fitted to within it; in an expert library, orientations further off
+            are not in the vocabulary.
+        labels: names of the states [S_j] of each joint [J]; empty for a joint whose states have no names.
     """
 
     names: tuple[str, ...]
@@ -50,7 +50,7 @@ class StateSpace:
     labels: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        # asarray, not array: what is memory-mapped stays so.
+        # asarray, not array: memory-mapped arrays stay memory-mapped.
         centres = np.asarray(self.centres, dtype=np.float64)
         starts = np.asarray(self.starts, dtype=np.int64)
         tolerances = np.asarray(self.tolerances, dtype=np.float64)
@@ -89,7 +89,18 @@ class StateSpace:
         tolerances: Floats,
         labels: Sequence[Sequence[str]] = (),
     ) -> StateSpace:
-        """The state space whose joint j has the states `centres[j]` [S_j, 4]."""
+        """Make a state space from the centres of each joint.
+
+        Args:
+            names: names of the joints [J].
+            centres: unit quaternions of each joint's states, [J] arrays [S_j, 4].
+            kind: the kind of discretization.
+            tolerances: degrees [J].
+            labels: names of each joint's states, as in the class.
+
+        Raises:
+            MotionMindError: the arguments do not fit together.
+        """
         starts = np.concatenate([[0], np.cumsum([len(c) for c in centres])])
         flat = rot.canonical(np.concatenate([np.asarray(c, dtype=np.float64) for c in centres]))
         return cls(tuple(names), flat, starts, kind, tolerances, tuple(tuple(named) for named in labels))
@@ -103,25 +114,29 @@ class StateSpace:
         return len(self.names)
 
     def index(self, joint: str) -> int:
-        """Index of the joint called `joint`; SkeletonError names the joints there are."""
+        """Return the index of the joint called `joint`; SkeletonError, which lists the joints, if there is none."""
         if joint not in self.names:
             raise SkeletonError(f"no joint {joint!r} among the states; there are {', '.join(self.names)}")
         return self.names.index(joint)
 
     def of(self, joint: int | str) -> Floats:
-        """The centres [S_j, 4] of a joint, by index or name."""
+        """Return the centres [S_j, 4] of a joint, by index or name."""
         j = self.index(joint) if isinstance(joint, str) else joint
         return self.centres[self.starts[j] : self.starts[j + 1]]
 
     def label(self, joint: int | str, state: int) -> str:
-        """What people call a state: the library's name for it, or "state 17" where nobody gave one."""
+        """Return the label of a state, or "state 17" if it has none; MotionMindError if there is no such state."""
         j = self.index(joint) if isinstance(joint, str) else joint
         if not 0 <= state < self.sizes[j]:
             raise MotionMindError(f"{self.names[j]} has states 0 to {self.sizes[j] - 1}, no state {state}")
         return self.labels[j][state] if self.labels[j] else f"state {state}"
 
     def assign(self, rotations: Floats) -> States:
-        """The nearest state [N, J] of every orientation in `rotations` [N, J, 4]; ties go to the lowest index."""
+        """Return the nearest state [N, J] of every orientation in `rotations` [N, J, 4]; of ties the lowest index.
+
+        Raises:
+            MotionMindError: the shape is wrong, or a quaternion is not a unit quaternion.
+        """
         rotations = checked_rotations(self.names, rotations)
         states = np.empty(rotations.shape[:2], dtype=np.int32)
         for j in range(len(self)):
@@ -129,7 +144,11 @@ class StateSpace:
         return states
 
     def decode(self, states: NDArray[np.integer]) -> Floats:
-        """The orientations [N, J, 4] that `states` [N, J] stand for; `assign` takes them back."""
+        """Return the centres [N, J, 4] of `states` [N, J]; `assign` is the inverse.
+
+        Raises:
+            MotionMindError: the shape is wrong, or there is no such state.
+        """
         states = np.asarray(states)
         if states.ndim != 2 or states.shape[1] != len(self) or not np.issubdtype(states.dtype, np.integer):
             raise MotionMindError(f"states must be integers [N, {len(self)}], not {states.dtype} {list(states.shape)}")
@@ -142,7 +161,7 @@ class StateSpace:
         return np.asarray(self.centres[self.starts[:-1] + states])
 
     def distance(self, rotations: Floats, states: NDArray[np.integer]) -> Floats:
-        """Degrees [N, J] between `rotations` [N, J, 4] and the centres of `states` [N, J]."""
+        """Return the angles [N, J], degrees, between `rotations` [N, J, 4] and the centres of `states` [N, J]."""
         rotations = checked_rotations(self.names, rotations)
         centres = self.decode(states)
         if len(centres) != len(rotations):
@@ -151,11 +170,18 @@ class StateSpace:
 
 
 def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple[States, Floats]:
-    """For one joint: the index [N] of the nearest of `centres` [S, 4] to `rotations` [N, 4], and the cosine of
-    half the angle to it [N].
+    """Find the nearest state of each orientation of one joint; of ties the lowest index.
 
-    The angle between unit quaternions is 2 acos |a . b|, so the nearest is the largest |a . b|, which also makes
-    q and -q the same. Ties go to the lowest index. At most `block` products are held at a time.
+    The angle between unit quaternions a and b is 2 acos |a . b|, so the nearest centre has the largest |a . b|, which
+    also makes q and -q the same.
+
+    Args:
+        rotations: orientations of the joint [N, 4].
+        centres: orientations of its states [S, 4].
+        block: number of products that are held in memory at a time.
+
+    Returns:
+        The index of the nearest state [N], and the cosine of half the angle to it [N].
     """
     states = np.empty(len(rotations), dtype=np.int32)
     cosines = np.empty(len(rotations))
@@ -166,14 +192,14 @@ def nearest(rotations: Floats, centres: Floats, *, block: int = _BLOCK) -> tuple
         dots = np.ascontiguousarray(rotations[part]) @ transposed
         np.abs(dots, out=dots)
         best = dots.max(axis=1)
-        # argmax of a truth table is its first true entry.
+        # argmax of booleans is the first true entry.
         states[part] = np.argmax(dots >= (best - _TIE)[:, None], axis=1)
         cosines[part] = best
     return states, cosines
 
 
 def distinct(centres: Floats) -> Floats:
-    """`centres` [S, 4] without those that an earlier one equals, up to sign and `SAME` radians."""
+    """Return `centres` [S, 4] without duplicates of an earlier one, up to sign and `SAME` radians."""
     keep = np.ones(len(centres), dtype=bool)
     limit = np.cos(0.5 * SAME)
     rows = max(1, _BLOCK // max(1, len(centres)))
@@ -185,7 +211,12 @@ def distinct(centres: Floats) -> Floats:
 
 
 def checked_rotations(names: Sequence[str], rotations: Floats) -> Floats:
-    """`rotations` as float64 [N, J, 4], or a MotionMindError that names the joint and posture that is wrong."""
+    """Return `rotations` as float64 [N, J, 4].
+
+    Raises:
+        MotionMindError: the shape is wrong, or a quaternion is not a unit quaternion; the message names its posture and
+            joint.
+    """
     rotations = np.asarray(rotations, dtype=np.float64)
     if rotations.ndim != 3 or rotations.shape[1:] != (len(names), 4):
         raise MotionMindError(f"rotations must have the shape [N, {len(names)}, 4], not {list(rotations.shape)}")

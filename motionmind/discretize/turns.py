@@ -1,4 +1,4 @@
-"""Orientations as people write them: turns about named axes, one after the other."""
+"""Orientations as people write them: turns about named axes, one after another."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ _TURN = re.compile(r"([xyzXYZ])\s*([+-]?(?:\d+(?:\.\d*)?|\.\d+))", re.ASCII)
 
 
 def parse_turns(text: str) -> Floats:
-    """The rotation [4] that a text such as "x -90, y 45" describes: turns in degrees, in sequence.
+    """Parse turns such as "x -90, y 45" into a unit quaternion [4].
 
-    Each turn is about an axis of the frame as the turns before it have left it (intrinsic). The empty text is the
-    identity. ValueError where the text is none.
+    Turns are in degrees, and intrinsic: each is about an axis of the frame as the turns before have left it. The empty
+    text is the identity.
+
+    Raises:
+        ValueError: the text is not a list of turns, or a turn is by more than 360 degrees.
     """
     letters, angles = "", []
     for part in text.split(",") if text.strip() else []:
@@ -33,9 +36,9 @@ def parse_turns(text: str) -> Floats:
 
 
 def format_turns(q: Floats) -> str | None:
-    """The shortest turns in hundredths of a degree that are the rotation `q` [4]; None where none are exactly it.
+    """Write a unit quaternion `q` [4] as the shortest turns; None if no turns in hundredths of a degree equal it.
 
-    The inverse of `parse_turns` up to sign and 1e-9 radians.
+    It is the inverse of `parse_turns` up to sign and 1e-9 radians.
     """
     tries = [""]
     for order in ("xyz", "yxz", "zxy", "xzy", "yzx", "zyx"):

@@ -1,1 +1,1 @@
-"""What is learned from a corpus: joint graphs, and how joints coordinate."""
+"""The grammar learned from a corpus: joint graphs, bridges between states, and the coordination of joints."""

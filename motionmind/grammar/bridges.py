@@ -1,4 +1,4 @@
-"""Bridges: unattested moves between states that lie close together on SO(3), for where a corpus has no way through."""
+"""Bridges: unattested moves between states that lie close together on SO(3), for corpora that have no path."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.grammar.transitions import Transitions
 
-NEAREST = 3  # states to which a bridge leads from each state
-WITHIN = 45.0  # degrees that such a bridge may span
+NEAREST = 3  # nearest states to which bridges lead from each state
+WITHIN = 45.0  # degrees that such a bridge spans at most
 
 
 @dataclass(frozen=True, eq=False)
 class Bridges:
-    """Unattested moves, flat as in Transitions: B in all.
+    """The B bridges of all chains in flat arrays, as in `Transitions`; G states in all.
 
     Attributes:
         indptr: bridges of each state [G + 1].
-        targets: the state that a bridge leads to, increasing within a row [B].
-        degrees: the angle that it spans [B].
+        targets: the state that each bridge leads to, increasing within a row [B].
+        degrees: the angle that each bridge spans [B].
     """
 
     indptr: Ints
@@ -28,21 +28,25 @@ class Bridges:
     degrees: Floats
 
     def span(self, row: int, target: int) -> float:
-        """Degrees that the bridge from the state of `row` to `target` spans."""
+        """Return the angle, in degrees, of the bridge from the state of `row` to the state `target` of its chain."""
         first, last = self.indptr[row], self.indptr[row + 1]
         return float(self.degrees[first + np.searchsorted(self.targets[first:last], target)])
 
 
 def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
-    """Bridges between the states of each chain, whose orientations are `centres` [G, 4].
+    """Find the bridges between the states of each chain.
 
-    From every state to its three nearest within 45 degrees, and, both ways, along a minimum spanning tree of the
-    chain's states by angle, so that every state can be reached from every other. What is attested is no bridge.
+    Bridges lead from every state to its three nearest within 45 degrees and, both ways, along a minimum spanning tree
+    of the chain's states by angle; so every state can be reached from every other. Attested moves are left out.
+
+    Args:
+        centres: orientation of each state of each chain [G, 4].
+        transitions: the joint graphs.
     """
     indptr, targets, degrees = [np.zeros(1, np.int64)], [], []
     for chain, size in enumerate(transitions.sizes()):
         first = transitions.starts[chain]
-        # Rounded, so that which of equally near states comes first does not hang on the last bit.
+        # Rounded: the order of equally near states must not depend on the last bit.
         angles = np.asarray(np.degrees(_angles(centres[first : first + size])).round(9), dtype=np.float64)
         near = _nearest(angles) | _spanning_tree(angles)
         rows = transitions.indptr[first : first + size + 1]
@@ -56,11 +60,12 @@ def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
 
 
 def _angles(centres: Floats) -> Floats:
-    """Angle between all pairs of orientations [S, S]; arccos serves, for states are no less than degrees apart."""
+    """Angles between all pairs of orientations [S, S], radians; arccos is accurate enough for states degrees apart."""
     return np.asarray(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
 
 
 def _nearest(angles: Floats) -> Bools:
+    """Whether a state is among the nearest of another, given the angles between them in degrees [S, S]."""
     near = np.zeros(angles.shape, dtype=bool)
     others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
     order = np.argsort(others, axis=1, kind="stable")[:, :NEAREST]
@@ -69,6 +74,7 @@ def _nearest(angles: Floats) -> Bools:
 
 
 def _spanning_tree(angles: Floats) -> Bools:
+    """The adjacency matrix of a minimum spanning tree by angle [S, S], symmetric."""
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     # The offset keeps edges of zero length, which a sparse matrix would drop, and leaves the tree what it is.

@@ -1,13 +1,15 @@
-"""How joints coordinate: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
+"""Coordination of joints: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
 
-A pgmpy network is the model of record. A joint's conditional distribution is estimated from the corpus's postures
-with a Dirichlet prior of `PSEUDO_COUNT` virtual postures spread as the joint's marginal is, so that a pair that was
-never seen together costs what its parts cost: dear, but possible. With N the corpus's counts (each posture by its
-weight), m the marginal and a the pseudo-count,
+Stuart and Bradley, "Learning the grammar of dance", ICML (1998), coordinate joints by such a network. A pgmpy network
+is the model of record. A joint's conditional distribution is estimated from the corpus's postures with a Dirichlet
+prior of `PSEUDO_COUNT` virtual postures that are distributed as the joint's marginal. So a pair that was never seen
+together is expensive, but possible. For states c of the joint and p of its parent, with N the corpus's counts (each
+posture by its weight), m the marginal and a the pseudo-count,
 
     P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
 
-and -log P separates into a term of c and a term of p wherever N(p, c) = 0. The search reads it in that form.
+If N(p, c) = 0, then -log P(c | p) = -log(a m(c)) + log(N(p) + a): a term of c and a term of p. The search reads it in
+that form.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
 
 
-PSEUDO_COUNT = 1.0
+PSEUDO_COUNT = 1.0  # virtual postures in the Dirichlet prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,14 @@ class Coordination:
     parent_costs: Floats
 
     def cost(self, chain: int, above: int, state: int, starts: Ints) -> float:
-        """-log P(state | parent's state `above`) of one chain, nats."""
+        """Return -log P(state | parent's state) of one chain, nats.
+
+        Args:
+            chain: the chain, which has a parent.
+            above: the parent's state.
+            state: the chain's state.
+            starts: first row of each chain [L + 1].
+        """
         row = self.pair_starts[chain] + above
         first, last = self.pair_ptr[row], self.pair_ptr[row + 1]
         at = first + np.searchsorted(self.pair_states[first:last], state)
@@ -61,7 +70,12 @@ class Coordination:
         return float(self.child_costs[starts[chain] + state] + self.parent_costs[row])
 
     def table(self, chain: int, starts: Ints) -> Floats:
-        """-log P(c | p) of one chain [states of the parent, states of the chain], nats."""
+        """Return -log P(c | p) of one chain as a table [states of the parent, states of the chain], nats.
+
+        Args:
+            chain: the chain; without a parent its table has no rows.
+            starts: first row of each chain [L + 1].
+        """
         rows = slice(self.pair_starts[chain], self.pair_starts[chain + 1])
         out = self.parent_costs[rows, None] + self.child_costs[starts[chain] : starts[chain + 1]]
         for p, row in enumerate(range(rows.start, rows.stop)):
@@ -73,11 +87,16 @@ class Coordination:
 def fit_network(
     names: tuple[str, ...], parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None = None
 ) -> DiscreteBayesianNetwork:
-    """The pgmpy network over joints `names` [J] with `parents` [J], from `states` [N, J] of a corpus's postures.
+    """Fit a pgmpy network to a corpus's postures.
 
-    What each posture counts is in `weights` [N]; None for 1.
+    Every joint is a node with the state names 0 .. S - 1; `get_cpds("left_knee")` is P(left_knee | left_hip).
 
-    Every joint is a node, its states 0 .. S - 1 the state names; `get_cpds("left_knee")` is P(left_knee | left_hip).
+    Args:
+        names: names of the joints [J].
+        parents: parent joint [J], or -1.
+        states: state of each joint in each posture [N, J].
+        sizes: number of states of each joint [J].
+        weights: weight of each posture [N]; None for 1.
     """
     import pandas as pd
     from pgmpy.models import DiscreteBayesianNetwork
@@ -110,10 +129,18 @@ def compile_network(
     sizes: Ints,
     weights: Floats | None = None,
 ) -> Coordination:
-    """The flat form of a network's CPDs, in the order of `names`; `states` [N, J] and their weights [N] are what the
-    network was fitted to, and tell which pairs were seen.
+    """Compile a network's conditional distributions into flat arrays.
 
-    Chains that are no node of the network are coupled to nothing.
+    Args:
+        network: the network; chains that are not nodes of it get no coordination.
+        names: names of the chains [L].
+        parents: parent chain [L], or -1.
+        states: the states that the network was fitted to [N, L], which show the pairs that were seen.
+        sizes: number of states of each chain [L].
+        weights: weight of each posture [N]; None for 1.
+
+    Raises:
+        ValueError: a distribution of the network is not over a chain and its parent.
     """
     weights = np.ones(len(states)) if weights is None else np.asarray(weights)
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)

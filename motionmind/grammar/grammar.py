@@ -1,4 +1,4 @@
-"""All that is learned from a corpus, and the costs that the search reads from it."""
+"""The grammar of a corpus: all that is learned from it, in the flat arrays from which searches build their costs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from motionmind.grammar.transitions import Transitions, count_transitions
 
 @dataclass(frozen=True, eq=False)
 class Grammar:
-    """How each chain moves, where it may be bridged, and how chains coordinate.
+    """The moves of each chain, the bridges between its states, and the coordination of chains.
 
     Attributes:
-        chains: names [L]: the skeleton's joints, then "facing" where the body's turn travels as a chain of its own.
+        chains: names [L]: the skeleton's joints, then "facing" if the body's heading is a chain of its own.
         centres: orientation of each state of each chain [G, 4].
         transitions: the joint graphs.
-        bridges: unattested moves between neighbours.
-        coordination: the compiled network.
+        bridges: unattested moves between neighbouring states.
+        coordination: P(state of a joint | state of its parent), compiled from the network.
     """
 
     chains: tuple[str, ...]
@@ -42,19 +42,20 @@ def learn(
     weights: Floats | None = None,
     posture_weights: Floats | None = None,
 ) -> Grammar:
-    """Learn from a corpus's postures.
+    """Learn a grammar from N postures of a corpus, with L chains and M moves between postures.
 
     Args:
-        chains: names [L]; one called "facing" is pooled over where it turns from and coordinates with nothing.
+        chains: names [L]; a last one called "facing" is pooled over the headings that it turns from, and has no
+            coordination.
         parents: parent chain [L], or -1.
         centres: orientation of each state, chain after chain [sum of sizes, 4].
         states: state of each chain in each posture [N, L]; every state of a joint occurs.
         sizes: number of states in each chain [L].
-        begins: postures from which a move leads [M].
-        seconds: duration of those moves [M].
+        begins: the posture that each move leads from [M].
+        seconds: duration of each move [M].
         ends: the posture that each move leads to [M]; None for the next one.
-        weights: what each move counts [M]; None for 1.
-        posture_weights: what each posture counts [N]; None for 1.
+        weights: weight of each move [M]; None for 1.
+        posture_weights: weight of each posture [N]; None for 1.
     """
     joints = len(chains) - (chains[-1] == "facing")
     transitions = count_transitions(

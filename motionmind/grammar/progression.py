@@ -1,16 +1,17 @@
-"""How joints move together: P(where a joint goes | where it is, and the move that its parent makes), as [C98] has it.
+"""Progressions: P(where a joint goes | where it is, and the move that its parent makes).
 
-The Bayesian network of the two postures of a move is x_j(t+1) given x_j(t), x_parent(t) and x_parent(t+1). Its tables
-would have the square of a joint's states by the square of its parent's, so they are kept for what was seen, by
+The tables are those of Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800
+(1998): the Bayesian network of the two postures of a move has x_j(t+1) given x_j(t), x_parent(t) and x_parent(t+1). In
+full they would hold the square of a joint's states by the square of its parent's. So they are stored sparsely, by
 *moves*: m = (s, s') of the joint and n of its parent. With C the corpus's counts, each move by its weight,
 
     P(m | s, n) = (C(m, n) + a P(m | s)) / (C(s, n) + a),   C(s, n) the sum of C(m, n) over the moves m that leave s
     P(m | s) = C(m) / (C(s) + a),  and a / (C(s) + a) for any move that the corpus does not attest
 
-so that for every move of the parent the probabilities of leaving a state add up to 1. What was never seen beside the
-parent's move backs off to how the joint moves on its own, and from there to the unattested moves, taken together as
-one: a is what they are held to have been seen. (Escape method A of Cleary and Witten, "Data compression using adaptive
-coding and partial string matching", IEEE Transactions on Communications 32(4), 1984, mixed rather than excluded.)
+For every move of the parent, the probabilities of leaving a state add up to 1. A move that was never seen with the
+parent's backs off to the joint's own moves, and from there to the unattested moves, which together have the
+pseudo-count a. This is escape method A of Cleary and Witten, "Data compression using adaptive coding and partial string
+matching", IEEE Transactions on Communications 32(4), 1984, mixed rather than excluded.
 """
 
 from __future__ import annotations
@@ -31,26 +32,26 @@ def fit_progression(
     ends: Ints,
     weights: Floats,
 ) -> Coordination:
-    """The same for every move that a chain may make, in the form of a network whose states are moves.
+    """Fit the progressions of all chains, in the form of a network whose states are moves.
 
-    Chain j has S_j + E_j states there: first one for each state of its joint graph, which stands for being there before
-    any move and is coupled to nothing, then its moves in the order of `targets`.
+    Chain j has S_j + E_j states in it: first one for each state of its joint graph, which means being there before any
+    move and has no coordination, then its moves in the order of `targets`.
 
     Args:
         parents: parent chain [L], or -1.
         starts: first row of each chain [L + 1].
         indptr: moves that leave each state [G + 1].
-        targets: where they lead, increasing within a row [E]; all moves of the corpus are among them.
-        states: of the corpus's postures [N, L].
-        begins: postures from which a move leads [M].
+        targets: the state that each move leads to, increasing within a row [E]; all moves of the corpus are among them.
+        states: states of the corpus's postures [N, L].
+        begins: the posture that each of the corpus's moves leads from [M].
         ends: the posture that it leads to [M].
-        weights: what it counts [M].
+        weights: its weight [M].
     """
     sizes, first_moves = np.diff(starts), indptr[starts]
     shifted = starts + first_moves  # rows of the chains where states are moves
     sources = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
     keys = sources * (1 + np.max(sizes, initial=0)) + targets
-    made = {}  # by chain, the move that each of the corpus's is
+    made = {}  # by chain, the move of the joint graph that each of the corpus's moves is
     for chain in {*range(len(parents))} - {*np.flatnonzero(parents < 0)} | {*parents[parents >= 0]}:
         rows = starts[chain] + states[begins, chain].astype(np.int64)
         made[chain] = np.searchsorted(keys, rows * (1 + np.max(sizes)) + states[ends, chain])
@@ -62,31 +63,18 @@ def fit_progression(
             pair_starts.append(pair_starts[-1])
             continue
         first, last, stood = first_moves[chain], first_moves[chain + 1], sizes[chain]
+        below, above = made[chain] - first, made[parent] - first_moves[parent]
         source = sources[first:last] - starts[chain]
-        seen = np.bincount(made[chain] - first, weights, last - first)
-        alone = np.where(seen > 0.0, seen, PSEUDO_COUNT)
-        alone /= np.bincount(source, seen, stood)[source] + PSEUDO_COUNT
+        alone = _own_probabilities(source, stood, below, weights)
         child_costs[shifted[chain] + stood : shifted[chain + 1]] = -np.log(alone)
-
-        # Every move that leaves a state in which the chain was seen beside a move of its parent, and how often it was.
-        above, below = made[parent] - first_moves[parent], made[chain] - first
-        contexts, which = np.unique(above * stood + source[below], return_inverse=True)
-        beside = np.bincount(which, weights, len(contexts))
-        begin = indptr[starts[chain] + contexts % stood] - first
-        count = indptr[starts[chain] + contexts % stood + 1] - first - begin
-        context = np.repeat(np.arange(len(contexts)), count)
-        within = np.arange(len(context)) - np.repeat(np.cumsum(count) - count, count)
-        move = begin[context] + within
-        together = np.zeros(len(context))
-        np.add.at(together, (np.cumsum(count) - count)[which] + below - begin[which], weights)
+        move, beside, costs = _pairs(
+            source, indptr[starts[chain] : starts[chain + 1] + 1], alone, above, below, weights
+        )
 
         pair_states.append(stood + move)
-        pair_costs.append(np.log(beside[context] + PSEUDO_COUNT) - np.log(together + PSEUDO_COUNT * alone[move]))
+        pair_costs.append(costs)
         above_moves = first_moves[parent + 1] - first_moves[parent]
-        pair_counts += [
-            np.zeros(sizes[parent], np.int64),
-            np.bincount((contexts // stood)[context], minlength=above_moves),
-        ]
+        pair_counts += [np.zeros(sizes[parent], np.int64), np.bincount(beside, minlength=above_moves)]
         pair_starts.append(pair_starts[-1] + int(sizes[parent] + above_moves))
     return Coordination(
         parents,
@@ -97,3 +85,48 @@ def fit_progression(
         child_costs,
         np.zeros(pair_starts[-1]),
     )
+
+
+def _own_probabilities(source: Ints, size: int, below: Ints, weights: Floats) -> Floats:
+    """P(m | s) of each move m of a chain with `size` states [E_j]; of an unattested move, that of all of them.
+
+    Args:
+        source: state that each move of the chain leaves [E_j].
+        size: number of states of the chain.
+        below: the chain's move in each of the corpus's moves [M].
+        weights: weight of each of the corpus's moves [M].
+    """
+    seen = np.bincount(below, weights, len(source))
+    alone = np.where(seen > 0.0, seen, PSEUDO_COUNT)
+    alone /= np.bincount(source, seen, size)[source] + PSEUDO_COUNT
+    return alone
+
+
+def _pairs(
+    source: Ints, rows: Ints, alone: Floats, above: Ints, below: Ints, weights: Floats
+) -> tuple[Ints, Ints, Floats]:
+    """-log P(m | s, n), nats, of all moves m that leave a state s in which the chain was seen during a move n.
+
+    Args:
+        source: state that each move of the chain leaves [E_j].
+        rows: moves that leave each state of the chain, as in `indptr` [S_j + 1].
+        alone: P(m | s) of each move of the chain [E_j].
+        above: the parent's move n in each of the corpus's moves [M].
+        below: the chain's move m in each of the corpus's moves [M].
+        weights: weight of each of the corpus's moves [M].
+
+    Returns:
+        The move m, the parent's move n and the cost of each pair, in the order of n, then m.
+    """
+    size, first = len(rows) - 1, rows[0]
+    contexts, which = np.unique(above * size + source[below], return_inverse=True)  # a context is a pair (n, s)
+    seen = np.bincount(which, weights, len(contexts))
+    begin = rows[contexts % size] - first
+    count = rows[contexts % size + 1] - first - begin
+    context = np.repeat(np.arange(len(contexts)), count)
+    within = np.arange(len(context)) - np.repeat(np.cumsum(count) - count, count)
+    move = begin[context] + within
+    together = np.zeros(len(context))
+    np.add.at(together, (np.cumsum(count) - count)[which] + below - begin[which], weights)
+    costs = np.log(seen[context] + PSEUDO_COUNT) - np.log(together + PSEUDO_COUNT * alone[move])
+    return move, (contexts // size)[context], costs

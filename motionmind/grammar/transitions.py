@@ -1,13 +1,13 @@
-"""Joint graphs: which state follows which in a corpus, how often, and who attests it.
+"""Joint graphs: the transitions between states in a corpus, their counts, and the postures that attest them.
 
-A *chain* is a joint, or the body's facing where that travels on its own. States are numbered from 0 in each chain;
+A *chain* is a joint, or the body's facing if that is a chain of its own. States are numbered from 0 in each chain;
 state s of chain j has the row `starts[j] + s` in flat arrays.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -18,17 +18,17 @@ Weights = Literal["conditional", "printed"]
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """The joint graphs of L chains, flat: G states in all, E attested transitions in all.
+    """The joint graphs of L chains in flat arrays: G states and E attested transitions in all.
 
     Attributes:
         starts: first row of each chain [L + 1].
         indptr: transitions of each state [G + 1].
-        targets: the state that a transition leads to, increasing within a row [E].
-        counts: how often it was seen, each time by the weight of who made it [E].
-        visits: how many postures are in each state, each by its weight [G].
-        attests: index of the first posture from which the transition was made [E].
-        arrives: index of the posture that it led to there [E].
-        seconds: its mean duration [E].
+        targets: the state that each transition leads to, increasing within a row [E].
+        counts: how often it was made, each time by the weight of the move [E].
+        visits: the number of postures in each state, each by its weight [G].
+        attests: index of the first posture from which it was made [E].
+        arrives: index of the posture that it led to from there [E].
+        seconds: its mean duration, by the same weights [E].
     """
 
     starts: Ints
@@ -50,11 +50,19 @@ class Transitions:
         return np.diff(self.starts)
 
     def weights(self, scheme: Weights, novelty: float = 0.0) -> Floats:
-        """Weight in nats of each transition s -> s' [E].
+        """Return the weight of each transition s -> s' [E], nats.
 
-        `conditional` is -log P(s' | s) = log C(s) - log C(s, s'), C(s) counted over the transitions that leave s
-        ([I98] 2.2.1); `printed` is -log f(s) + log f(s') - log f(s, s') with relative frequencies, as [C98] and
-        [TR97] print it. `novelty` from 0 to 1 tempers either: at 1 all n transitions that leave s cost log n alike.
+        With w the weight in the scheme and n the number of transitions that leave s, it is
+
+            (1 - novelty) w(s, s') + novelty log n
+
+        Args:
+            scheme: `conditional`: w = -log P(s' | s) = log C(s) - log C(s, s'), with C(s) the sum of the counts
+                C(s, s') over the transitions that leave s (Stuart and Bradley, "Learning the grammar of dance", ICML
+                (1998), section 2.2.1). `printed`: w = -log f(s) + log f(s') - log f(s, s') with the relative
+                frequencies f in the chain, as printed in Bradley and Stuart, Chaos 8:800 (1998), and in their technical
+                report CU-CS-844-97 (1997).
+            novelty: 0 to 1; at 1 all transitions that leave a state cost the same.
         """
         weights = self._weights(scheme)
         return (1.0 - novelty) * weights + novelty * np.log(np.diff(self.indptr)[self.sources])
@@ -73,19 +81,23 @@ class Transitions:
         )
 
     def edge(self, chain: int, state: int, target: int) -> int:
-        """Index of the transition from `state` to `target` in a chain; -1 where it is not attested."""
+        """Return the index of the transition from `state` to `target` in a chain; -1 if it is not attested."""
         row = self.starts[chain] + state
         first, last = self.indptr[row], self.indptr[row + 1]
         at = int(first + np.searchsorted(self.targets[first:last], target))
         return at if at < last and self.targets[at] == target else -1
 
     def edges(self, path: Int32s) -> Ints:
-        """Indices of the transitions of all chains in each move of a path of states [T + 1, L]: [T, L], as `edge`."""
+        """Return the indices of all chains' transitions in a path [T, L]; -1 for those that are not attested.
+
+        Args:
+            path: states [T + 1, L].
+        """
         width = int(self.sizes().max()) + 1
-        keys = self.sources * width + self.targets  # in order, for rows are, and the targets in each
-        asked = (self.starts[:-1] + path[:-1]) * width + path[1:]
-        at = np.minimum(np.searchsorted(keys, asked), len(keys) - 1)
-        return np.where(keys[at] == asked, at, -1) if len(keys) else np.full(asked.shape, -1)
+        keys = self.sources * width + self.targets  # increasing, as rows are, and the targets in each
+        wanted = (self.starts[:-1] + path[:-1]) * width + path[1:]
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[at] == wanted, at, -1) if len(keys) else np.full(wanted.shape, -1)
 
 
 def count_transitions(
@@ -104,52 +116,72 @@ def count_transitions(
     Args:
         states: state of each chain in each posture [N, L].
         sizes: number of states in each chain [L].
-        begins: postures from which a move leads, none across clips [M]; of those that attest a transition the first in
-            this order is kept.
-        seconds: duration of those moves [M].
-        pooled: a chain whose states are equal steps of a circle: what is counted is by how many steps it turns, pooled
-            over where it turns from, and holds from every state alike.
+        begins: the posture that each move leads from, within one clip [M]; of the moves that attest a transition the
+            first in this order is kept.
+        seconds: duration of each move [M].
+        pooled: a chain whose states are equal steps of a circle. Its transitions are counted by the number of steps
+            that they turn, whatever state they leave, and hold from every state alike.
         ends: the posture that each move leads to [M]; None for the next one.
-        weights: what each move counts [M]; None for 1.
-        posture_weights: what each posture counts [N]; None for 1.
+        weights: weight of each move [M]; None for 1.
+        posture_weights: weight of each posture [N]; None for 1.
     """
     ends = begins + 1 if ends is None else ends
     weights = np.ones(len(begins)) if weights is None else weights
     posture_weights = np.ones(len(states)) if posture_weights is None else posture_weights
-    chains, size = states.shape[1], np.asarray(sizes, dtype=np.int64)
-    sources, targets, counts, attests, arrives, durations, visits = [], [], [], [], [], [], []
-    for chain in range(chains):
+    size = np.asarray(sizes, dtype=np.int64)
+    counted, visits = [], []
+    for chain in range(states.shape[1]):
         src, dst = states[begins, chain].astype(np.int64), states[ends, chain].astype(np.int64)
         if chain == pooled:
-            src, dst = np.zeros_like(src), (dst - src) % size[chain]
-        keys, first, which = np.unique(src * size[chain] + dst, return_index=True, return_inverse=True)
-        count = np.bincount(which, weights=weights, minlength=len(keys))
-        mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / count
-        source, target, visited = keys // size[chain], keys % size[chain], states[:, chain]
-        if chain == pooled:
-            turned = (np.arange(size[chain])[:, None] + target[None, :]) % size[chain]
-            order = np.argsort(turned, axis=1)
-            source, target = np.repeat(np.arange(size[chain]), len(keys)), np.take_along_axis(turned, order, 1).ravel()
-            first, count, mean = first[order].ravel(), count[order].ravel(), mean[order].ravel()
+            counted.append(_pool(_count(np.zeros_like(src), (dst - src) % size[chain], size[chain], seconds, weights)))
             visits.append(np.full(size[chain], posture_weights.sum() / size[chain]))
         else:
-            visits.append(np.bincount(visited, weights=posture_weights, minlength=size[chain]))
-        sources.append(source)
-        targets.append(target)
-        counts.append(count)
-        attests.append(begins[first])
-        arrives.append(ends[first])
-        durations.append(mean)
+            counted.append(_count(src, dst, size[chain], seconds, weights))
+            visits.append(np.bincount(states[:, chain], weights=posture_weights, minlength=size[chain]))
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
-    rows = np.concatenate([starts[chain] + source for chain, source in enumerate(sources)])
+    rows = np.concatenate([starts[chain] + one.sources for chain, one in enumerate(counted)])
     leaving = np.bincount(rows, minlength=starts[-1])
     return Transitions(
         starts,
         np.concatenate([[0], np.cumsum(leaving)]).astype(np.int64),
-        np.concatenate(targets).astype(np.int32),
-        np.concatenate(counts).astype(np.float64),
+        np.concatenate([one.targets for one in counted]).astype(np.int32),
+        np.concatenate([one.counts for one in counted]).astype(np.float64),
         np.concatenate(visits).astype(np.float64),
-        np.concatenate(attests).astype(np.int32),
-        np.concatenate(arrives).astype(np.int32),
-        np.concatenate(durations).astype(np.float64),
+        np.concatenate([begins[one.first] for one in counted]).astype(np.int32),
+        np.concatenate([ends[one.first] for one in counted]).astype(np.int32),
+        np.concatenate([one.seconds for one in counted]).astype(np.float64),
+    )
+
+
+class _Counted(NamedTuple):
+    """The transitions of one chain with `size` states, in the order of sources, then targets, each array [E_j]."""
+
+    size: int
+    sources: Ints
+    targets: Ints
+    counts: Floats
+    first: Ints  # the first move that makes it
+    seconds: Floats
+
+
+def _count(sources: Ints, targets: Ints, size: int, seconds: Floats, weights: Floats) -> _Counted:
+    """Count the transitions that one chain makes in the moves [M] from `sources` to `targets`."""
+    keys, first, which = np.unique(sources * size + targets, return_index=True, return_inverse=True)
+    counts = np.asarray(np.bincount(which, weights=weights, minlength=len(keys)), dtype=np.float64)
+    mean = np.bincount(which, weights=weights * seconds, minlength=len(keys)) / counts
+    return _Counted(size, keys // size, keys % size, counts, first, mean)
+
+
+def _pool(turns: _Counted) -> _Counted:
+    """Let every state of a circle make the turns that were counted as transitions from state 0."""
+    size = turns.size
+    targets = (np.arange(size)[:, None] + turns.targets[None, :]) % size
+    order = np.argsort(targets, axis=1)
+    return _Counted(
+        size,
+        np.repeat(np.arange(size), len(turns.targets)),
+        np.take_along_axis(targets, order, 1).ravel(),
+        turns.counts[order].ravel(),
+        turns.first[order].ravel(),
+        turns.seconds[order].ravel(),
     )

@@ -1,11 +1,11 @@
-"""How far movement that was made is from the movement that it stands for: L2Q, L2P and NPSS.
+"""Distances of generated movement from the true movement that it replaces: L2Q, L2P and NPSS.
 
 The protocol is that of LaFAN1: Harvey, Yurick, Nowrouzezahrai and Pal, "Robust motion in-betweening", ACM TOG 39(4)
-(2020), and `lafan1/benchmarks.py`, which was released with it. The frames that are compared are those in between; what
-was given, A and B, is left out. Rotations and positions are global, of windows as `seen` shows them.
+(2020), and `lafan1/benchmarks.py`, which was released with it. Only the frames in between are compared; the given
+ones, A and B, are left out. Rotations and positions are global, of windows that `seen` has aligned.
 
-There signs of quaternions follow from those of the recording, so that an error may count more on one hemisphere than
-on the other. Here q and -q are the same rotation: the nearer sign counts.
+LaFAN1 takes the signs of quaternions from the recording, so an error may count more on one hemisphere than on the
+other. Here q and -q are the same rotation: the nearer sign counts.
 """
 
 from __future__ import annotations
@@ -21,16 +21,19 @@ from motionmind.geometry import rotations as rot
 def seen(
     skeleton: Skeleton, rotations: Floats, root: Floats, truth_rotations: Floats, truth_root: Floats
 ) -> tuple[Floats, Floats]:
-    """Global rotations [..., T, J, 4] and joints' positions [..., T, J, 3] of windows, as the protocol looks at them.
+    """Align windows as the protocol does, and return global rotations and joint positions.
 
-    The stage is turned and moved so that the true body faces +Z in its first frame, and is on average above the origin.
+    The true body then faces +Z in its first frame, and is above the origin on average.
 
     Args:
         skeleton: the body.
         rotations: local rotations of the windows [..., T, J, 4].
         root: positions of the root joint [..., T, 3], metres.
         truth_rotations: the true movement in the same windows [..., T, J, 4].
-        truth_root: its root [..., T, 3].
+        truth_root: its root [..., T, 3], metres.
+
+    Returns:
+        Global rotations [..., T, J, 4] and positions [..., T, J, 3], metres.
     """
     turn = rot.inv(rot.about_vertical(rot.heading(truth_rotations[..., :1, 0, :])))
     place = truth_root.mean(axis=-2, keepdims=True) * np.array([1.0, 0.0, 1.0])
@@ -41,30 +44,44 @@ def seen(
 
 
 def l2q(truth: Floats, made: Floats) -> Floats:
-    """L2Q of each window [...]: the mean over its frames of the norm of the difference of all joints' quaternions.
+    """Return L2Q of each window: the mean over its frames of ||q_made - q_truth|| over all joints.
 
-    `truth` and `made` are global rotations [..., T, J, 4]. No unit: 2 sqrt(J) sin(a / 4) where every joint is off by
-    the angle a.
+    It has no unit; if every joint is off by the angle a, it is 2 sqrt(J) sin(a / 4).
+
+    Args:
+        truth: true global rotations [..., T, J, 4].
+        made: generated global rotations [..., T, J, 4].
+
+    Returns:
+        L2Q [...].
     """
     nearer = np.minimum(np.sum((made - truth) ** 2, axis=-1), np.sum((made + truth) ** 2, axis=-1))
     return np.asarray(np.sqrt(nearer.sum(axis=-1)).mean(axis=-1))
 
 
 def l2p(truth: Floats, made: Floats, spread: Floats) -> Floats:
-    """L2P of each window [...]: the mean over its frames of the norm of the difference of all joints' positions.
+    """Return L2P of each window: the mean over its frames of ||(p_made - p_truth) / spread|| over all joints.
 
-    `truth` and `made` are global positions [..., T, J, 3] in metres; each coordinate counts in units of its `spread`
-    [J, 3] in the movement that was learned from.
+    Args:
+        truth: true global positions [..., T, J, 3], metres.
+        made: generated global positions [..., T, J, 3], metres.
+        spread: standard deviation of each coordinate [J, 3], metres, in the training movement.
+
+    Returns:
+        L2P [...], without unit.
     """
     off = (made - truth) / spread
     return np.asarray(np.sqrt(np.sum(off**2, axis=(-2, -1))).mean(axis=-1))
 
 
 def position_spread(positions: Floats) -> Floats:
-    """Standard deviation of each coordinate [J, 3], metres, over windows of positions [..., T, J, 3] as `seen`.
+    """Return the standard deviation of each coordinate [J, 3], metres.
+
+    Args:
+        positions: aligned windows of positions [..., T, J, 3], metres (see `seen`).
 
     Raises:
-        MotionMindError: a coordinate never changes, so that nothing can be measured by it.
+        MotionMindError: a coordinate never changes, so it cannot serve as a unit.
     """
     spread = np.asarray(positions.reshape(-1, *positions.shape[-2:]).std(axis=0))
     if not np.all(spread > 0.0):
@@ -73,13 +90,17 @@ def position_spread(positions: Floats) -> Floats:
 
 
 def npss(truth: Floats, made: Floats) -> float:
-    """NPSS of a batch: how unlike the power spectra of all joints' quaternions are; 0 for the same spectra.
+    """Return the normalised power spectrum similarity of a batch: a distance, 0 for equal spectra.
 
-    Gopalakrishnan, Mali, Kifer, Giles and Ororbia, "A neural temporal model for human motion prediction", CVPR (2019),
-    on global rotations [B, T, J, 4] as in LaFAN1: of each coefficient in each window the squares of the Fourier
-    coefficients' real parts are brought to a sum of 1, the distance is the sum of the absolute differences of the two
-    cumulated spectra, and windows and coefficients are averaged by the power of the truth. A coefficient without power
-    has a spectrum of zeros. Signs are those with which each joint's quaternions follow one another most nearly.
+    Defined by Gopalakrishnan, Mali, Kifer, Giles and Ororbia, "A neural temporal model for human motion prediction",
+    CVPR (2019), and computed as in LaFAN1. For each quaternion coefficient of each window, the squared real parts of
+    its Fourier coefficients are normalised to a sum of 1; the distance is the sum of the absolute differences of the
+    two cumulative spectra. Windows and coefficients are averaged, weighted by the power of the truth. A coefficient
+    without power has a spectrum of zeros. Signs are chosen to make each joint's quaternions continuous in time.
+
+    Args:
+        truth: true global rotations [B, T, J, 4].
+        made: generated global rotations [B, T, J, 4].
     """
     powers = [np.fft.fft(_continuous(q).reshape(*q.shape[:2], -1), axis=1).real ** 2 for q in (truth, made)]
     totals = [power.sum(axis=1) for power in powers]
@@ -91,7 +112,7 @@ def npss(truth: Floats, made: Floats) -> float:
 
 
 def _continuous(q: Floats) -> Floats:
-    """The same rotations [B, T, ...,  4], each with the sign that is nearer to the frame before."""
+    """The same rotations [B, T, ..., 4], each with the sign that is nearer to the frame before."""
     flips = np.sum(q[:, 1:] * q[:, :-1], axis=-1, keepdims=True) < 0.0
     sign = np.cumprod(np.where(flips, -1.0, 1.0), axis=1)
     return np.concatenate([q[:, :1], q[:, 1:] * sign], axis=1)

@@ -1,4 +1,4 @@
-"""All measures of one movement at once, each beside the range that the corpus's own movement has."""
+"""All measures of one movement at once, each beside the range of the corpus's own movement."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,19 +17,19 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.model import LearnedCorpus
-from motionmind.metrics.paths import Habits, arrival_spread, find_habits
+from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
-from motionmind.metrics.verbatim import LONGEST, Phrasebook, find_phrases
+from motionmind.metrics.verbatim import LONGEST, Phrasebook, learn_phrases
 from motionmind.realise.timeline import usual
 from motionmind.retarget.retarget import own_skeleton
 
 RANGE = 5.0, 95.0  # percentiles of the corpus's own movement
-_SHORTEST = 4  # frames that a jerk needs
+_SHORTEST = 4  # frames; a jerk needs as many
 _MOST = 100  # pieces of the corpus that are measured
-_PARTS = 10  # at least so many are made of all its movement
+_PARTS = 10  # pieces that the corpus is cut into, at least
 _KEYED = 2.0  # frames in the time of a move; fewer are keyframes
-_HUMAN = 1.0  # metres; limits of skating are for bodies as high as this at least
+_HUMAN = 1.0  # metres; the limits of skating are for bodies at least as tall
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,11 @@ class Figure:
     """One measure of a movement.
 
     Attributes:
-        value: what it is; NaN where it has no meaning, as the smoothness of rest.
-        low: 5th percentile of the corpus's own movement, in pieces; NaN where that has none.
-        high: 95th percentile.
-        unit: of all three; "" where they are numbers or shares.
-        about: what it says, in words.
+        value: the measure; NaN where it has no meaning, as the smoothness of rest.
+        low: 5th percentile over pieces of the corpus's own movement; NaN where that has no value.
+        high: 95th percentile, likewise.
+        unit: the unit of all three; "" for counts and shares.
+        about: a description in words.
     """
 
     value: float
@@ -48,6 +49,46 @@ class Figure:
     high: float
     unit: str
     about: str
+
+
+class FigureReport(msgspec.Struct, frozen=True):
+    """A `Figure` for JSON, which has no NaN: None (null) stands for it."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    about: str
+
+
+class MeasureReport(msgspec.Struct, frozen=True):
+    """All measures of a movement for JSON.
+
+    Attributes:
+        corpus: the name of the corpus.
+        frames: the movement's number of frames.
+        figures: the measures, by name.
+    """
+
+    corpus: str
+    frames: int
+    figures: dict[str, FigureReport]
+
+    @classmethod
+    def of(cls, corpus: str, frames: int, figures: Mapping[str, Figure]) -> MeasureReport:
+        """Make the report of the figures that `measure` returns."""
+        return cls(
+            corpus,
+            frames,
+            {
+                name: FigureReport(_or_none(one.value), _or_none(one.low), _or_none(one.high), one.unit, one.about)
+                for name, one in figures.items()
+            },
+        )
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 _ABOUT: Mapping[str, tuple[str, str]] = {
@@ -73,21 +114,24 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
 
 
 def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) -> dict[str, Figure]:
-    """All measures of a movement beside a corpus.
+    """Measure a movement beside a corpus.
 
-    How it moves is seen at 30 frames a second, keyframes joined by splines, as tweens join them. What it says in states
-    is seen at the corpus's own postures a second; keyframes as they are, and what the engine made at the times of its
-    moves. The corpus's range is that of its own clips, in pieces as long as the movement, or as the clip or a tenth of
-    the corpus if that is shorter; of what is copied it is what each has from the other clips.
+    Kinematics are measured at 30 frames a second, with keyframes joined by splines as in tweens. States are taken at
+    the corpus's own rate of postures; of keyframes as they are, and of the engine's movement at the times of its moves.
+    The corpus's range is over its own clips, in pieces as long as the movement, or as the clip or a tenth of the corpus
+    if that is shorter. A clip's own copies are counted from the other clips.
 
     Args:
         motion: on the corpus's skeleton, or on one that maps to it.
         learned: the corpus.
-        path: states of the movement [T + 1, L], where the engine's report says them.
+        path: states of the movement [T + 1, L], if the engine's report has them.
+
+    Returns:
+        The measures, by name.
 
     Raises:
         SkeletonError: the movement is on other joints.
-        MotionMindError: there is not enough of it to measure.
+        MotionMindError: the movement is too short to measure, or the path is of another corpus.
     """
     corpus = learned.corpus
     motion = _on(corpus.skeleton, motion)
@@ -102,26 +146,29 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
             f"{motion.name or 'the movement'} is too short to be measured: it takes {_SHORTEST} frames at {RATE:g} a "
             f"second, and two postures, {step:.2f} s apart"
         )
-    habits, phrases = find_habits(learned.grammar), find_phrases(corpus, np.asarray(learned.states))
+    habits, phrases = learn_habits(learned.grammar), learn_phrases(corpus, np.asarray(learned.states))
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
     own = _motion_figures(sampled, _style(seen, None)) | _path_figures(path, habits, phrases, None)
-    rows: dict[str, list[float]] = {name: [] for name in own}
     frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
     postures = min(len(path), max(len(corpus) // _PARTS, 2))
-    for found in (*_usual_motion(clips, seen, frames), *_usual_paths(learned, postures, habits, phrases)):
-        for name, value in found.items():
-            rows.setdefault(name, []).append(value)
-    out = {}
+    rows = [*_usual_motion(clips, seen, frames), *_usual_paths(learned, postures, habits, phrases)]
+    return _beside_range(own, rows)
+
+
+def _beside_range(own: Mapping[str, float], rows: Sequence[Mapping[str, float]]) -> dict[str, Figure]:
+    """Measures beside their range over the `rows` of pieces of a corpus."""
+    figures = {}
     for name, value in own.items():
-        known = np.array(rows[name])[np.isfinite(rows[name])]
+        usual_values = np.array([row[name] for row in rows if name in row])
+        known = usual_values[np.isfinite(usual_values)]
         low, high = np.percentile(known, RANGE) if len(known) else (np.nan, np.nan)
-        out[name] = Figure(value, float(low), float(high), *_ABOUT[name])
-    return out
+        figures[name] = Figure(value, float(low), float(high), *_ABOUT[name])
+    return figures
 
 
 def at_rate(motion: Motion) -> Motion:
-    """The movement at 30 frames a second: what is coarser is joined by splines, what is finer is thinned."""
+    """Return the movement at 30 frames a second: coarser movement is interpolated by splines, finer is thinned."""
     if motion.fps >= RATE or len(motion) < 2:
         return motion.resample(RATE)
     start, keys = motion.times[0], motion.times
@@ -131,7 +178,7 @@ def at_rate(motion: Motion) -> Motion:
 
 
 def _on(skeleton: Skeleton, motion: Motion) -> Motion:
-    """The movement on the corpus's joints; SkeletonError names the difference."""
+    """The movement on the corpus's joints; SkeletonError names the difference if it has others."""
     if skeleton.difference(motion.skeleton) is not None:
         motion = own_skeleton(motion)
     difference = skeleton.difference(motion.skeleton)
@@ -141,8 +188,8 @@ def _on(skeleton: Skeleton, motion: Motion) -> Motion:
 
 
 def _path(motion: Motion, learned: LearnedCorpus, step: float) -> States:
-    """The states [T + 1, L] that a movement passes: of its keyframes, or every `step` seconds where it has many frames,
-    or move by move where the engine made it."""
+    """The states of a movement [T + 1, L]: at each move of the engine's movement, at the keyframes of keyed movement,
+    else every `step` seconds."""
     whole = [one for one in motion.insertions if one.times[0] <= motion.times[0] and one.times[-1] >= motion.times[-1]]
     postures = motion
     if whole:
@@ -153,7 +200,7 @@ def _path(motion: Motion, learned: LearnedCorpus, step: float) -> States:
 
 
 def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
-    """What is measured of movement at 30 frames a second; `style` is what it is to be like."""
+    """Kinematic measures of movement at 30 frames a second, and its distance from a style."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
     speed = angular_speed(rotations, RATE)
     out = {
@@ -171,7 +218,7 @@ def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
 
 
 def _path_figures(path: States, habits: Habits, phrases: Phrasebook, clip: int | None) -> dict[str, float]:
-    """What is measured of states; `clip` is the clip of the corpus that they are from."""
+    """Measures of states; `clip` is the clip of the corpus that they come from, if any."""
     runs = phrases.runs(path, clip) or [0]
     return {
         "moves": float(len(path) - 1),
@@ -190,14 +237,13 @@ def _path_figures(path: States, habits: Habits, phrases: Phrasebook, clip: int |
 
 
 def _style(seen: Sequence[Floats], besides: int | None) -> Styles | None:
-    """How the joints of clips move, by the `features` of all but one; None where nothing is left to tell it by."""
+    """The style of clips, by the `features` of all but one; None if nothing is left to learn from."""
     rows = [one for number, one in enumerate(seen) if number != besides and len(one)]
     return learn_styles({"own": np.concatenate(rows)}) if rows else None
 
 
 def _usual_motion(clips: Sequence[Motion], seen: Sequence[Floats], frames: int) -> Iterator[dict[str, float]]:
-    """How a corpus's clips at 30 frames a second, with their `features`, move, in pieces of as many frames; style is
-    beside the other clips."""
+    """Kinematic measures of pieces of a corpus's clips at 30 frames a second, the style beside the other clips."""
     pieces = _pieces([len(clip) for clip in clips], frames, _SHORTEST)
     styles = {number: _style(seen, number) for number, _ in pieces}
     for number, start in pieces:
@@ -207,20 +253,21 @@ def _usual_motion(clips: Sequence[Motion], seen: Sequence[Floats], frames: int) 
 def _usual_paths(
     learned: LearnedCorpus, postures: int, habits: Habits, phrases: Phrasebook
 ) -> Iterator[dict[str, float]]:
-    """What a corpus's clips say, in pieces of as many postures."""
+    """Measures of the states of pieces of a corpus's clips."""
     states, clips = np.asarray(learned.states), learned.corpus.clips
     for number, start in _pieces([len(clip) for clip in clips], postures, 2):
         path = states[clips[number].start : clips[number].stop][start : start + postures]
         found = _path_figures(path, habits, phrases, number)
-        del found["moves"]  # which is how long the piece was made
+        del found["moves"]  # it is only the length that was chosen for the piece
         if len(clips) == 1:  # there is no other to copy from
             found = {name: value for name, value in found.items() if not name.endswith("run") and "copied" not in name}
         yield found
 
 
 def _pieces(lengths: Sequence[int], size: int, least: int) -> list[tuple[int, int]]:
-    """Where pieces of a `size` begin: the clip's number, and where in it; the whole of a clip that is shorter, if it is
-    not less than `least`. Of many, some that are evenly spread."""
+    """The clip and the beginning of each piece of a `size`; a shorter clip is one piece if it has `least` at least.
+
+    Of many pieces some are chosen, evenly spread."""
     found = [
         (number, start)
         for number, length in enumerate(lengths)

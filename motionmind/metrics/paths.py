@@ -1,6 +1,6 @@
-"""What a path of states is like beside the corpus: how long, how likely, how much of a cliche.
+"""Measures of a path of states beside the corpus: arrival times, likelihood, cliches.
 
-A path has the states of L chains in T + 1 postures, int [T + 1, L]. What is said of joints leaves the facing out.
+A path holds the states of L chains in T + 1 postures, int [T + 1, L]. Measures of joints leave the facing out.
 """
 
 from __future__ import annotations
@@ -16,14 +16,22 @@ from motionmind.grammar.transitions import Transitions
 
 
 def arrivals(path: States) -> Ints:
-    """The number of moves after which each chain is where it stays to the end [L]; 0 for one that never leaves it."""
+    """Return the number of moves after which each chain has reached its last state for good [L]; 0 if it never moves.
+
+    Args:
+        path: states [T + 1, L].
+    """
     return np.asarray(len(path) - np.cumprod(path[::-1] == path[-1], axis=0).sum(axis=0), dtype=np.int64)
 
 
 def arrival_spread(path: States) -> float:
-    """Standard deviation, in moves, of when the chains that move arrive for good; 0 where fewer than two move.
+    """Return the standard deviation, in moves, of when chains arrive for good; 0 if fewer than two move.
 
-    What [MM] balances lengths for: that all parts of the body arrive together.
+    Bradley and Stuart's short paper on MotionMind (about 2000) balances path lengths to keep it small: all parts of the
+    body should arrive together.
+
+    Args:
+        path: states [T + 1, L].
     """
     moving = np.any(path != path[-1], axis=0)
     return float(arrivals(path)[moving].std()) if moving.sum() > 1 else 0.0
@@ -31,16 +39,16 @@ def arrival_spread(path: States) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Habits:
-    """What is usual in a corpus, for each of E transitions between G states; holds are no moves here.
+    """A corpus's usual moves: statistics of its E transitions between G states. Holds do not count as moves.
 
     Attributes:
         joints: the number of joints, which are the first chains.
         transitions: the joint graphs.
         is_hold: whether a transition stays in its state [E].
         choice: whether at least two different moves lead out of a state [G].
-        likeliest: whether no move out of the same state was seen more often, and some were less often [E].
-        percentile: of how often it was seen among the joint's moves, each as often as it was made, from 0 to 100: those
-            that were seen less often, and half of those as often [E].
+        likeliest: whether no move out of the same state is more frequent, and some are less frequent [E].
+        percentile: percentile rank, 0 to 100, of a move's frequency among all moves that the joint made: the share of
+            those less frequent, and half the share of those as frequent [E]. 50 for a hold.
         log_likelihood: log P(state arrived in | state left), nats [E].
     """
 
@@ -53,34 +61,40 @@ class Habits:
     log_likelihood: Floats
 
     def cliches(self, path: States) -> Bools:
-        """For each joint's move of a path out of a state with a choice, whether it is the likeliest one.
+        """Tell, for each joint's move out of a state with a choice, whether it is the likeliest one.
 
-        The mean is the cliche rate. A move that the corpus does not attest is none; where all that lead out of a state
-        were seen as often, neither is any of those.
+        The mean is the cliche rate. A move that the corpus does not attest is no cliche; nor is any move out of a
+        state whose moves are all equally frequent.
+
+        Args:
+            path: states [T + 1, L].
+
+        Returns:
+            One entry for each such move, in the order of moves, then joints.
         """
         moved, edges, rows = self._moves(path)
         chosen = moved & self.choice[rows]
         return (self.likeliest[edges] & (edges >= 0))[chosen]
 
     def percentiles(self, path: States) -> Floats:
-        """For each joint's move of a path the percentile of how often the corpus made it: 0 where it never did.
+        """Return the percentile of each joint's move in a path [T + 1, L]: 0 if the corpus never made it.
 
-        Of the corpus's own moves the mean is 50.
+        The mean over the corpus's own moves is 50.
         """
         moved, edges, _ = self._moves(path)
         return np.where(edges >= 0, self.percentile[edges], 0.0)[moved]
 
     def log_likelihoods(self, path: States) -> Floats:
-        """For each attested transition of a joint in a path, holds among them, its log P, nats."""
+        """Return log P, nats, of each attested transition of a joint in a path [T + 1, L], holds included."""
         _, edges, _ = self._moves(path)
         return self.log_likelihood[edges[edges >= 0]]
 
     def attested(self, path: States) -> Bools:
-        """For each transition of a joint in a path, holds among them, whether the corpus attests it."""
+        """Tell, for each transition of a joint in a path [T + 1, L], holds included, whether the corpus attests it."""
         return (self._moves(path)[1] >= 0).ravel()
 
     def _moves(self, path: States) -> tuple[Bools, Ints, Ints]:
-        """Whether each joint moves, the transition that it makes or -1, and the row that it leaves [T, joints]."""
+        """Whether each joint moves, its transition or -1, and the row of the state that it leaves, each [T, joints]."""
         graph = self.transitions
         before, after = path[:-1, : self.joints], path[1:, : self.joints]
         edges = np.array(
@@ -93,8 +107,8 @@ class Habits:
         return before != after, edges, graph.starts[: self.joints] + before
 
 
-def find_habits(grammar: Grammar) -> Habits:
-    """What is usual in the corpus that a grammar was learned from."""
+def learn_habits(grammar: Grammar) -> Habits:
+    """Learn the usual moves of the corpus that a grammar was learned from."""
     graph = grammar.transitions
     sources = graph.sources
     chain = np.searchsorted(graph.starts, sources, side="right") - 1

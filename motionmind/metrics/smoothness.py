@@ -1,4 +1,4 @@
-"""How smooth movement is: angular jerk, and the spectral arc length of its speed."""
+"""Smoothness of movement: angular jerk, and the spectral arc length of its speed."""
 
 from __future__ import annotations
 
@@ -8,35 +8,48 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
 _PADDING = 4  # the spectrum is taken of 2^4 times as many samples, zeros added
-_HIGHEST = 10.0  # Hz; above it is no movement of a person
-_LEAST = 0.05  # of the greatest amplitude; beyond the last that is as large is noise
+_HIGHEST = 10.0  # Hz; people do not move at higher frequencies
+_LEAST = 0.05  # of the greatest amplitude; beyond the last amplitude as large as this there is only noise
 
 
 def angular_speed(rotations: Floats, fps: float) -> Floats:
-    """Speed of turning [..., T - 1, J], rad/s, of rotations [..., T, J, 4] that follow one another at `fps`."""
+    """Return the angular speed between consecutive frames [..., T - 1, J], rad/s.
+
+    Args:
+        rotations: [..., T, J, 4], evenly spaced in time.
+        fps: frames a second.
+    """
     return rot.angle(rotations[..., :-1, :, :], rotations[..., 1:, :, :]) * fps
 
 
 def angular_jerk(rotations: Floats, fps: float) -> Floats:
-    """Size of the angular jerk [..., T - 3, J], rad/s^3, of rotations [..., T, J, 4] that follow one another at `fps`.
+    """Return the magnitude of the angular jerk [..., T - 3, J], rad/s^3.
 
-    The angular velocity from each frame to the next is log(inv(q) * q') * fps, as the turning joint itself sees it;
-    jerk is its second derivative, by the second difference. Flash and Hogan, "The coordination of arm movements",
-    J. Neuroscience 5:1688 (1985), took jerk as the measure of smoothness, of places; this is the same of turns. For a
-    turn about one axis it is the third difference of the angle, which is exact where the angle is a cubic of time.
+    The angular velocity between consecutive frames is log(inv(q) * q') * fps, in the joint's own frame; jerk is its
+    second derivative, by second differences. Flash and Hogan, "The coordination of arm movements", J. Neuroscience
+    5:1688 (1985), introduced jerk, of positions, as a measure of smoothness; this is its analogue for rotations. For a
+    turn about one axis it is the third difference of the angle, which is exact if the angle is a cubic of time.
+
+    Args:
+        rotations: [..., T, J, 4], evenly spaced in time.
+        fps: frames a second.
     """
     velocity = rot.log(rot.inv_mul(rotations[..., :-1, :, :], rotations[..., 1:, :, :])) * fps
     return np.asarray(np.linalg.norm(np.diff(velocity, n=2, axis=-3), axis=-1) * fps**2)
 
 
 def sparc(speed: Floats, fps: float) -> float:
-    """Spectral arc length of a speed [T] sampled at `fps`: at most -1, the closer to 0 the smoother; NaN at rest.
+    """Return the spectral arc length of a speed: at most -1, the closer to 0 the smoother; NaN at rest.
 
-    Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement smoothness", J.
-    NeuroEngineering and Rehabilitation 12:112 (2015), with the constants of its section on discrete movements (and of
-    the code released with it): minus the length of the curve of the speed's amplitude spectrum, from 0 Hz up to the
-    last frequency of at most 10 Hz whose amplitude is 5 % of the greatest or more, where both the amplitudes and that
-    range of frequencies are scaled to 1. It does not depend on the size of the movement.
+    Defined by Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement smoothness", J.
+    NeuroEngineering and Rehabilitation 12:112 (2015); the constants are those of its section on discrete movements and
+    of the code released with it. It is minus the length of the curve of the speed's amplitude spectrum, from 0 Hz to
+    the last frequency, at most 10 Hz, whose amplitude is at least 5 % of the greatest; amplitudes and that range of
+    frequencies are scaled to 1. It does not depend on the size of the movement.
+
+    Args:
+        speed: [T], in any unit, evenly spaced in time.
+        fps: samples a second.
     """
     count = 1 << (int(np.ceil(np.log2(len(speed)))) + _PADDING)
     amplitude = np.abs(np.fft.fft(speed, count))

@@ -1,4 +1,4 @@
-"""How much of a path is copied: runs of whole postures, and sequences of n states of a joint, a limb, the body."""
+"""Verbatim copies in a path: runs of whole postures, and n-grams of the states of a joint, a limb or the body."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from motionmind._typing import Int32s, Ints, States
 from motionmind.body.limbs import sided_parts
 from motionmind.corpus.corpus import Corpus
 
-LONGEST = 5  # states that n-grams have at most
-_SEVERAL = -1  # in place of the one clip that has an n-gram
+LONGEST = 5  # states in the longest n-grams
+_SEVERAL = -1  # for the clip of an n-gram that several clips have
 
 
 @dataclass(frozen=True, eq=False)
 class Phrasebook:
-    """What a corpus says word by word.
+    """The n-grams of a corpus's N postures, and where each whole posture occurs.
 
     Attributes:
-        groups: the joints of each part of the body that is looked at: "joint", "limb" (the trunk is one) and
-            "body".
-        grams: the sequences of states of each part, and the clip that has each, or that several have.
-        places: in which of the corpus's postures each whole posture occurs.
+        groups: the parts of the body of each size, as lists of joints: "joint", "limb" (the trunk is one) and "body".
+        grams: for n from 1 on, the n-grams of all parts, each with the number of its clip, or -1 if several have it.
+        places: the postures at which each whole posture occurs.
         clip_of: the clip of each posture [N].
     """
 
@@ -33,15 +32,16 @@ class Phrasebook:
     clip_of: Ints
 
     def copied(self, path: States, size: str, n: int, besides: int | None = None) -> float:
-        """Share of the sequences of `n` states in a path that the corpus has, the mean over parts of a `size`.
+        """Return the share of a path's n-grams that the corpus has, over all parts of one size.
 
         Args:
             path: states [T + 1, L].
             size: "joint", "limb" or "body".
-            n: states in a sequence, from 1.
-            besides: a clip of the corpus that does not count; the one that the path is from.
+            n: states in a sequence, 1 to `LONGEST`.
+            besides: a clip that does not count: the one that the path comes from.
 
-        NaN for a path of fewer than `n` postures.
+        Returns:
+            A share from 0 to 1; NaN for a path of fewer than `n` postures.
         """
         found = [
             clip is not None and clip != besides
@@ -51,10 +51,19 @@ class Phrasebook:
         return float(np.mean(found)) if found else float("nan")
 
     def runs(self, path: States, besides: int | None = None) -> list[int]:
-        """Lengths in postures of the runs of whole postures, wherever they face, that the path has from one clip of
-        the corpus in its order: of those that cannot be longer, in the order of their ends."""
+        """Return the lengths, in postures, of the maximal runs of whole postures that a path copies from one clip.
+
+        A run has the clip's postures in the clip's order; where they face does not matter.
+
+        Args:
+            path: states [T + 1, L].
+            besides: a clip that does not count: the one that the path comes from.
+
+        Returns:
+            Lengths in the order of the runs' ends.
+        """
         lengths: list[int] = []
-        ends: dict[int, int] = {}  # how long the longest run is that ends in a posture of the corpus
+        ends: dict[int, int] = {}  # length of the longest run that ends in each posture of the corpus
         for posture in _grams(path, self.groups["body"][0], 1):
             ends = {
                 place: 1 + (ends.get(place - 1, 0) if self.clip_of[place] == self.clip_of[place - 1] else 0)
@@ -65,8 +74,13 @@ class Phrasebook:
         return [now for now, after in zip(lengths, [*lengths[1:], 0], strict=True) if now and after <= now]
 
 
-def find_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
-    """What a corpus, with its postures' states [N, L], says word by word."""
+def learn_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
+    """Collect the n-grams of a corpus.
+
+    Args:
+        corpus: the corpus.
+        states: the states of its postures [N, L].
+    """
     joints = list(range(len(corpus.skeleton)))
     parts = [part.tolist() for part in sided_parts(corpus.skeleton).values()]
     groups = {"joint": [[joint] for joint in joints], "limb": parts, "body": [joints]}
@@ -85,7 +99,7 @@ def find_phrases(corpus: Corpus, states: Int32s) -> Phrasebook:
 
 
 def _grams(path: States, part: Sequence[int], n: int) -> list[bytes]:
-    """All sequences of `n` states of a part of the body in a path, each with what part it is of."""
+    """All n-grams of a part of the body in a path, each headed by the joints of the part."""
     own = np.ascontiguousarray(path[:, list(part)], dtype=np.int32)
     head = np.array(part, dtype=np.int32).tobytes()
     width = own.shape[1] * own.itemsize

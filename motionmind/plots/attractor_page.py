@@ -17,7 +17,7 @@ _THINNED = 50  # one of so many points of the sheets is enough to see where the 
 
 def attractor_page(portrait: Portrait) -> str:
     """The page; player/README.md says what it holds."""
-    arranged = portrait.variation.arranged()
+    arranged = portrait.variation.arrange()
     sheets = portrait.sheets[::_THINNED]
     there = portrait.in_space(sheets)
     low, high = there.min(axis=0), there.max(axis=0)

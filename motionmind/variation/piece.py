@@ -1,14 +1,14 @@
-"""A piece of movement as postures that can follow one another in any order, and the movement that comes of an order.
+"""A piece of movement as postures that can follow one another in any order, and the movement of such an order.
 
-What follows in the order as it does in the piece is a *chunk* and stays one movement: a chunk is set down whole, moved
-over the floor and, where the piece may face anywhere, turned about the vertical. So each step's displacement stays what
-it was in the body's heading, and nothing teleports: a chunk begins where the one before it ended.
+Postures that follow one another as in the piece form a *chunk*, which stays one movement: a chunk is placed whole,
+moved over the floor and, if the piece may face anywhere, turned about the vertical. So each step keeps its displacement
+in the body's heading, and nothing teleports: a chunk begins where the one before it ended.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,38 +19,40 @@ from motionmind.body.motion import FASTEST, Insertion, Motion, Posture
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
-from motionmind.variation.arguments import number
+from motionmind.variation.arguments import check_number
 
 _ROUNDING = 1e-9  # seconds
-ALONE = 1.0  # seconds that a posture lasts where the piece has no other
+ALONE = 1.0  # seconds that the only posture of a piece lasts
+_VERTICAL = np.array([0.0, 1.0, 0.0])
+_FLOOR = np.array([1.0, 0.0, 1.0])
 
 
-class Arranged(NamedTuple):
+class Arrangement(NamedTuple):
     """A piece's postures in another order.
 
     Attributes:
         motion: the movement.
-        frames: the frame of it that each posture of the order is [L].
+        frames: the frame of the movement at which each posture of the order is [L].
     """
 
     motion: Motion
     frames: Ints
 
 
-class _Place(NamedTuple):
-    """Where a chunk is set down: turned by `angle` radians about the vertical, then moved by `shift` [3] metres."""
+class _Placement(NamedTuple):
+    """A turn by `angle` radians about the vertical, then a move by `shift` [3] metres."""
 
     angle: float
     shift: Floats
 
     def turn(self, rotations: Floats) -> Floats:
-        """Local rotations [..., J, 4] with the root's turned."""
+        """Local rotations [..., J, 4], the root's turned."""
         turned = rotations.copy()
         turned[..., 0, :] = rot.mul(rot.about_vertical(self.angle), rotations[..., 0, :])
         return turned
 
     def move(self, root: Floats) -> Floats:
-        """Positions [..., 3] of the root there."""
+        """Positions [..., 3] of the root, turned and moved, metres."""
         return np.asarray(rot.mul_vec(rot.about_vertical(self.angle), root) + self.shift)
 
 
@@ -60,9 +62,9 @@ class Piece:
 
     Attributes:
         motion: the piece, all its frames, from its first posture to its last.
-        frames: the frame that each posture is [N], from 0 on, increasing.
-        facing: "free" where the piece may face anywhere, so that a chunk goes on in the heading in which the last one
-            ended; "stage" where each posture keeps the orientation that it has.
+        frames: the frame of each posture [N], increasing from 0.
+        facing: "free" if the piece may face anywhere: a chunk then continues in the heading in which the last one
+            ended. "stage" if each posture keeps its own orientation.
     """
 
     motion: Motion
@@ -81,13 +83,21 @@ class Piece:
 
     @classmethod
     def of(cls, motion: Motion, rate: float | None = None, facing: Facing = "free") -> Piece:
-        """A motion as a piece with `rate` postures a second, each the frame nearest to its time, or with every frame.
+        """Cut a motion into postures.
 
-        What is left after the last posture, less than a step, is not part of the piece.
+        The rest after the last posture, less than a step, is not part of the piece.
+
+        Args:
+            motion: the movement.
+            rate: postures a second, each the frame nearest to its time; None for every frame.
+            facing: see the class.
+
+        Raises:
+            MotionMindError: the rate or the facing is out of its range.
         """
         if rate is None:
             return cls(motion, np.arange(len(motion)), facing)
-        if not 0.0 < number("rate", rate) <= FASTEST:
+        if not 0.0 < check_number("rate", rate) <= FASTEST:
             raise MotionMindError(
                 f"a rate must be a number of postures a second above 0, at most {FASTEST:g}, not {rate}"
             )
@@ -103,82 +113,111 @@ class Piece:
         return len(self.frames)
 
     @cached_property
-    def lasting(self) -> Floats:
+    def durations(self) -> Floats:
         """Seconds from each posture to the next one [N]; the last lasts as long as the one before it."""
         steps = np.diff(self.motion.times[self.frames])
         return np.append(steps, steps[-1:] if len(steps) else ALONE)
 
     def ends(self, i: int, k: int) -> tuple[Posture, Posture]:
-        """Postures i and k as they stand where k follows on i: both over the origin, and, where the facing is free,
-        both facing +Z."""
+        """Return postures i and k for a movement from one to the other: both above the origin and, if the facing is
+        free, both facing +Z."""
         return self._at_origin(i), self._at_origin(k)
 
     def _at_origin(self, posture: int) -> Posture:
-        found = self.motion.posture(int(self.frames[posture]))
-        rotations = _Place(-self._headings[posture], np.zeros(3)).turn(found.rotations)
-        return replace(found, rotations=rot.normalise(rotations), root=found.root * np.array([0.0, 1.0, 0.0]))
+        own = self.motion.posture(int(self.frames[posture]))
+        rotations = _Placement(-self._headings[posture], np.zeros(3)).turn(own.rotations)
+        return replace(own, rotations=rot.normalise(rotations), root=own.root * _VERTICAL)
 
     @cached_property
     def _headings(self) -> Floats:
-        """Where each posture faces, radians [N]: 0 where it keeps its orientation, for then nothing is turned."""
+        """Heading of each posture [N], radians; 0 if postures keep their orientation: nothing is turned."""
         if self.facing == "stage":
             return np.zeros(len(self))
         return rot.heading(self.motion.rotations[self.frames, 0])
 
-    def _marks(self, frames: slice) -> Iterator[Insertion]:
-        """The piece's own insertions that lie wholly within some of its frames."""
+    def _insertions_within(self, frames: slice) -> Iterator[Insertion]:
+        """The piece's own insertions that lie wholly within a slice of its frames."""
         times = self.motion.times[frames]
         for mark in self.motion.insertions:
             if times[0] - _ROUNDING <= mark.times[0] and mark.times[-1] <= times[-1] + _ROUNDING:
                 yield mark
 
-    def arranged(self, order: Ints, insertions: Mapping[int, Motion]) -> Arranged:
-        """The piece's postures in another order.
+    def arrange(self, order: Ints, insertions: Mapping[int, Motion]) -> Arrangement:
+        """Put the piece's postures in another order.
+
+        The piece's own insertions stay marked where a chunk holds the whole of them.
 
         Args:
-            order: postures [L], any number of them.
-            insertions: what leads from the n-th posture of the order to the next one, by n, from and to `ends`; where
-                there is nothing, and the order leaves the piece's, the one posture just follows on the other.
-
-        What the engine had put into the piece is marked where the whole of it comes.
+            order: numbers of postures [L], any number of them.
+            insertions: the movement from the n-th posture of the order to the next, by n, from and to `ends`. Where the
+                order leaves the piece's and there is no insertion, the next posture follows at once.
         """
         leaps = np.flatnonzero(np.diff(order) != 1) + 1
         starts, stops = np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
-        rotations, root, times, frames, marks = [], [], [], [], []
-        count, motion = 0, self.motion
-        place, clock = _Place(0.0, np.zeros(3)), float(motion.times[0] - motion.times[self.frames[order[0]]])
+        motion, parts = self.motion, _Parts()
+        place, clock = _Placement(0.0, np.zeros(3)), float(motion.times[0] - motion.times[self.frames[order[0]]])
         for start, stop in zip(starts, stops, strict=True):
             first, last = order[start], order[stop - 1]
-            here = slice(int(self.frames[first]), int(self.frames[last]) + 1)
-            rotations.append(place.turn(motion.rotations[here]))
-            root.append(place.move(motion.root[here]))
-            times.append(motion.times[here] + clock)
-            marks += [replace(mark, times=mark.times + clock) for mark in self._marks(here)]
-            frames.append(self.frames[order[start:stop]] - here.start + count)
-            count += here.stop - here.start
+            chunk = slice(int(self.frames[first]), int(self.frames[last]) + 1)
+            parts.frames.append(self.frames[order[start:stop]] - chunk.start + parts.count)
+            marks = self._insertions_within(chunk)
+            parts.add(motion.rotations[chunk], motion.root[chunk], motion.times[chunk], marks, place, clock)
             if stop == len(order):
                 break
-            end, heading = root[-1][-1] * np.array([1.0, 0.0, 1.0]), place.angle + self._headings[last]
-            now, inserted = float(times[-1][-1]), insertions.get(int(stop - 1))
+            end, heading = parts.root[-1][-1] * _FLOOR, place.angle + self._headings[last]
+            now, inserted = float(parts.times[-1][-1]), insertions.get(int(stop - 1))
             if inserted is None:
-                now += float(self.lasting[last])
+                now += float(self.durations[last])
             else:
-                there, inner = _Place(heading, end), slice(1, -1)
-                rotations.append(there.turn(inserted.rotations[inner]))
-                root.append(there.move(inserted.root[inner]))
-                times.append(inserted.times[inner] + now)
-                count += len(inserted) - 2
-                marks += [replace(mark, times=mark.times + now) for mark in inserted.insertions]
+                inner = slice(1, -1)  # the ends are the postures themselves
+                rotations, root, times = inserted.rotations[inner], inserted.root[inner], inserted.times[inner]
+                parts.add(rotations, root, times, inserted.insertions, _Placement(heading, end), now)
                 now += float(inserted.times[-1])
-            angle = heading - self._headings[order[stop]]
-            begins = self.frames[order[stop]]
-            turned = rot.mul_vec(rot.about_vertical(angle), motion.root[begins] * np.array([1.0, 0.0, 1.0]))
-            place, clock = _Place(float(angle), end - turned), now - float(motion.times[begins])
-        found = replace(
+            place, clock = self._continue(order[stop], end, heading, now)
+        return parts.join(motion)
+
+    def _continue(self, posture: int, end: Floats, heading: float, now: float) -> tuple[_Placement, float]:
+        """The placement and the clock of a chunk that begins with a posture at `end` [3], at the time `now`."""
+        angle = heading - self._headings[posture]
+        begins = self.frames[posture]
+        turned = rot.mul_vec(rot.about_vertical(angle), self.motion.root[begins] * _FLOOR)
+        return _Placement(float(angle), end - turned), now - float(self.motion.times[begins])
+
+
+@dataclass
+class _Parts:
+    """The chunks and insertions of an arrangement, one after another; `count` frames so far."""
+
+    count: int = 0
+    rotations: list[Floats] = field(default_factory=list)
+    root: list[Floats] = field(default_factory=list)
+    times: list[Floats] = field(default_factory=list)
+    insertions: list[Insertion] = field(default_factory=list)
+    frames: list[Ints] = field(default_factory=list)
+
+    def add(
+        self,
+        rotations: Floats,
+        root: Floats,
+        times: Floats,
+        insertions: Iterable[Insertion],
+        place: _Placement,
+        clock: float,
+    ) -> None:
+        """Add frames [F], placed on the floor and `clock` seconds later."""
+        self.count += len(times)
+        self.rotations.append(place.turn(rotations))
+        self.root.append(place.move(root))
+        self.times.append(times + clock)
+        self.insertions.extend(replace(one, times=one.times + clock) for one in insertions)
+
+    def join(self, motion: Motion) -> Arrangement:
+        """All of them as one movement."""
+        arranged = replace(
             motion,
-            rotations=np.concatenate(rotations),
-            root=np.concatenate(root),
-            times=np.concatenate(times),
-            insertions=tuple(marks),
+            rotations=np.concatenate(self.rotations),
+            root=np.concatenate(self.root),
+            times=np.concatenate(self.times),
+            insertions=tuple(self.insertions),
         )
-        return Arranged(found, np.concatenate(frames))
+        return Arrangement(arranged, np.concatenate(self.frames))

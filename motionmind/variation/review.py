@@ -1,7 +1,7 @@
-"""What a reviewer does with a variation: edits, each of which leads from one state of the review to the next.
+"""The review of a variation: edits, each of which leads from one state of the review to the next.
 
-Nothing is lost by an edit. A variation keeps the list of them, and its state is what they make, one after another, of
-the order that the attractor gave; to undo one is to leave out the last.
+An edit loses nothing. A variation keeps the list of its edits; its state is the result of applying them one after
+another to the order that the attractor gave. To undo the last edit is to drop it from the list.
 """
 
 from __future__ import annotations
@@ -10,64 +10,70 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 import msgspec
 import numpy as np
 
 from motionmind._typing import Ints
 from motionmind.errors import MotionMindError, enumerated
-from motionmind.variation.seams import Candidate, Join
+from motionmind.variation.seams import Candidate, Transition
 
+T = TypeVar("T")  # a judged transition, or its form in a file
 Decision = Literal["open", "approved", "discarded"]
 
 
 class Approve(msgspec.Struct, frozen=True, tag_field="edit", tag="approve", forbid_unknown_fields=True):
-    """The insertions at these seams are good; where there is none, the transition is good as it is."""
+    """Approve the insertions at these seams; where a seam has no insertion, approve the transition as it is."""
 
     seams: tuple[int, ...]
 
 
 class Discard(msgspec.Struct, frozen=True, tag_field="edit", tag="discard", forbid_unknown_fields=True):
-    """The insertions at these seams are left out."""
+    """Leave out the insertions at these seams."""
 
     seams: tuple[int, ...]
 
 
 class Replace(msgspec.Struct, frozen=True, tag_field="edit", tag="replace", forbid_unknown_fields=True):
-    """At a seam another of the movements that the engine found, counted from 1."""
+    """Insert another of the movements that the engine found for a seam, counted from 1."""
 
     seam: int
     alternative: int
 
 
 class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unknown_fields=True):
-    """Postures `first` to `last` are taken out and put before posture `before`, all as numbered until then."""
+    """Move postures `first` to `last` before posture `before`, all as numbered before the edit."""
 
     first: int
     last: int
     before: int
 
 
-@dataclass(frozen=True, eq=False)
-class Smooth:
-    """Seams that had not been judged or smoothed are, or whose insertion had been discarded; nobody has approved what
-    stands there now."""
+class Smooth(
+    msgspec.Struct, Generic[T], frozen=True, eq=False, tag_field="edit", tag="smooth", forbid_unknown_fields=True
+):
+    """Judge and smooth transitions that had not been, or whose insertion was discarded; nobody has approved these yet.
 
-    joins: tuple[Join, ...]
+    Attributes:
+        transitions: the new judgements, with what the engine found; variation files call them `joins`.
+    """
+
+    transitions: tuple[T, ...] = msgspec.field(name="joins")
 
 
-Edit = Approve | Discard | Replace | Cut | Smooth
+Edit = Approve | Discard | Replace | Cut | Smooth[Transition]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is decided of a seam.
+    """The reviewer's decision on a seam.
 
     Attributes:
-        number: by which it goes, as long as it is there.
-        decision: open until somebody approves or discards it; what is not discarded is in the movement.
-        chosen: which of the movements that the engine found, counted from 1.
+        number: the seam's number, which it keeps.
+        decision: open until somebody approves or discards the seam; insertions that are not discarded are in the
+            movement.
+        chosen: the number of the chosen candidate, counted from 1.
     """
 
     number: int
@@ -80,78 +86,84 @@ class Seam:
     """A place in a variation where it neither goes on as the piece does nor stays in its posture.
 
     Attributes:
-        number: by which it goes.
+        number: the seam's number, which it keeps.
         at: the posture of the variation that it leads from; it leads to the next one.
         start: that posture's number in the piece.
-        end: the next one's.
-        join: what the corpus says of it; None where none was asked.
+        end: the next posture's number in the piece.
+        transition: the corpus's judgement of it; None if no corpus has judged it.
         decision: open, approved or discarded.
-        chosen: which of the join's candidates, counted from 1.
+        chosen: the number of the chosen candidate of the transition, counted from 1.
     """
 
     number: int
     at: int
     start: int
     end: int
-    join: Join | None
+    transition: Transition | None
     decision: Decision
     chosen: int
 
     @property
+    def join(self) -> Transition | None:
+        """The former name of `transition`."""
+        return self.transition
+
+    @property
     def insertion(self) -> Candidate | None:
-        """The engine's movement that stands here; None where there is none, or it is discarded."""
-        if self.join is None or not self.join.candidates or self.decision == "discarded":
+        """The engine's movement that is inserted here; None if it found none, or it is discarded."""
+        if self.transition is None or not self.transition.candidates or self.decision == "discarded":
             return None
-        return self.join.candidates[self.chosen - 1]
+        return self.transition.candidates[self.chosen - 1]
 
     @property
     def is_abrupt(self) -> bool:
-        """Whether the transition is abrupt and stays so, for nothing is inserted."""
-        return self.join is not None and self.join.is_abrupt and self.insertion is None
+        """Whether the transition is abrupt and nothing is inserted to smooth it."""
+        return self.transition is not None and self.transition.is_abrupt and self.insertion is None
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class ReviewState:
     """A variation as it stands.
 
     Attributes:
         order: the postures of the piece as the attractor gave them [L].
-        sequence: which of these follow one another now [L].
-        joins: what the corpus says of transitions, by the postures that they lead from and to.
-        verdicts: on transitions between entries of `order` that are or were seams.
+        sequence: the entries of `order` in their present order [L].
+        transitions: judged transitions, by the postures of the piece that they lead from and to.
+        verdicts: decisions, by the two entries of `order` between which the seam is or was.
     """
 
     order: Ints
     sequence: tuple[int, ...]
-    joins: Mapping[tuple[int, int], Join]
+    transitions: Mapping[tuple[int, int], Transition]
     verdicts: Mapping[tuple[int, int], Verdict]
 
     @cached_property
     def postures(self) -> Ints:
-        """The piece's postures in the order in which they are now [L]."""
+        """The piece's postures in their present order [L]."""
         return np.asarray(self.order[list(self.sequence)])
 
     @cached_property
     def seams(self) -> tuple[Seam, ...]:
-        """All seams, in the order in which they come."""
-        found = []
+        """All seams, in the order of the movement."""
+        seams = []
         for at, (one, other) in enumerate(pairwise(self.sequence)):
             start, end = int(self.order[one]), int(self.order[other])
             if is_seam(start, end):
                 verdict = self.verdicts[one, other]
-                join = self.joins.get((start, end))
-                found.append(Seam(verdict.number, at, start, end, join, verdict.decision, verdict.chosen))
-        return tuple(found)
+                transition = self.transitions.get((start, end))
+                seams.append(Seam(verdict.number, at, start, end, transition, verdict.decision, verdict.chosen))
+        return tuple(seams)
 
-    def shows(self, other: State) -> bool:
-        """Whether another state is the same to whoever looks: its postures, its seams and what stands there."""
+    def looks_like(self, other: ReviewState) -> bool:
+        """Whether a reviewer sees the same in another state: its postures, its seams and their insertions."""
         mine, theirs = (
-            [(seam.number, seam.join, seam.decision, seam.chosen) for seam in state.seams] for state in (self, other)
+            [(seam.number, seam.transition, seam.decision, seam.chosen) for seam in state.seams]
+            for state in (self, other)
         )
         return np.array_equal(self.postures, other.postures) and mine == theirs
 
     def seam(self, number: int) -> Seam:
-        """The seam of that number; MotionMindError names those there are."""
+        """Return the seam of that number; MotionMindError, which lists the seams there are, if there is none."""
         for seam in self.seams:
             if seam.number == number:
                 return seam
@@ -159,64 +171,74 @@ class State:
         raise MotionMindError(f"no seam {number}; there are {there or 'none'}")
 
 
-def begun(order: Ints, joins: tuple[Join, ...]) -> State:
-    """The state before any edit."""
-    return _numbered(State(order, tuple(range(len(order))), {(join.start, join.end): join for join in joins}, {}))
+def initial_state(order: Ints, transitions: tuple[Transition, ...]) -> ReviewState:
+    """Return the state before any edit.
+
+    Args:
+        order: the postures of the piece as the attractor gave them [L].
+        transitions: what a corpus judged.
+    """
+    known = {(transition.start, transition.end): transition for transition in transitions}
+    return _number_seams(ReviewState(order, tuple(range(len(order))), known, {}))
 
 
-def edited(state: State, edit: Edit) -> State:
-    """The state after an edit; MotionMindError where it does not fit."""
+def apply_edit(state: ReviewState, edit: Edit) -> ReviewState:
+    """Return the state after an edit.
+
+    Raises:
+        MotionMindError: the edit does not fit the state; the message says why.
+    """
     match edit:
         case Approve(seams):
-            return _decided(state, seams, "approved")
+            return _decide(state, seams, "approved")
         case Discard(seams):
             for number in seams:
-                _with_candidates(state, number, "discard")
-            return _decided(state, seams, "discarded")
+                _candidates(state, number, "discard")
+            return _decide(state, seams, "discarded")
         case Replace(number, alternative):
-            ways = len(_with_candidates(state, number, "replace"))
-            if not 1 <= alternative <= ways:
-                raise MotionMindError(f"seam {number} has alternatives 1 to {ways}, no alternative {alternative}")
-            return _ruled(state, number, chosen=alternative, decision="open")
+            count = len(_candidates(state, number, "replace"))
+            if not 1 <= alternative <= count:
+                raise MotionMindError(f"seam {number} has alternatives 1 to {count}, no alternative {alternative}")
+            return _change_verdict(state, number, chosen=alternative, decision="open")
         case Cut():
-            return _numbered(replace(state, sequence=_moved(state.sequence, edit)))
-        case Smooth(joins):
-            return _smoothed(state, {(join.start, join.end): join for join in joins})
+            return _number_seams(replace(state, sequence=_move_postures(state.sequence, edit)))
+        case Smooth(transitions):
+            return _judge_anew(state, {(one.start, one.end): one for one in transitions})
 
 
-def _smoothed(state: State, joins: Mapping[tuple[int, int], Join]) -> State:
-    """The state with what is said of transitions now; what was decided stands only where there was and is nothing."""
+def _judge_anew(state: ReviewState, judged: Mapping[tuple[int, int], Transition]) -> ReviewState:
+    """The state with new judgements; a decision stands only where nothing was discarded and nothing new was found."""
     verdicts = dict(state.verdicts)
     for (one, other), verdict in verdicts.items():
-        join = joins.get((int(state.order[one]), int(state.order[other])))
-        if join and (join.candidates or verdict.decision == "discarded"):
+        transition = judged.get((int(state.order[one]), int(state.order[other])))
+        if transition and (transition.candidates or verdict.decision == "discarded"):
             verdicts[one, other] = Verdict(verdict.number)
-    return replace(state, joins={**state.joins, **joins}, verdicts=verdicts)
+    return replace(state, transitions={**state.transitions, **judged}, verdicts=verdicts)
 
 
-def _with_candidates(state: State, number: int, what: str) -> tuple[Candidate, ...]:
-    join = state.seam(number).join
-    if not (join and join.candidates):
-        raise MotionMindError(f"seam {number} has no insertion to {what}")
-    return join.candidates
+def _candidates(state: ReviewState, number: int, purpose: str) -> tuple[Candidate, ...]:
+    """The candidates for a seam; MotionMindError, which names the `purpose`, if there are none."""
+    transition = state.seam(number).transition
+    if not (transition and transition.candidates):
+        raise MotionMindError(f"seam {number} has no insertion to {purpose}")
+    return transition.candidates
 
 
-def _decided(state: State, seams: tuple[int, ...], decision: Decision) -> State:
+def _decide(state: ReviewState, seams: tuple[int, ...], decision: Decision) -> ReviewState:
     for number in seams:
-        state = _ruled(state, number, decision=decision)
+        state = _change_verdict(state, number, decision=decision)
     return state
 
 
-def _ruled(state: State, number: int, **changes: object) -> State:
-    """The state with a verdict changed."""
+def _change_verdict(state: ReviewState, number: int, **changes: object) -> ReviewState:
     at = state.seam(number).at
     pair = state.sequence[at], state.sequence[at + 1]
     verdict = replace(state.verdicts[pair], **changes)  # type: ignore[arg-type]
     return replace(state, verdicts={**state.verdicts, pair: verdict})
 
 
-def _moved(sequence: tuple[int, ...], cut: Cut) -> tuple[int, ...]:
-    """The sequence with what was cut in another place."""
+def _move_postures(sequence: tuple[int, ...], cut: Cut) -> tuple[int, ...]:
+    """The sequence with the cut postures in their new place."""
     count = len(sequence)
     if not 0 <= cut.first <= cut.last < count:
         raise MotionMindError(f"cannot cut {cut.first}..{cut.last}: postures are 0 to {count - 1}, the first one first")
@@ -226,15 +248,15 @@ def _moved(sequence: tuple[int, ...], cut: Cut) -> tuple[int, ...]:
         )
     if cut.first < cut.before <= cut.last:
         raise MotionMindError(
-            f"cannot paste before {cut.before}: it is itself among {cut.first}..{cut.last}, what is cut"
+            f"cannot paste before {cut.before}: it is itself among {cut.first}..{cut.last}, the postures that are cut"
         )
     taken, rest = sequence[cut.first : cut.last + 1], sequence[: cut.first] + sequence[cut.last + 1 :]
     place = cut.before if cut.before <= cut.first else cut.before - len(taken)
     return rest[:place] + taken + rest[place:]
 
 
-def _numbered(state: State) -> State:
-    """The state with a verdict on each seam: new ones are open, and get the next numbers."""
+def _number_seams(state: ReviewState) -> ReviewState:
+    """The state with a verdict on each seam: new seams are open, and get the next numbers."""
     verdicts = dict(state.verdicts)
     for pair in pairwise(state.sequence):
         if is_seam(*state.order[list(pair)]) and pair not in verdicts:
@@ -243,5 +265,5 @@ def _numbered(state: State) -> State:
 
 
 def is_seam(start: int, end: int) -> bool:
-    """Whether posture `end` of a piece following on its posture `start` is another transition than the piece's own."""
+    """Whether going from posture `start` of a piece to posture `end` is neither the piece's own step nor a stay."""
     return end not in (start, start + 1)

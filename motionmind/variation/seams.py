@@ -1,22 +1,22 @@
-"""Where one posture of a piece follows another that it did not follow there: whether that is abrupt, and the movement
-that the engine puts in between.
+"""Transitions at the seams of a variation, where one posture of a piece follows another that it did not follow there:
+which of them are abrupt, and the movement that the engine inserts to smooth those.
 
-A transition is abrupt where the corpus does not know it: some joint goes from one state to another as it never does
-there (or, posturewise, the whole body does), or turns faster than it ever does there. To stay in a state is no move.
+A transition is abrupt if the corpus does not know it: some joint goes from one state to another as it never does in the
+corpus (or, posturewise, the whole body does), or turns faster than it ever does there. Staying in a state is no move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sized
+from dataclasses import dataclass, replace
 from functools import cached_property
 from inspect import signature
-from typing import Any
+from typing import Annotated, Any, Generic, TypeVar
 
 import msgspec
 import numpy as np
 
-from motionmind._typing import Floats, Int32s
+from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import NoPathError, SkeletonError, did_you_mean
 from motionmind.geometry import rotations as rot
@@ -24,22 +24,29 @@ from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween.certificate import Bridge, Wait
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween, gap_of
-from motionmind.variation.arguments import whole
+from motionmind.variation.arguments import check_whole
 from motionmind.variation.piece import Piece
 
-OnProgress = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]  # called with how many searches are done, and how many there are
+Index = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]  # of a posture or a state
+M = TypeVar("M")  # a movement: Motion, or its form in a file
+P = TypeVar("P", bound=Sized)  # a path of states: Int32s, or its form in a file
+C = TypeVar("C")  # a candidate, in memory or in a file
+M2 = TypeVar("M2")  # the same three in the other form
+P2 = TypeVar("P2", bound=Sized)
+C2 = TypeVar("C2")
 
-_ROUNDING = 1.0 + 1e-6  # a corpus's fastest move, made again, is not faster than itself
-BODY = "body"  # what a break is named after where whole bodies are judged
+_ROUNDING = 1.0 + 1e-6  # the corpus's fastest move, made again, is not faster than itself
+BODY = "body"  # stands for the joint where whole bodies are judged
 
 
 @dataclass(frozen=True)
-class Break:
-    """What makes a transition abrupt: a joint (or "facing", or "body" for all of it) that turns by `degrees` within it.
+class AbruptJoint:
+    """A joint that makes a transition abrupt; "facing" is one, and "body" stands for all joints together.
 
     Attributes:
         joint: its name.
-        degrees: how far it turns; of a body the most that any joint does.
+        degrees: the angle that it turns by; for "body", the largest angle of any joint.
         attested: whether the corpus has it go from the one state to the other.
         fast: whether it turns faster than it ever does in the corpus.
     """
@@ -50,9 +57,10 @@ class Break:
     fast: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
+class InsertionCandidate(msgspec.Struct, Generic[M, P], frozen=True, eq=False, forbid_unknown_fields=True):
     """Movement that the engine found from one posture to another, with its certificate (see Tween).
+
+    Variation files hold the same fields in this order, with the movement and the path in the file's own form.
 
     Attributes:
         motion: the movement, from and to `Piece.ends`.
@@ -61,12 +69,12 @@ class Candidate:
         cost: nats.
         lower_bound: no path costs less, nats.
         attested: share of the joints' moves that the corpus attests.
-        bridges: the moves that it does not, but for waits.
+        bridges: the moves that it does not attest, other than waits.
         waits: moves that joints spend waiting at their goals.
     """
 
-    motion: Motion
-    path: Int32s
+    motion: M
+    path: P
     status: Status
     cost: float
     lower_bound: float
@@ -74,23 +82,9 @@ class Candidate:
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
 
-    @classmethod
-    def of(cls, tween: Tween) -> Candidate:
-        """What is kept of a tween."""
-        return cls(
-            replace(tween.motion, name=""),
-            tween.path,
-            tween.status,
-            tween.cost,
-            tween.lower_bound,
-            tween.attested,
-            tween.bridges,
-            tween.waits,
-        )
-
     @property
     def moves(self) -> int:
-        """Number of its moves."""
+        """Number of moves T; the path has T + 1 postures."""
         return len(self.path) - 1
 
     @property
@@ -98,85 +92,106 @@ class Candidate:
         """(cost - lower bound) / cost: 0 is proven optimal."""
         return gap_of(self.cost, self.lower_bound)
 
+    def with_movement(self, motion: M2, path: P2) -> InsertionCandidate[M2, P2]:
+        """Return the candidate with its movement and path in another form."""
+        certificate = self.status, self.cost, self.lower_bound, self.attested, self.bridges, self.waits
+        return InsertionCandidate(motion, path, *certificate)
 
-@dataclass(frozen=True, eq=False)
-class Join:
-    """What a corpus says of posture `end` of a piece following on posture `start`.
+
+Candidate = InsertionCandidate[Motion, Int32s]
+
+
+class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid_unknown_fields=True):
+    """A corpus's judgement of posture `end` of a piece following posture `start`, and the movement to go between them.
+
+    Variation files hold the same fields in this order; `breaks` and `asked` are their names there for two of them.
 
     Attributes:
-        start: the posture that it leads from.
+        start: the posture that the transition leads from.
         end: the posture that it leads to.
-        corpus: the corpus that was asked.
-        breaks: what is abrupt about it; nothing where the corpus knows it.
-        candidates: movement that the engine found to go between, the best first.
-        failure: why it found none, where it found none.
-        asked: what was asked of the engine, as plain values.
+        corpus: the name of the corpus.
+        abrupt_joints: the joints that make it abrupt; none if the corpus knows the transition.
+        candidates: movements that the engine found to go between, the best first.
+        failure: why the engine found none; "" if it found some or has not searched.
+        options: the options of the engine's search, as plain values.
     """
 
-    start: int
-    end: int
+    start: Index
+    end: Index
     corpus: str
-    breaks: tuple[Break, ...] = ()
-    candidates: tuple[Candidate, ...] = ()
-    failure: str = ""
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    abrupt_joints: tuple[AbruptJoint, ...] = msgspec.field(name="breaks")
+    candidates: tuple[C, ...]
+    failure: str
+    options: Mapping[str, Any] = msgspec.field(name="asked")
+
+    @property
+    def breaks(self) -> tuple[AbruptJoint, ...]:
+        """The former name of `abrupt_joints`."""
+        return self.abrupt_joints
 
     @property
     def is_abrupt(self) -> bool:
-        """Whether the corpus does not know it."""
-        return bool(self.breaks)
+        """Whether the corpus does not know this transition."""
+        return bool(self.abrupt_joints)
 
     @property
     def is_pending(self) -> bool:
-        """Whether it is abrupt and the engine was not asked yet."""
+        """Whether it is abrupt and the engine has not searched for movement yet."""
         return self.is_abrupt and not self.candidates and not self.failure
 
-    def tells_more_than(self, other: Join | None) -> bool:
-        """Whether there is more in it than in what was known of the same transition, if anything."""
+    def tells_more_than(self, other: JudgedTransition[C] | None) -> bool:
+        """Whether it adds to an earlier judgement of the same transition; None stands for no judgement."""
         if other is None or self.candidates or not self.is_abrupt:
             return True
-        said = other.corpus, other.breaks, other.failure
-        return not other.candidates and not self.is_pending and (self.corpus, self.breaks, self.failure) != said
+        mine, theirs = ((one.corpus, one.abrupt_joints, one.failure) for one in (self, other))
+        return not other.candidates and not self.is_pending and mine != theirs
+
+    def with_candidates(self, candidates: tuple[C2, ...]) -> JudgedTransition[C2]:
+        """Return the transition with its candidates in another form."""
+        judgement = self.start, self.end, self.corpus, self.abrupt_joints
+        return JudgedTransition(*judgement, candidates, self.failure, self.options)
+
+
+Transition = JudgedTransition[Candidate]
 
 
 @dataclass(frozen=True, eq=False)
 class TransitionTest:
-    """A corpus, asked which transitions are abrupt.
+    """A test of which transitions are abrupt beside a corpus.
 
     Attributes:
-        engine: what was learned from it.
+        engine: what was learned from the corpus.
         posturewise: whether the whole body must have made the move, not each joint.
     """
 
     engine: Engine
     posturewise: bool = False
 
-    def breaks(self, a: Posture, b: Posture, seconds: float) -> tuple[Break, ...]:
-        """What is abrupt about posture `b` following on posture `a` within `seconds`; SkeletonError where they are on
-        other joints than the corpus."""
+    def abrupt_joints(self, a: Posture, b: Posture, seconds: float) -> tuple[AbruptJoint, ...]:
+        """List the joints that make the transition from posture `a` to posture `b` within `seconds` abrupt.
+
+        Raises:
+            SkeletonError: a posture is on other joints than the corpus.
+        """
         engine, corpus = self.engine, self.engine.corpus
         for posture in (a, b):
             if (difference := corpus.skeleton.difference(posture.skeleton)) is not None:
                 raise SkeletonError(f"the piece is on another skeleton than corpus {corpus.name!r}: {difference}")
         chains = corpus.to_chains(np.stack([a.rotations, b.rotations]))
         before, after = engine.space.assign(chains)
-        turned = np.degrees(rot.angle(*chains))
+        angles = np.degrees(rot.angle(*chains))
         # Within a state's tolerance orientations are one to the corpus: that is no turn.
-        fast = turned > np.maximum(engine.space.tolerances, self._fastest * seconds) * _ROUNDING
-        moved = before != after
-        graph = engine.grammar.transitions
-        known = [not moved[chain] or graph.edge(chain, before[chain], after[chain]) >= 0 for chain in range(len(moved))]
-        joints = len(corpus.skeleton)
-        found = []
+        fast = angles > np.maximum(engine.space.tolerances, self._fastest * seconds) * _ROUNDING
+        joints, found = len(corpus.skeleton), []
+        attested = self._attested(before, after)
         if self.posturewise:
-            attested = not moved[:joints].any() or self._has_made(before[:joints], after[:joints])
-            known = [True] * len(known)
-            if not attested:
-                found.append(Break(BODY, float(turned[:joints].max()), attested=False, fast=False))
+            attested[:] = True
+            if (before != after)[:joints].any() and not self._has_made(before[:joints], after[:joints]):
+                found.append(AbruptJoint(BODY, float(angles[:joints].max()), attested=False, fast=False))
         found += [
-            Break(name, float(turned[chain]), attested=known[chain], fast=bool(fast[chain]))
+            AbruptJoint(name, float(angles[chain]), attested=bool(attested[chain]), fast=bool(fast[chain]))
             for chain, name in enumerate(corpus.chains)
-            if fast[chain] or not known[chain]
+            if fast[chain] or not attested[chain]
         ]
         return tuple(found)
 
@@ -187,8 +202,14 @@ class TransitionTest:
         if len(moves.begins) == 0:
             return np.zeros(len(corpus.chains))
         chains = corpus.to_chains(np.asarray(corpus.rotations))
-        turned = np.degrees(rot.angle(chains[moves.begins], chains[moves.ends]))
-        return np.asarray((turned / moves.seconds[:, None]).max(axis=0))
+        angles = np.degrees(rot.angle(chains[moves.begins], chains[moves.ends]))
+        return np.asarray((angles / moves.seconds[:, None]).max(axis=0))
+
+    def _attested(self, before: Int32s, after: Int32s) -> Bools:
+        """Whether the corpus attests each chain's move from states [L] to states [L]; a chain may always stay [L]."""
+        graph = self.engine.grammar.transitions
+        pairs = enumerate(zip(before, after, strict=True))
+        return np.array([state == target or graph.edge(chain, state, target) >= 0 for chain, (state, target) in pairs])
 
     def _has_made(self, before: Int32s, after: Int32s) -> bool:
         """Whether a body of the corpus went from states [J] to states [J] of its joints."""
@@ -196,75 +217,121 @@ class TransitionTest:
         return bool(((states[moves.begins] == before).all(axis=1) & (states[moves.ends] == after).all(axis=1)).any())
 
 
-def judge(piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, posturewise: bool) -> list[Join]:
-    """What a corpus says of each posture k of a piece following on a posture i, for pairs (i, k)."""
-    court, name = TransitionTest(engine, posturewise), engine.corpus.name
-    return [Join(i, k, name, court.breaks(*piece.ends(i, k), float(piece.lasting[i]))) for i, k in pairs]
+def judge_transitions(
+    piece: Piece, pairs: Iterable[tuple[int, int]], engine: Engine, posturewise: bool
+) -> list[Transition]:
+    """Judge, for pairs (i, k), whether posture k of a piece may follow posture i.
+
+    Args:
+        piece: the piece.
+        pairs: numbers of two postures each.
+        engine: what was learned from the corpus that judges.
+        posturewise: whether whole bodies are judged, not each joint.
+
+    Raises:
+        SkeletonError: the piece is on another skeleton than the corpus.
+    """
+    test, name = TransitionTest(engine, posturewise), engine.corpus.name
+    return [
+        Transition(i, k, name, test.abrupt_joints(*piece.ends(i, k), float(piece.durations[i])), (), "", {})
+        for i, k in pairs
+    ]
 
 
-def check_asked(alternatives: int, asked: Mapping[str, Any]) -> None:
-    """Whether seams can be smoothed so, before it shows that any are to be.
+def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
+    """Check the options for smoothing seams, before it is known whether any seam needs it.
 
     Raises:
         MotionMindError: `alternatives` is out of its range.
-        TypeError: `Engine.tween` takes no argument of a name in `asked`.
+        TypeError: `Engine.tween` takes no argument of a name in `options`.
     """
-    whole("alternatives", alternatives, 1)
+    check_whole("alternatives", alternatives, 1)
     known = signature(Engine.tween).parameters.keys() - {"self", "a", "b", "unlike"}
-    for name in asked:
+    for name in options:
         if name not in known:
             raise TypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
 
 
-def smooth(
+def judge_and_smooth(
     piece: Piece,
-    joins: Iterable[Join],
+    pairs: Iterable[tuple[int, int]],
     engine: Engine,
     alternatives: int,
     *,
-    told: OnProgress | None = None,
+    posturewise: bool = False,
+    on_progress: OnProgress | None = None,
     watch: Watch | None = None,
-    **asked: Any,
-) -> tuple[Join, ...]:
-    """Those that are abrupt and pending with what the engine finds to go between, and all others as they are.
+    **options: Any,
+) -> tuple[Transition, ...]:
+    """Judge the transitions between pairs of a piece's postures, and find movement for those that are abrupt.
 
     Args:
         piece: the piece.
-        joins: what a corpus said of them.
-        engine: the corpus that they are smoothed by.
-        alternatives: how many ways to find for each; whole-body searches find one.
-        told: called before each with how many are done and how many there are.
-        watch: as for `Engine.tween`; once it returns True, what is left stays pending.
-        asked: the other arguments of `Engine.tween`.
+        pairs: numbers of two postures each, (from, to).
+        engine: what was learned from the corpus.
+        alternatives: how many movements to find for each; searches of whole bodies find one.
+        posturewise: whether whole bodies are judged and inserted.
+        on_progress: called before each search with how many are done and how many there are.
+        watch: as for `Engine.tween`; once it returns True, the remaining transitions stay pending.
+        options: the other arguments of `Engine.tween`.
+
+    Raises:
+        SkeletonError: the piece is on another skeleton than the corpus.
+        MotionMindError: an option is out of its range.
     """
-    joins, ended = list(joins), False
+    transitions = judge_transitions(piece, pairs, engine, posturewise)
+    options = {"posturewise": posturewise, **options}
+    ended = False
 
     def watching(so_far: Progress) -> bool:
         nonlocal ended
         ended = bool(watch and watch(so_far)) or ended
         return ended
 
-    waiting = [number for number, join in enumerate(joins) if join.is_pending]
-    for done, number in enumerate(waiting):
-        if told:
-            told(done, len(waiting))
-        join = joins[number]
-        a, b = piece.ends(join.start, join.end)
-        found: list[Tween] = []
+    pending = [number for number, transition in enumerate(transitions) if transition.is_pending]
+    for done, number in enumerate(pending):
+        if on_progress:
+            on_progress(done, len(pending))
+        transition = transitions[number]
+        a, b = piece.ends(transition.start, transition.end)
+        tweens: list[Tween] = []
         try:
-            for _ in range(1 if asked.get("posturewise") else alternatives):
-                found.append(engine.tween(a, b, **asked, unlike=found, watch=watching if watch else None))
+            for _ in range(1 if posturewise else alternatives):
+                tweens.append(engine.tween(a, b, **options, unlike=tweens, watch=watching if watch else None))
                 if ended:
                     break
         except NoPathError as error:
-            if not found and not ended:
-                joins[number] = replace(join, failure=str(error))
-        if found:
-            ways: dict[bytes, Tween] = {}
-            for tween in found:  # a corpus may know one way only: then the next one is the same
-                ways.setdefault(tween.path.tobytes(), tween)
-            plain = msgspec.to_builtins(found[0].asked, enc_hook=np.generic.item)
-            joins[number] = replace(join, candidates=tuple(map(Candidate.of, ways.values())), asked=plain)
+            if not tweens and not ended:
+                transitions[number] = msgspec.structs.replace(transition, failure=str(error))
+        if tweens:
+            transitions[number] = _with_candidates(transition, tweens)
         if ended:
             break
-    return tuple(joins)
+    return tuple(transitions)
+
+
+def _with_candidates(transition: Transition, tweens: Iterable[Tween]) -> Transition:
+    """The transition with the tweens as its candidates, each path once: a corpus may know one path only."""
+    distinct: dict[bytes, Tween] = {}
+    for tween in tweens:
+        distinct.setdefault(tween.path.tobytes(), tween)
+    first = next(iter(distinct.values()))
+    return msgspec.structs.replace(
+        transition,
+        candidates=tuple(map(_candidate_of, distinct.values())),
+        options=msgspec.to_builtins(first.asked, enc_hook=np.generic.item),
+    )
+
+
+def _candidate_of(tween: Tween) -> Candidate:
+    """What a variation keeps of a tween."""
+    return Candidate(
+        replace(tween.motion, name=""),
+        tween.path,
+        tween.status,
+        tween.cost,
+        tween.lower_bound,
+        tween.attested,
+        tween.bridges,
+        tween.waits,
+    )

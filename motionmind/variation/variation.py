@@ -1,12 +1,13 @@
-"""A variation of a piece: its postures in the order of a chaotic trajectory, smoothed by the engine, as reviewed."""
+"""A variation of a piece: its postures in the order of a chaotic trajectory, smoothed by the engine, and reviewed."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from motionmind._typing import Ints
@@ -17,43 +18,44 @@ from motionmind.chaos.trajectories import largest_exponent
 from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
-from motionmind.variation.arguments import number, numbers, whole
-from motionmind.variation.piece import Arranged, Piece
+from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
+from motionmind.variation.piece import Arrangement, Piece
+from motionmind.variation.report import report_of
 from motionmind.variation.review import (
     Approve,
     Cut,
     Discard,
     Edit,
     Replace,
+    ReviewState,
     Seam,
     Smooth,
-    State,
-    begun,
-    edited,
+    apply_edit,
+    initial_state,
 )
-from motionmind.variation.seams import Join, OnProgress, check_asked, judge, smooth
+from motionmind.variation.seams import OnProgress, Transition, check_asked, judge_and_smooth
 
-NUDGE = 0.1  # in a flow's own coordinates; ten times as much may begin elsewhere than with the first posture
+NUDGE = 0.1  # in a flow's own coordinates; with ten times as much a variation may not begin with the first posture
 SKIP = 10
 ALTERNATIVES = 3
 EXPONENT_STEPS = 200_000
-MOST_STEPS = 1_000_000_000  # of a transient, which take some minutes
+MOST_STEPS = 1_000_000_000  # of a transient: some minutes
 LONGEST = 1_000_000  # postures that a variation may have
 
 
 @dataclass(frozen=True)
 class Course:
-    """The trajectories that a variation was made by.
+    """The trajectories that a variation was made by, in d dimensions.
 
     Attributes:
         flow: the flow's name.
-        parameters: of the flow.
-        start: of the piece's trajectory, before its transient [d].
-        nudge: how far from there, once the transient is over, the variation's trajectory begins [d], as it was asked.
+        parameters: the flow's parameters, by name.
+        start: the start of the piece's trajectory, before its transient [d].
+        nudge: the offset, as asked for, between the starts of the two trajectories once the transient is over [d].
         skip: points of the trajectories that are left out between two postures.
-        step: of the integration.
-        transient: steps that are dropped of the piece's trajectory at first.
-        exponent: the flow's largest Lyapunov exponent, nats a unit of time, to within some percent.
+        step: the step of the integration, in the flow's units of time.
+        transient: steps that are dropped from the beginning of the piece's trajectory.
+        exponent: the flow's largest Lyapunov exponent, nats a unit of time, accurate to some percent.
     """
 
     flow: str
@@ -73,21 +75,22 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """A variation and its review. Nothing changes it: what edits it returns another one, or itself where the edit
-    changes nothing, which is no edit then.
+    """A variation and its review.
+
+    A variation never changes: an edit returns another one, or, if it makes no difference, this one, and is not kept.
 
     Attributes:
-        piece: what it is a variation of.
+        piece: the piece that it varies.
         course: the trajectories that it was made by.
-        order: the postures of the piece as these gave them [L].
-        joins: what a corpus said of the seams; nothing where none was asked.
-        edits: what was done to it since, in this order.
+        order: the postures of the piece as the trajectories gave them [L].
+        transitions: the judged transitions that it began with; none if no corpus was given.
+        edits: the edits since, in order.
     """
 
     piece: Piece
     course: Course
     order: Ints
-    joins: tuple[Join, ...] = ()
+    transitions: tuple[Transition, ...] = ()
     edits: tuple[Edit, ...] = ()
 
     def __post_init__(self) -> None:
@@ -96,78 +99,76 @@ class Variation:
             raise MotionMindError(f"a variation's order must name postures of the piece, 0 to {len(self.piece) - 1}")
         order.setflags(write=False)
         object.__setattr__(self, "order", order)
-        _ = self._state  # which raises where an edit does not fit
+        _ = self._state  # raises if an edit does not fit
 
     @cached_property
-    def _state(self) -> State:
-        state = begun(self.order, self.joins)
+    def _state(self) -> ReviewState:
+        state = initial_state(self.order, self.transitions)
         for edit in self.edits:
-            state = edited(state, edit)
+            state = apply_edit(state, edit)
         return state
 
     @property
     def postures(self) -> Ints:
-        """The postures of the piece in the order in which they are now [L]."""
+        """The postures of the piece in their present order [L]."""
         return self._state.postures
 
     @property
     def seams(self) -> tuple[Seam, ...]:
-        """Where it neither goes on as the piece does nor stays where it is, in the order in which that comes."""
+        """The places where it neither goes on as the piece does nor stays in its posture, in order."""
         return self._state.seams
 
     def motion(self) -> Motion:
-        """The movement as it stands: with all insertions but those that were discarded."""
-        return self.arranged().motion
+        """Return the movement as it stands: with all insertions but those that were discarded."""
+        return self.arrange().motion
 
-    def arranged(self) -> Arranged:
-        """The same, and which of its frames the postures are."""
-        found = {seam.at: seam.insertion.motion for seam in self.seams if seam.insertion}
-        return self.piece.arranged(self.postures, found)
+    def arrange(self) -> Arrangement:
+        """Return the movement as `motion` does, with the frame of each posture."""
+        insertions = {seam.at: seam.insertion.motion for seam in self.seams if seam.insertion}
+        return self.piece.arrange(self.postures, insertions)
 
     def report(self) -> dict[str, Any]:
-        """What it is made of, as plain values for JSON: all but the movement."""
-        seams, stays = [_plain(seam) for seam in self.seams], np.flatnonzero(np.diff(self.postures) == 0)
-        return {
-            "piece": {"name": self.piece.motion.name, "postures": len(self.piece), "facing": self.piece.facing},
-            "course": {
-                **asdict(self.course),
-                "start": list(self.course.start),
-                "nudge": list(self.course.nudge),
-                "parting": self.course.parting,
-            },
-            "order": self.postures.tolist(),
-            "counts": {
-                "postures": len(self.postures),
-                "seams": len(seams),
-                "inserted": sum(seam.insertion is not None for seam in self.seams),
-                "attested": sum(seam.join is not None and not seam.join.is_abrupt for seam in self.seams),
-                "abrupt": sum(seam.is_abrupt for seam in self.seams),
-                "unjudged": sum(seam.join is None for seam in self.seams),
-                "stays": len(stays),
-                "seconds_still": float(self.piece.lasting[self.postures[stays]].sum()),
-            },
-            "seams": seams,
-            "edits": len(self.edits),
-        }
+        """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
+        report: dict[str, Any] = msgspec.to_builtins(report_of(self))
+        return report
 
     # --- edits ------------------------------------------------------------------------------------------------------
 
     def approve(self, *seams: int) -> Variation:
-        """These seams are good as they are."""
-        return self._after(Approve(_numbers(seams)))
+        """Approve these seams, by number, as they are.
+
+        Raises:
+            MotionMindError: there is no seam of such a number.
+        """
+        return self._after(Approve(_check_seams(seams)))
 
     def discard(self, *seams: int) -> Variation:
-        """Without the insertions at these seams; MotionMindError where there is none."""
-        return self._after(Discard(_numbers(seams)))
+        """Leave out the insertions at these seams, by number.
+
+        Raises:
+            MotionMindError: there is no seam of such a number, or no insertion.
+        """
+        return self._after(Discard(_check_seams(seams)))
 
     def replace(self, seam: int, alternative: int) -> Variation:
-        """With another of the movements that the engine found for a seam, counted from 1; it is open again."""
-        return self._after(Replace(whole("a seam's number", seam), whole("an alternative's number", alternative)))
+        """Insert another of the movements that the engine found for a seam, counted from 1; the seam is open again.
+
+        Raises:
+            MotionMindError: there is no seam or no alternative of this number.
+        """
+        number = check_whole("a seam's number", seam)
+        return self._after(Replace(number, check_whole("an alternative's number", alternative)))
 
     def cut(self, first: int, last: int, before: int) -> Variation:
-        """With postures `first` to `last` before posture `before` instead, all as they are numbered now, from 0;
-        `before` may be the number of postures, which is the end. Seams keep their numbers, new ones get the next."""
-        return self._after(Cut(*(whole("a posture's number", posture) for posture in (first, last, before))))
+        """Move postures `first` to `last` before posture `before`.
+
+        All are numbered from 0 as they stand now; `before` may be the number of postures, which means the end. Seams
+        keep their numbers; new seams get the next ones.
+
+        Raises:
+            MotionMindError: there are no such postures, or `before` is one of those that move.
+        """
+        return self._after(Cut(*(check_whole("a posture's number", posture) for posture in (first, last, before))))
 
     def smooth(
         self,
@@ -175,82 +176,60 @@ class Variation:
         *,
         alternatives: int = ALTERNATIVES,
         posturewise: bool = False,
-        told: OnProgress | None = None,
+        on_progress: OnProgress | None = None,
         watch: Watch | None = None,
-        **asked: Any,
+        **options: Any,
     ) -> Variation:
-        """With the seams judged, and smoothed by the engine, that no corpus was asked about, that were not smoothed, or
-        whose insertions are discarded.
+        """Judge the seams that no corpus has judged, and smooth those that are abrupt and have no insertion.
 
-        What is found for these is open again. A transition that comes more than once is made anew where all its
-        insertions are discarded, and keeps what it had where nothing is found.
+        Seams whose insertion was discarded are smoothed anew. A transition that comes more than once is smoothed anew
+        only if its insertion is discarded wherever it comes, and keeps what it had if nothing is found. All seams with
+        new candidates are open again.
 
         Args:
-            engine: the corpus that says which of them are abrupt, and smooths those.
-            alternatives: how many movements to find for each.
-            posturewise: what is abrupt is told by whole bodies, and only whole bodies of the corpus are inserted.
-            told: called before each with how many are done and how many there are.
-            watch: as for `Engine.tween`; once it returns True, what is left stays as it is.
-            asked: the other arguments of `Engine.tween`.
+            engine: the corpus that judges and smooths.
+            alternatives: how many movements to find for each transition.
+            posturewise: whether to judge by whole bodies and insert only whole bodies of the corpus.
+            on_progress: called before each search with how many are done and how many there are.
+            watch: as for `Engine.tween`; once it returns True, the remaining seams stay as they are.
+            options: the other arguments of `Engine.tween`.
 
         Raises:
             SkeletonError: the piece is on another skeleton than the corpus.
             MotionMindError: an argument is out of its range.
             TypeError: there is no such argument.
         """
-        check_asked(alternatives, asked)
-        stands = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
-        known = {(seam.start, seam.end): seam.join for seam in self.seams}  # once however often it comes
-        left = [pair for pair, join in known.items() if pair not in stands and (join is None or join.is_abrupt)]
-        judged = judge(self.piece, left, engine, posturewise)
-        asked = {"posturewise": posturewise, **asked}
-        found = smooth(self.piece, judged, engine, alternatives, told=told, watch=watch, **asked)
-        news = tuple(join for join in found if join.tells_more_than(known[join.start, join.end]))
+        on_progress = take_renamed(options, "told", "on_progress", on_progress)
+        check_asked(alternatives, options)
+        inserted = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
+        known = {(seam.start, seam.end): seam.transition for seam in self.seams}  # once, however often it comes
+        left = [pair for pair, one in known.items() if pair not in inserted and (one is None or one.is_abrupt)]
+        judged = judge_and_smooth(
+            self.piece,
+            left,
+            engine,
+            alternatives,
+            posturewise=posturewise,
+            on_progress=on_progress,
+            watch=watch,
+            **options,
+        )
+        news = tuple(one for one in judged if one.tells_more_than(known[one.start, one.end]))
         return self._after(Smooth(news)) if news else self
 
     def undo(self) -> Variation:
-        """Without the last edit; MotionMindError where there is none."""
+        """Take back the last edit; MotionMindError if there is none."""
         if not self.edits:
             raise MotionMindError("there is no edit to undo")
         return replace(self, edits=self.edits[:-1])
 
     def _after(self, edit: Edit) -> Variation:
         after = replace(self, edits=(*self.edits, edit))
-        return self if self._state.shows(after._state) else after
+        return self if self._state.looks_like(after._state) else after
 
 
-def _numbers(seams: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(whole("a seam's number", seam) for seam in seams)
-
-
-def _plain(seam: Seam) -> dict[str, Any]:
-    """A seam as plain values."""
-    join = seam.join
-    return {
-        "number": seam.number,
-        "at": seam.at,
-        "start": seam.start,
-        "end": seam.end,
-        "decision": seam.decision,
-        "chosen": seam.chosen,
-        "corpus": join.corpus if join else None,
-        "breaks": [asdict(one) for one in join.breaks] if join else [],
-        "failure": join.failure if join else "",
-        "candidates": [
-            {
-                "moves": way.moves,
-                "seconds": float(way.motion.times[-1]),
-                "status": way.status,
-                "cost": way.cost,
-                "lower_bound": way.lower_bound,
-                "gap": way.gap,
-                "attested": way.attested,
-                "bridges": [asdict(bridge) for bridge in way.bridges],
-                "waits": [asdict(wait) for wait in way.waits],
-            }
-            for way in (join.candidates if join else ())
-        ],
-    }
+def _check_seams(seams: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(check_whole("a seam's number", seam) for seam in seams)
 
 
 def vary(
@@ -266,58 +245,76 @@ def vary(
     length: int | None = None,
     alternatives: int = ALTERNATIVES,
     posturewise: bool = False,
-    told: OnProgress | None = None,
+    on_progress: OnProgress | None = None,
     watch: Watch | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Variation:
-    """A variation of a piece: its postures in the order in which a trajectory passes the sites of another one.
+    """Vary a piece: order its postures as a trajectory passes the sites of another, nearby one.
+
+    The method is that of Bradley and Stuart, "Using chaos to generate variations on movement sequences", Chaos 8:800
+    (1998); see `motionmind.chaos.reorder`.
 
     Args:
         piece: the movement; every frame of a motion is a posture, `Piece.of` takes fewer.
-        engine: a corpus that says which transitions are abrupt, and smooths those; None leaves them as they are.
-        flow: whose trajectories they are.
-        nudge: how far the variation's trajectory begins from the piece's, in the flow's first coordinate or in each.
-        start: where the piece's trajectory begins, before its transient; the flow's own where None.
+        engine: the corpus that judges which transitions are abrupt, and smooths those; None leaves them as they are.
+        flow: the flow whose trajectories order the postures.
+        nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
+            coordinate, or one for each [d].
+        start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
         skip: points of the trajectories to leave out between two postures.
-        step: of the integration; the flow's own where None.
-        transient: steps that are dropped at first; the flow's own where None.
-        length: postures of the variation; as many as the piece's where None.
-        alternatives: see `Variation.smooth`, as are `posturewise`, `told`, `watch` and what else is `asked`.
+        step: the step of the integration, in the flow's units of time; None for the flow's own.
+        transient: steps to drop from the beginning; None for the flow's own.
+        length: postures of the variation; None for as many as the piece has.
+        alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
 
     Raises:
         MotionMindError: an argument is out of its range, or a trajectory diverges or settles.
         SkeletonError: the piece is on another skeleton than the corpus.
         TypeError: there is no such argument.
     """
-    check_asked(alternatives, asked)
+    on_progress = take_renamed(options, "told", "on_progress", on_progress)
+    check_asked(alternatives, options)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    if not isinstance(flow, Flow):
-        raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
-    skip = whole("skip", skip, 0, LONGEST)
-    length = whole("length", len(piece) if length is None else length, 1, LONGEST)
-    step = number("step", flow.step if step is None else step)
-    transient = whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
-    start = numbers("start", flow.start if start is None else start)
-    away = numbers("nudge", nudge)
-    if np.ndim(nudge) == 0:
-        away += (0.0,) * (len(flow.start) - 1)
-    found = itinerary(flow, len(piece), length, nudge=away, start=start, every=skip + 1, step=step, transient=transient)
-    course = Course(
-        flow.name,
-        dict(flow.parameters),
-        start,
-        away,
-        skip,
-        step,
-        transient,
-        # With the flow's own step and transient at least: tiny ones do not come to the attractor in so many steps.
-        round(largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step)), 4),
-    )
-    variation = Variation(piece, course, found.indices)
+    course, order = _order_postures(len(piece), flow, nudge, start, skip, step, transient, length)
+    variation = Variation(piece, course, order)
     if engine is None:
         return variation
-    # What it begins with is no edit, and cannot be undone.
-    edits = variation.smooth(
-        engine, alternatives=alternatives, posturewise=posturewise, told=told, watch=watch, **asked
-    ).edits
-    return replace(variation, joins=tuple(join for edit in edits if isinstance(edit, Smooth) for join in edit.joins))
+    transitions = judge_and_smooth(
+        piece,
+        dict.fromkeys((seam.start, seam.end) for seam in variation.seams),
+        engine,
+        alternatives,
+        posturewise=posturewise,
+        on_progress=on_progress,
+        watch=watch,
+        **options,
+    )
+    return replace(variation, transitions=transitions)
+
+
+def _order_postures(
+    count: int,
+    flow: Flow,
+    nudge: float | Sequence[float],
+    start: Sequence[float] | None,
+    skip: int,
+    step: float | None,
+    transient: int | None,
+    length: int | None,
+) -> tuple[Course, Ints]:
+    """The course that `vary` asks for, its arguments checked, and the order of `count` postures that it gives [L]."""
+    if not isinstance(flow, Flow):
+        raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
+    skip = check_whole("skip", skip, 0, LONGEST)
+    length = check_whole("length", count if length is None else length, 1, LONGEST)
+    step = check_number("step", flow.step if step is None else step)
+    transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
+    start = check_numbers("start", flow.start if start is None else start)
+    offset = check_numbers("nudge", nudge)
+    if np.ndim(nudge) == 0:
+        offset += (0.0,) * (len(flow.start) - 1)
+    found = itinerary(flow, count, length, nudge=offset, start=start, every=skip + 1, step=step, transient=transient)
+    # With the flow's own step at least: tiny steps do not reach the attractor in so many.
+    exponent = largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step))
+    course = Course(flow.name, dict(flow.parameters), start, offset, skip, step, transient, round(exponent, 4))
+    return course, found.indices

@@ -76,7 +76,7 @@ def test_a_nudge_that_is_no_point_is_refused(nudge: object) -> None:
 
 def test_sites_and_points_that_do_not_fit_are_refused() -> None:
     for sites, points in ((np.zeros((0, 3)), np.zeros((2, 3))), (np.zeros((2, 3)), np.zeros((2, 2)))):
-        with pytest.raises(MotionMindError, match="cannot be told by sites"):
+        with pytest.raises(MotionMindError, match="cannot be compared with sites"):
             reorder(sites, points)
     with pytest.raises(MotionMindError, match="finite"):
         reorder(np.zeros((2, 3)), np.full((1, 3), np.nan))

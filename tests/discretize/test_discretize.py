@@ -24,7 +24,7 @@ from motionmind.discretize import (
     QuaternionGrid,
     StateSpace,
     from_spec,
-    make,
+    make_discretization,
     parse_library,
     read_library,
     to_spec,
@@ -166,7 +166,7 @@ class TestEveryKind:
 @pytest.mark.parametrize("kind", ["codebook", "quaternion", "euler"])
 def test_every_sample_lies_within_the_tolerance(kind: str, tolerance: float) -> None:
     q = random_rotations(400, 4)
-    space = make(kind, tolerance).fit(NAMES, q)
+    space = make_discretization(kind, tolerance).fit(NAMES, q)
     # The grids stop widening at some point, which keeps the promise all the more.
     assert np.allclose(space.tolerances, tolerance if kind == "codebook" or tolerance < 120.0 else space.tolerances[0])
     assert space.tolerances.max() <= tolerance + SLACK
@@ -328,33 +328,35 @@ class TestMake:
     def test_per_joint_tolerances(self) -> None:
         q = random_rotations(200, 4)
         for kind in ("codebook", "quaternion", "euler"):
-            space = make(kind, 30.0, {"left_hip": 10.0, "hip": 20.0}).fit(NAMES, q)
+            space = make_discretization(kind, 30.0, {"left_hip": 10.0, "hip": 20.0}).fit(NAMES, q)
             assert np.allclose(space.tolerances, [30.0, 10.0, 20.0, 30.0])
             assert np.all(space.distance(q, space.assign(q)).max(axis=0) <= space.tolerances + SLACK)
 
     @pytest.mark.parametrize("kind", ["codebook", "quaternion", "euler", "human23"])
     def test_an_unknown_joint_is_named_with_the_one_meant(self, kind: str) -> None:
         with pytest.raises(SkeletonError, match=r"'left_hpi'.*did you mean left_hip"):
-            make(kind, 15.0, {"left_hpi": 10.0}).fit(human23().names, random_rotations(9, 23))
+            make_discretization(kind, 15.0, {"left_hpi": 10.0}).fit(human23().names, random_rotations(9, 23))
 
     @pytest.mark.parametrize("kind", ["codebook", "quaternion", "euler", "human23"])
     @pytest.mark.parametrize("tolerance", [0.0, -1.0, 181.0, float("nan"), float("inf"), "15", True, None])
     def test_what_is_no_tolerance_is_refused_in_degrees(self, kind: str, tolerance: object) -> None:
         with pytest.raises(MotionMindError, match="degrees"):
-            make(kind, tolerance)  # type: ignore[arg-type]
+            make_discretization(kind, tolerance)  # type: ignore[arg-type]
         with pytest.raises(MotionMindError, match="left_hip"):
-            make(kind, 15.0, {"left_hip": tolerance})  # type: ignore[dict-item]
+            make_discretization(kind, 15.0, {"left_hip": tolerance})  # type: ignore[dict-item]
 
     def test_an_unknown_kind_names_the_known_ones(self) -> None:
         with pytest.raises(FormatError, match=r"human23.*did you mean codebook"):
-            make("codebok")
+            make_discretization("codebok")
         with pytest.raises(FormatError, match=r"nowhere\.toml"):
-            make("nowhere.toml")
+            make_discretization("nowhere.toml")
 
     def test_a_library_by_name_and_by_file(self, tmp_path: Path) -> None:
         (tmp_path / "small.toml").write_text(SMALL)
-        assert make(str(tmp_path / "small.toml"), 20.0) == ExpertLibrary(parse_library(SMALL), 20.0)
-        assert make("human23", 20.0) == from_spec({"kind": "library", "library": "human23", "tolerance": 20.0})
+        assert make_discretization(str(tmp_path / "small.toml"), 20.0) == ExpertLibrary(parse_library(SMALL), 20.0)
+        assert make_discretization("human23", 20.0) == from_spec(
+            {"kind": "library", "library": "human23", "tolerance": 20.0}
+        )
 
     @pytest.mark.parametrize(
         "spec",
@@ -582,5 +584,5 @@ def test_real_movement_needs_few_states(dance: tuple[tuple[str, ...], np.ndarray
     assert distance.mean() < tolerance / 3.0
     assert 100 < space.sizes.max() <= most
     for kind in ("quaternion", "euler"):
-        grid = make(kind, tolerance).fit(names, q)
+        grid = make_discretization(kind, tolerance).fit(names, q)
         assert grid.distance(q, grid.assign(q)).max() <= tolerance + SLACK

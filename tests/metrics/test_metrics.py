@@ -27,12 +27,12 @@ from motionmind.metrics import (
     arrivals,
     find_feet,
     find_floor,
-    find_habits,
-    find_phrases,
     fit_style_classifier,
     foot_slide,
     l2p,
     l2q,
+    learn_habits,
+    learn_phrases,
     npss,
     position_spread,
     seen,
@@ -295,7 +295,7 @@ def test_arrivals_are_the_first_postures_after_which_nothing_changes(seed: int) 
 
 
 def test_of_the_corpus_itself_all_is_attested_and_the_mean_percentile_is_fifty(engine: Engine) -> None:
-    habits = find_habits(engine.grammar)
+    habits = learn_habits(engine.grammar)
     paths = own_paths(engine)
     assert all(habits.attested(path).all() for path in paths)
     assert np.concatenate([habits.percentiles(path) for path in paths]).mean() == pytest.approx(50.0)
@@ -307,7 +307,7 @@ def test_of_the_corpus_itself_all_is_attested_and_the_mean_percentile_is_fifty(e
 
 
 def test_cliches_are_the_most_frequent_moves_where_there_is_a_choice(engine: Engine) -> None:
-    habits = find_habits(engine.grammar)
+    habits = learn_habits(engine.grammar)
     seen: dict[tuple[int, int], Counter[int]] = {}
     for path in own_paths(engine):
         for before, after in pairwise(path.tolist()):
@@ -325,7 +325,7 @@ def test_cliches_are_the_most_frequent_moves_where_there_is_a_choice(engine: Eng
 
 
 def test_a_move_that_nobody_made_is_no_cliche(engine: Engine) -> None:
-    habits, graph = find_habits(engine.grammar), engine.grammar.transitions
+    habits, graph = learn_habits(engine.grammar), engine.grammar.transitions
     path = own_paths(engine)[0][:2].copy()
     chain = 5
     known = {int(b) for a, b in pairwise(own_paths(engine)[0][:, chain]) if a == path[0, chain]}
@@ -341,7 +341,7 @@ def test_a_move_that_nobody_made_is_no_cliche(engine: Engine) -> None:
 
 
 def test_a_clip_is_copied_whole_from_itself_and_not_without_it(engine: Engine) -> None:
-    book = find_phrases(engine.corpus, np.asarray(engine.states))
+    book = learn_phrases(engine.corpus, np.asarray(engine.states))
     for number, path in enumerate(own_paths(engine)):
         assert book.runs(path) == [len(path)]
         assert all(book.copied(path, size, n) == 1.0 for size in book.groups for n in range(1, 6))
@@ -350,7 +350,7 @@ def test_a_clip_is_copied_whole_from_itself_and_not_without_it(engine: Engine) -
 
 
 def test_what_is_copied_falls_with_the_length_and_the_size_of_what_is_compared(engine: Engine) -> None:
-    book = find_phrases(engine.corpus, np.asarray(engine.states))
+    book = learn_phrases(engine.corpus, np.asarray(engine.states))
     path = own_paths(engine)[1]
     shares = {size: [book.copied(path, size, n, 1) for n in range(1, 6)] for size in ("joint", "limb", "body")}
     for found in shares.values():
@@ -360,7 +360,7 @@ def test_what_is_copied_falls_with_the_length_and_the_size_of_what_is_compared(e
 
 
 def test_runs_end_where_clips_do(engine: Engine) -> None:
-    book = find_phrases(engine.corpus, np.asarray(engine.states))
+    book = learn_phrases(engine.corpus, np.asarray(engine.states))
     first, second = own_paths(engine)[:2]
     strange = first[:1].copy()
     strange[0] = (strange[0] + 1) % engine.space.sizes
@@ -386,22 +386,22 @@ def wavers(rng: np.random.Generator, pace: float, count: int = 4) -> dict[str, l
 
 def test_style_is_told_by_how_joints_move_and_not_by_where_they_are() -> None:
     rng = np.random.default_rng(3)
-    judge = fit_style_classifier({"slow": wavers(rng, 0.4), "fast": wavers(rng, 1.6)}, 60)
-    found = judge.table(0)
+    classifier = fit_style_classifier({"slow": wavers(rng, 0.4), "fast": wavers(rng, 1.6)}, 60)
+    found = classifier.table(0)
     for shares in found.values():
         assert shares["held out"] > 0.8  # 95 % at most, as what is too far off is taken for nothing
         assert shares["shuffle"] < 0.1
         assert shares["slerp"] < 0.1
-    sequence, real = next(judge.held_out("slow"))
+    sequence, real = next(classifier.held_out("slow"))
     away = rot.mul(rot.exp(np.array([1.0, -2.0, 0.5])), real)
-    assert judge.takes(away, "slow", sequence) == judge.takes(real, "slow", sequence)
-    assert judge.table(0) == found
+    assert classifier.takes(away, "slow", sequence) == classifier.takes(real, "slow", sequence)
+    assert classifier.table(0) == found
 
 
 def test_of_two_corpora_in_one_style_each_is_taken_for_the_other_as_often() -> None:
     rng = np.random.default_rng(5)
-    judge = fit_style_classifier({"one": wavers(rng, 1.0, 12), "other": wavers(rng, 1.0, 12)}, 60)
-    for shares in judge.table(0).values():
+    classifier = fit_style_classifier({"one": wavers(rng, 1.0, 12), "other": wavers(rng, 1.0, 12)}, 60)
+    for shares in classifier.table(0).values():
         assert 0.25 < shares["held out"] < 0.75
 
 

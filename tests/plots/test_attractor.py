@@ -372,7 +372,7 @@ def test_the_page_follows_the_variation_on_its_attractor(browser: Any, tmp_path:
         if tab.evaluate("!!window.motionmind?.attractor"):
             break
         tab.wait_for_timeout(20)
-    times = variation.motion().times[variation.arranged().frames]
+    times = variation.motion().times[variation.arrange().frames]
     found = tab.evaluate(
         "motionmind.attractor.times.map(time => (motionmind.player.seek(time), motionmind.attractor.posture))"
     )

@@ -64,7 +64,7 @@ def edit(variation: Variation, engine: Engine, what: str, how: object) -> Variat
     if what == "smooth":
         return variation.smooth(engine, alternatives=1, max_moves=how)
     if what == "replace":
-        many = [seam for seam in variation.seams if seam.join and len(seam.join.candidates) > 1]
+        many = [seam for seam in variation.seams if seam.transition and len(seam.transition.candidates) > 1]
         seam = many[how % len(many)]  # type: ignore[operator]
         return variation.replace(seam.number, 3 - seam.chosen)
     numbers = inserted(variation)
@@ -102,7 +102,9 @@ def test_undo_takes_back_one_edit_after_another(
 
 
 def test_undone_movement_is_what_it_was_to_the_last_bit(variation: Variation) -> None:
-    first, second, *_ = (seam.number for seam in variation.seams if seam.join and len(seam.join.candidates) == 2)
+    first, second, *_ = (
+        seam.number for seam in variation.seams if seam.transition and len(seam.transition.candidates) == 2
+    )
     one = variation.discard(first).replace(second, 2).cut(4, 9, 30).undo().undo().undo().motion()
     assert np.array_equal(one.rotations, variation.motion().rotations)
     assert np.array_equal(one.times, variation.motion().times)
@@ -128,13 +130,13 @@ def test_the_result_is_all_insertions_but_those_discarded(variation: Variation) 
 
 
 def test_another_alternative_stands_in_its_place_and_is_open_again(variation: Variation) -> None:
-    seam = next(one for one in variation.seams if one.join and len(one.join.candidates) == 2)
+    seam = next(one for one in variation.seams if one.transition and len(one.transition.candidates) == 2)
     found = variation.discard(seam.number).replace(seam.number, 2)
     (now,) = (one for one in found.seams if one.number == seam.number)
     assert (now.decision, now.chosen) == ("open", 2)
-    assert seam.join
-    assert now.insertion is seam.join.candidates[1]
-    longer = seam.join.candidates[1].motion.times[-1] - seam.join.candidates[0].motion.times[-1]
+    assert seam.transition
+    assert now.insertion is seam.transition.candidates[1]
+    longer = seam.transition.candidates[1].motion.times[-1] - seam.transition.candidates[0].motion.times[-1]
     assert found.motion().times[-1] == pytest.approx(variation.motion().times[-1] + longer)
 
 
@@ -157,7 +159,7 @@ def test_cut_and_paste_moves_postures_and_loses_none(variation: Variation, cut: 
     for seam in found.seams:
         assert seam.number > len(old) or old[seam.number] == (seam.start, seam.end)
     assert len({seam.number for seam in found.seams}) == len(found.seams)
-    motion, frames = found.arranged()
+    motion, frames = found.arrange()
     assert np.array_equal(motion.rotations[frames, 1:], found.piece.motion.rotations[found.postures, 1:])
 
 
@@ -165,13 +167,15 @@ def test_new_seams_are_not_judged_until_they_are_smoothed(variation: Variation, 
     found = variation.cut(5, 9, 60)
     new = {seam.number for seam in found.seams} - {seam.number for seam in variation.seams}
     assert new
-    assert {seam.number for seam in found.seams if seam.join is None} <= new
+    assert {seam.number for seam in found.seams if seam.transition is None} <= new
     smoothed = found.approve(inserted(found)[0]).smooth(karate, alternatives=1)
-    assert all(seam.join and not seam.is_abrupt for seam in smoothed.seams)
+    assert all(seam.transition and not seam.is_abrupt for seam in smoothed.seams)
     assert decided(smoothed) == decided(smoothed.undo())
     assert smoothed.smooth(karate) is smoothed
     # What is known of a transition is known wherever it comes.
-    assert not [seam for seam in smoothed.cut(0, 0, LENGTH).cut(LENGTH - 1, LENGTH - 1, 0).seams if seam.join is None]
+    assert not [
+        seam for seam in smoothed.cut(0, 0, LENGTH).cut(LENGTH - 1, LENGTH - 1, 0).seams if seam.transition is None
+    ]
 
 
 def test_what_changes_nothing_is_no_edit(variation: Variation) -> None:
@@ -201,14 +205,14 @@ def test_a_discarded_insertion_is_made_anew_and_is_open(variation: Variation, ka
     gone = next(
         seam
         for seam in variation.seams
-        if seam.join and len(seam.join.candidates) == 2 and transitions.count((seam.start, seam.end)) == 1
+        if seam.transition and len(seam.transition.candidates) == 2 and transitions.count((seam.start, seam.end)) == 1
     )
     kept = next(number for number in inserted(variation) if number != gone.number)
     without = variation.approve(kept).replace(gone.number, 2).discard(gone.number)
     found = without.smooth(karate, alternatives=1, novelty=1.0)
     now = {seam.number: seam for seam in found.seams}
     assert (now[gone.number].decision, now[gone.number].chosen) == ("open", 1)
-    assert now[gone.number].join.asked["novelty"] == 1.0  # type: ignore[union-attr]
+    assert now[gone.number].transition.options["novelty"] == 1.0  # type: ignore[union-attr]
     assert now[gone.number].insertion is not gone.insertion
     others = {number: seam.insertion for number, seam in now.items() if number != gone.number}
     assert others == {seam.number: seam.insertion for seam in without.seams if seam.number != gone.number}
@@ -221,7 +225,7 @@ def test_a_discarded_insertion_is_made_anew_and_is_open(variation: Variation, ka
 def test_what_stands_elsewhere_is_not_made_anew(variation: Variation, karate: Engine) -> None:
     seam = next(one for one in variation.seams if one.insertion)
     order = np.array([seam.start, seam.end, seam.start, seam.end])
-    twice = replace(variation, order=order, joins=()).smooth(karate, alternatives=1)
+    twice = replace(variation, order=order, transitions=()).smooth(karate, alternatives=1)
     first, *_, last = (one.number for one in twice.seams if (one.start, one.end) == (seam.start, seam.end))
     some = twice.discard(first)
     assert some.smooth(karate, novelty=1.0) is some
@@ -265,7 +269,7 @@ def file(variation: Variation, tmp_path: Path) -> Path:
 
 def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, variation: Variation) -> None:
     first, second, third, *_ = inserted(variation)
-    two = next(seam.number for seam in variation.seams if seam.join and len(seam.join.candidates) == 2)
+    two = next(seam.number for seam in variation.seams if seam.transition and len(seam.transition.candidates) == 2)
     original = file.read_bytes()
     listed = run("review", file, "--list")
     assert listed.code == 0

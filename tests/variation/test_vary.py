@@ -27,7 +27,7 @@ from motionmind.search.solve import Progress
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Smooth
-from motionmind.variation.seams import BODY, Join, judge
+from motionmind.variation.seams import BODY, Transition, judge_transitions
 from motionmind.variation.variation import Variation, vary
 from motionmind.variation.variation_json import read_variation, write_variation
 
@@ -96,7 +96,7 @@ def test_every_posture_is_the_pieces_own_turned_about_the_vertical_at_most(
     kata: Piece, order: np.ndarray, facing: str
 ) -> None:
     piece = Piece(kata.motion, kata.frames, facing)  # type: ignore[arg-type]
-    motion, frames = piece.arranged(order, {})
+    motion, frames = piece.arrange(order, {})
     own = piece.motion
     assert np.array_equal(motion.rotations[frames, 1:], own.rotations[order, 1:])
     assert np.array_equal(motion.root[frames, 1], own.root[order, 1])
@@ -108,7 +108,7 @@ def test_every_posture_is_the_pieces_own_turned_about_the_vertical_at_most(
 
 @given(order=orders)
 def test_steps_are_the_pieces_in_the_bodys_heading_and_nothing_teleports(kata: Piece, order: np.ndarray) -> None:
-    motion, frames = kata.arranged(order, {})
+    motion, frames = kata.arrange(order, {})
     own, root = kata.motion, motion.root[frames][:, [0, 2]]
     headings, faced = rot.heading(motion.rotations[frames, 0]), rot.heading(own.rotations[:, 0])
     for n, (i, k) in enumerate(pairwise(order)):
@@ -133,7 +133,7 @@ def test_a_pieces_own_insertions_are_marked_where_the_whole_of_them_comes(
     marks = tuple(Insertion(times[span.start : span.stop], (("pelvis", 0),)) for span in ranges)
     piece = Piece(replace(kata.motion, insertions=marks), kata.frames)
     order = np.concatenate([order, np.arange(30, 80)])
-    motion, frames = piece.arranged(order, {})
+    motion, frames = piece.arrange(order, {})
     here = [
         (n, span)
         for n, first in enumerate(order)
@@ -151,14 +151,14 @@ def test_what_stays_is_counted_with_the_time_that_it_takes(kata: Piece, smoothed
     counts = Variation(kata, smoothed.course, order).report()["counts"]
     moving = [n for n, (i, k) in enumerate(pairwise(order)) if i != k]
     assert counts["stays"] == len(order) - 1 - len(moving)
-    motion, frames = kata.arranged(order, {})
+    motion, frames = kata.arrange(order, {})
     lasting = np.diff(motion.times[frames])
     assert counts["seconds_still"] == pytest.approx(lasting.sum() - lasting[moving].sum(), abs=1e-9)
 
 
 @given(order=orders)
 def test_a_posture_lasts_as_long_as_in_the_piece(kata: Piece, order: np.ndarray) -> None:
-    motion, frames = kata.arranged(order, {})
+    motion, frames = kata.arrange(order, {})
     lasting = np.append(np.diff(kata.motion.times), np.diff(kata.motion.times)[-1])
     np.testing.assert_allclose(np.diff(motion.times[frames]), lasting[order[:-1]], atol=1e-9)
 
@@ -175,7 +175,7 @@ def test_a_recording_keeps_its_frames_between_postures(
     assert same(vary(piece, nudge=0.0).motion(), recording.slice(0, len(piece.motion)))
     start = min(start, len(piece) - 1)
     order = np.array([len(piece) - 1, *range(start, len(piece))])
-    motion, frames = piece.arranged(order, {})
+    motion, frames = piece.arrange(order, {})
     after = slice(int(frames[1]), None)
     assert np.array_equal(motion.rotations[after, 1:], piece.motion.rotations[piece.frames[start] :, 1:])
     assert recording.times[-1] - piece.motion.times[-1] < 1.0 / min(rate, 30.0) + 1e-9
@@ -185,7 +185,7 @@ def test_pieces_of_one_and_two_postures(kata: Piece, karate: Engine) -> None:
     for count in (1, 2):
         piece = Piece.of(kata.motion.slice(0, count))
         variation = vary(piece, karate, length=9)
-        motion, frames = variation.arranged()
+        motion, frames = variation.arrange()
         assert len(variation.postures) == 9
         assert np.array_equal(motion.rotations[frames, 1:], piece.motion.rotations[variation.postures, 1:])
 
@@ -234,6 +234,29 @@ def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate:
         still.smooth(karate, nonsense=3)
 
 
+def test_the_former_keyword_told_still_works_and_says_what_to_use(kata: Piece, karate: Engine) -> None:
+    short = Piece.of(kata.motion.slice(0, 12))
+    calls: list[tuple[int, int]] = []
+    options = {"flow": FLOWS["chua"], "nudge": 1.0, "alternatives": 1}
+
+    def note(done: int, of: int) -> None:
+        calls.append((done, of))
+
+    bare = vary(short, **{name: options[name] for name in ("flow", "nudge")})  # type: ignore[arg-type]
+    vary(short, karate, **options, on_progress=note)  # type: ignore[arg-type]
+    expected, calls[:] = [*calls], []
+    assert expected[0] == (0, len(expected))
+    with pytest.warns(DeprecationWarning, match="the keyword told is deprecated: use on_progress") as caught:
+        vary(short, karate, **options, told=note)  # type: ignore[arg-type]
+    assert caught[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match="use on_progress") as caught:
+        bare.smooth(karate, alternatives=1, told=note)
+    assert caught[0].filename == __file__
+    assert calls == 2 * expected
+    with pytest.raises(TypeError, match="told is the former name of on_progress"):
+        bare.smooth(karate, told=note, on_progress=note)
+
+
 # --- what is abrupt -------------------------------------------------------------------------------------------------
 
 
@@ -251,7 +274,7 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
     )
     fastest = (angles / corpus.moves.seconds[:, None]).max(axis=0)
     bodies = {(states[b, :-1].tobytes(), states[e, :-1].tobytes()) for b, e in zip(begins, ends, strict=True)}
-    joined, whole = judge(piece, pairs, macarena, False), judge(piece, pairs, macarena, True)
+    joined, whole = (judge_transitions(piece, pairs, macarena, posturewise) for posturewise in (False, True))
     assert any(not join.is_abrupt for join in joined)
     for join, body in zip(joined, whole, strict=True):
         i, k = join.start, join.end
@@ -262,21 +285,21 @@ def test_abrupt_is_what_no_move_of_the_corpus_shows(macarena: Engine) -> None:
                 (Rotation.from_quat(chains[i, chain]).inv() * Rotation.from_quat(chains[k, chain])).magnitude()
             )
             unknown = states[i, chain] != states[k, chain] and (states[i, chain], states[k, chain]) not in seen
-            limit = 1.000001 * max(macarena.space.tolerances[chain], fastest[chain] * piece.lasting[i])
+            limit = 1.000001 * max(macarena.space.tolerances[chain], fastest[chain] * piece.durations[i])
             if unknown or turned > limit:
                 expected[name] = (not unknown, turned > limit)
-        assert {one.joint: (one.attested, one.fast) for one in join.breaks} == expected
+        assert {one.joint: (one.attested, one.fast) for one in join.abrupt_joints} == expected
         fast = {name for name, (_, fast) in expected.items() if fast}
         known = (states[i, :-1].tobytes(), states[k, :-1].tobytes()) in bodies or (
             states[i, :-1] == states[k, :-1]
         ).all()
-        assert {one.joint for one in body.breaks} == fast | (set() if known else {BODY})
+        assert {one.joint for one in body.abrupt_joints} == fast | (set() if known else {BODY})
 
 
 def test_the_piece_follows_itself_as_its_own_corpus_knows(macarena: Engine) -> None:
     piece = piece_of(macarena, "macarena")
     for posturewise in (False, True):
-        found = judge(piece, list(pairwise(range(len(piece)))), macarena, posturewise)
+        found = judge_transitions(piece, list(pairwise(range(len(piece)))), macarena, posturewise)
         turning = [join for join in found if join.is_abrupt]
         # Its own turns are taken out at a seam, where a body goes on facing as it did.
         assert not turning
@@ -290,7 +313,7 @@ def test_a_piece_on_another_body_is_refused(kata: Piece) -> None:
 # --- what smooths it ------------------------------------------------------------------------------------------------
 
 
-def unattested(join: Join, engine: Engine, which: int) -> set[tuple[str, int]]:
+def unattested(join: Transition, engine: Engine, which: int) -> set[tuple[str, int]]:
     """The moves of joints in a candidate that the corpus was not seen to make, but for waits."""
     states, moves = engine.states, engine.corpus.moves
     way, found = join.candidates[which], set()
@@ -303,7 +326,7 @@ def unattested(join: Join, engine: Engine, which: int) -> set[tuple[str, int]]:
 
 
 def test_smoothing_leaves_nothing_unattested_unless_it_says_so(smoothed: Variation, karate: Engine) -> None:
-    abrupt = [seam.join for seam in smoothed.seams if seam.join and seam.join.is_abrupt]
+    abrupt = [seam.transition for seam in smoothed.seams if seam.transition and seam.transition.is_abrupt]
     assert len(abrupt) > 10
     assert not any(seam.is_abrupt for seam in smoothed.seams)
     for join in abrupt:
@@ -322,13 +345,17 @@ def test_strictly_all_is_attested_or_named(kata: Piece, karate: Engine) -> None:
     assert failed
     assert any(seam.insertion for seam in found.seams)
     for seam in found.seams:
-        assert seam.join
-        assert not any(way.bridges for way in seam.join.candidates)
-        assert seam.insertion or not seam.is_abrupt or ("no path" in seam.join.failure and seam.join.breaks)
+        assert seam.transition
+        assert not any(way.bridges for way in seam.transition.candidates)
+        assert (
+            seam.insertion
+            or not seam.is_abrupt
+            or ("no path" in seam.transition.failure and seam.transition.abrupt_joints)
+        )
 
 
 def test_insertions_lead_from_posture_to_posture(smoothed: Variation) -> None:
-    motion, frames = smoothed.arranged()
+    motion, frames = smoothed.arrange()
     piece = smoothed.piece
     inserted = [seam for seam in smoothed.seams if seam.insertion]
     assert len(motion.insertions) == len(inserted)
@@ -365,9 +392,9 @@ def test_a_search_that_is_ended_leaves_the_rest_to_be_smoothed(
         return True
 
     some = vary(kata, karate, flow=FLOWS["rossler"], alternatives=2, watch=ended)
-    pending = [seam for seam in some.seams if seam.join and seam.join.is_pending]
+    pending = [seam for seam in some.seams if seam.transition and seam.transition.is_pending]
     assert pending
-    assert not any(seam.join and seam.join.failure for seam in some.seams)
+    assert not any(seam.transition and seam.transition.failure for seam in some.seams)
     again = some.smooth(karate, alternatives=2)
     assert not any(seam.is_abrupt for seam in again.seams)
     assert [(seam.number, seam.at) for seam in again.seams] == [(seam.number, seam.at) for seam in smoothed.seams]
@@ -376,7 +403,7 @@ def test_a_search_that_is_ended_leaves_the_rest_to_be_smoothed(
 def test_a_stage_piece_keeps_its_orientation_and_another_corpus_may_smooth_it(kata: Piece, macarena: Engine) -> None:
     piece = Piece.of(kata.motion, facing="stage")
     found = vary(piece, macarena, flow=FLOWS["rossler"], length=30, alternatives=1)
-    motion, frames = found.arranged()
+    motion, frames = found.arrange()
     assert any(seam.insertion for seam in found.seams)
     assert np.array_equal(motion.rotations[frames], piece.motion.rotations[found.postures])
 
@@ -431,8 +458,8 @@ def test_what_is_no_variation_is_refused(smoothed: Variation, tmp_path: Path) ->
 
 def test_insertions_that_do_not_lead_where_they_should_are_refused(smoothed: Variation, tmp_path: Path) -> None:
     path = tmp_path / "variation.json"
-    joins = tuple(join for join in smoothed.joins if len(join.candidates) == 2)[:2]
-    write_variation(path, replace(smoothed, joins=joins, edits=(Smooth(joins),)))
+    joins = tuple(join for join in smoothed.transitions if len(join.candidates) == 2)[:2]
+    write_variation(path, replace(smoothed, transitions=joins, edits=(Smooth(joins),)))
     whole = json.loads(path.read_text())
     first, join = 1, joins[1]
     last = len(smoothed.piece) - 1

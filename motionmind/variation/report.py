@@ -1,0 +1,176 @@
+"""The report of a variation: what it is made of, all but the movement, as a schema for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from motionmind.corpus.corpus import Facing
+from motionmind.search.solve import Status
+from motionmind.tween.certificate import Bridge, Wait
+from motionmind.variation.review import Decision, Seam
+from motionmind.variation.seams import AbruptJoint, Candidate
+
+if TYPE_CHECKING:
+    from motionmind.variation.variation import Course, Variation
+
+
+class PieceReport(msgspec.Struct, frozen=True):
+    """The piece: its name, its number of postures, and whether it may face anywhere ("free") or not ("stage")."""
+
+    name: str
+    postures: int
+    facing: Facing
+
+
+class CourseReport(msgspec.Struct, frozen=True):
+    """The trajectories (see `Course`); `parting` in nats, on average, from one posture to the next."""
+
+    flow: str
+    parameters: Mapping[str, float]
+    start: list[float]
+    nudge: list[float]
+    skip: int
+    step: float
+    transient: int
+    exponent: float
+    parting: float
+
+
+class CountsReport(msgspec.Struct, frozen=True):
+    """The numbers of postures and seams of a variation as it stands.
+
+    Attributes:
+        postures: postures.
+        seams: seams.
+        inserted: seams with an insertion.
+        attested: seams that their corpus knows.
+        abrupt: seams that are abrupt and not smoothed.
+        unjudged: seams that no corpus has judged.
+        stays: steps that stay in their posture.
+        seconds_still: the duration of these, seconds.
+    """
+
+    postures: int
+    seams: int
+    inserted: int
+    attested: int
+    abrupt: int
+    unjudged: int
+    stays: int
+    seconds_still: float
+
+
+class CandidateReport(msgspec.Struct, frozen=True):
+    """A candidate for an insertion (see `InsertionCandidate`): its length in moves and seconds, and its certificate."""
+
+    moves: int
+    seconds: float
+    status: Status
+    cost: float
+    lower_bound: float
+    gap: float
+    attested: float
+    bridges: list[Bridge]
+    waits: list[Wait]
+
+
+class SeamReport(msgspec.Struct, frozen=True):
+    """A seam (see `Seam`) with its transition (see `JudgedTransition`), whose corpus is None if none has judged it."""
+
+    number: int
+    at: int
+    start: int
+    end: int
+    decision: Decision
+    chosen: int
+    corpus: str | None
+    abrupt_joints: list[AbruptJoint] = msgspec.field(name="breaks")
+    failure: str
+    candidates: list[CandidateReport]
+
+
+class VariationReport(msgspec.Struct, frozen=True):
+    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits."""
+
+    piece: PieceReport
+    course: CourseReport
+    order: list[int]
+    counts: CountsReport
+    seams: list[SeamReport]
+    edits: int
+
+
+def report_of(variation: Variation) -> VariationReport:
+    """Report what a variation is made of: all but the movement."""
+    piece, order = variation.piece, variation.postures
+    return VariationReport(
+        PieceReport(piece.motion.name, len(piece), piece.facing),
+        _course_report(variation.course),
+        order.tolist(),
+        _counts_report(variation),
+        list(map(_seam_report, variation.seams)),
+        len(variation.edits),
+    )
+
+
+def _course_report(course: Course) -> CourseReport:
+    return CourseReport(
+        course.flow,
+        dict(course.parameters),
+        list(course.start),
+        list(course.nudge),
+        course.skip,
+        course.step,
+        course.transient,
+        course.exponent,
+        course.parting,
+    )
+
+
+def _counts_report(variation: Variation) -> CountsReport:
+    order, seams = variation.postures, variation.seams
+    stays = np.flatnonzero(np.diff(order) == 0)
+    return CountsReport(
+        postures=len(order),
+        seams=len(seams),
+        inserted=sum(seam.insertion is not None for seam in seams),
+        attested=sum(seam.transition is not None and not seam.transition.is_abrupt for seam in seams),
+        abrupt=sum(seam.is_abrupt for seam in seams),
+        unjudged=sum(seam.transition is None for seam in seams),
+        stays=len(stays),
+        seconds_still=float(variation.piece.durations[order[stays]].sum()),
+    )
+
+
+def _seam_report(seam: Seam) -> SeamReport:
+    transition = seam.transition
+    return SeamReport(
+        seam.number,
+        seam.at,
+        seam.start,
+        seam.end,
+        seam.decision,
+        seam.chosen,
+        transition.corpus if transition else None,
+        list(transition.abrupt_joints) if transition else [],
+        transition.failure if transition else "",
+        list(map(_candidate_report, transition.candidates)) if transition else [],
+    )
+
+
+def _candidate_report(candidate: Candidate) -> CandidateReport:
+    return CandidateReport(
+        candidate.moves,
+        float(candidate.motion.times[-1]),
+        candidate.status,
+        candidate.cost,
+        candidate.lower_bound,
+        candidate.gap,
+        candidate.attested,
+        list(candidate.bridges),
+        list(candidate.waits),
+    )
