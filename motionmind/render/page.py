@@ -1,6 +1,6 @@
 """A motion as a page: one HTML file that plays it in any browser, from disk, without a network.
 
-The player's modules and three.js lie in `player/`, as they were written; there is no build step. A page opened from
+The player's modules and three.js (in `vendor/`) lie in `player/`, as they were written; there is no build step. A page opened from
 disk may not load one file from another, so each module goes into the page as a data: URL, and an import map says which
 name is which. The page forbids itself every request.
 """
@@ -71,7 +71,7 @@ def _modules(start: str) -> str:
     sources = {f"motionmind/{file.stem}": file.read_bytes() for file in sorted(_PLAYER.glob("*.js"))}
     sources[f"motionmind/{start}"] = (_PLAYER / f"{start}.js").read_bytes()
     for name, file in _THREE.items():
-        sources[name] = (_PLAYER / "three" / file).read_bytes().replace(_CORE, b'from"three/core"')
+        sources[name] = (_PLAYER / "vendor" / file).read_bytes().replace(_CORE, b'from"three/core"')
     urls = {name: f"data:text/javascript;charset=utf-8;base64,{base64_of(source)}" for name, source in sources.items()}
     return msgspec.json.encode({"imports": urls}).decode()
 
