@@ -50,10 +50,10 @@ def write_attractor(path: FilePath, variation: Variation) -> None:
 
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
-    >>> from motionmind import FLOWS, compose, vary
-    >>> piece = compose("corpora/macarena/macarena.score")
+    >>> from motionmind import compose, flow_of, vary
+    >>> piece = compose("corpora/macarena/macarena.score").slice(0, 40)
     >>> with TemporaryDirectory() as folder:
-    ...     write_attractor(Path(folder) / "rossler.svg", vary(piece, flow=FLOWS["rossler"]))
+    ...     write_attractor(Path(folder) / "rossler.svg", vary(piece, flow=flow_of("rossler")))
     ...     (Path(folder) / "rossler.svg").read_text()[:4]
     '<svg'
     """

@@ -45,11 +45,10 @@ def write_picture(
 
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
-    >>> from motionmind import human23, write_picture
-    >>> from motionmind.body.motion import Posture
-    >>> from motionmind.geometry.rotations import IDENTITY
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, write_picture
     >>> body = human23()
-    >>> posture = Posture(body, [IDENTITY] * len(body), [0.0, 0.95, 0.0])
+    >>> posture = Posture(body, np.tile([0.0, 0.0, 0.0, 1.0], (len(body), 1)), np.array([0.0, 0.95, 0.0]))
     >>> with TemporaryDirectory() as folder:
     ...     write_picture(Path(folder) / "rest.png", posture.as_motion(), view="front", size=240)
     ...     (Path(folder) / "rest.png").read_bytes()[1:4]

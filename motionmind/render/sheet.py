@@ -78,13 +78,12 @@ def contact_sheet(
         MotionMindError: there are no frames to draw, more than 400, or one that the motion does not have; or the side
             or the number of columns is invalid.
 
-    >>> from motionmind import contact_sheet, human23
-    >>> from motionmind.body.motion import Posture
-    >>> from motionmind.geometry.rotations import IDENTITY
+    >>> import numpy as np
+    >>> from motionmind import Posture, contact_sheet, human23
     >>> body = human23()
-    >>> posture = Posture(body, np.tile(IDENTITY, (len(body), 1)), np.array([0.0, 0.95, 0.0]))
+    >>> posture = Posture(body, np.tile([0.0, 0.0, 0.0, 1.0], (len(body), 1)), np.array([0.0, 0.95, 0.0]))
     >>> contact_sheet(posture.as_motion()).size
-    (240, 312)
+    (339, 378)
     """
     if side not in ("right", "left") or (columns is not None and columns < 1):
         raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")
