@@ -12,7 +12,7 @@ from motionmind.plots.portrait import Portrait
 from motionmind.render.page import base64_of, page_beside
 from motionmind.render.palette import PIECE, VARIATION
 
-_THINNED = 50  # every so many points of the sheets are enough to show the attractor
+_THINNED = 50  # every 50th point of the sheets is enough to show the attractor
 
 
 def attractor_page(portrait: Portrait) -> str:

@@ -81,13 +81,13 @@ class Field:
         yield from self._figures_and_numbers()
 
     def _cells(self) -> Iterator[Mark]:
-        found = smooth(outlines(self.cells))
-        areas = found.areas()
+        regions = smooth(outlines(self.cells))
+        areas = regions.areas()
         for n in np.argsort(-np.abs(areas), kind="stable"):  # regions in a hole lie over it
-            one, posture = found.only(np.arange(len(areas)) == n), int(found.labels[n])
+            outline, posture = regions.only(np.arange(len(areas)) == n), int(regions.labels[n])
             hole = areas[n] < 0.0
             yield Region(
-                one,
+                outline,
                 self.corner,
                 PAPER if hole else symbols.tint(int(self.visits[posture])),
                 EDGE,

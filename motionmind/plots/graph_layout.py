@@ -22,7 +22,7 @@ LETTERS, TITLE = 11, 17  # heights of the letters of names and of the heading, p
 MARGIN = 40.0  # pixels around the picture
 
 _STEP = 90.0  # usual distance between states that a transition joins, pixels
-_APART = 14.0  # least gap between circles, pixels, plus so many for each letter of an average name:
+_APART = 14.0  # least gap between circles, pixels, plus this for each letter of an average name:
 _APART_A_LETTER = 1.6
 _ON_RING = 64.0  # distance between states of the facing, pixels
 _SMALL, _LARGE = 5.0, 20.0  # radii of the least and of the most visited state, pixels
@@ -174,12 +174,12 @@ def _place_component(part: nx.Graph, states: Sequence[int], orientations: Floats
     start = vectors[:, -2:] * np.sqrt(np.maximum(values[-2:], 1e-9))
     # The sign of an eigenvector is arbitrary; fix it.
     start *= np.where(start[np.abs(start).argmax(axis=0), [0, 1]] < 0.0, -1.0, 1.0)
-    found = nx.kamada_kawai_layout(
+    layout = nx.kamada_kawai_layout(
         part,
         dist={s: dict(zip(states, far[row[s]], strict=True)) for s in states},
         pos=dict(zip(states, start, strict=True)),
     )
-    places = np.array([found[state] for state in states])
+    places = np.array([layout[state] for state in states])
     apart = np.linalg.norm(places[a] - places[b], axis=1)
     places *= _STEP / max(float(np.median(apart)), 1e-9)
     # The longest extent lies across the page.
@@ -210,7 +210,7 @@ def _place_names(places: Floats, radii: Floats, names: Sequence[str]) -> list[Po
         For each name the middle of its left edge, pixels; None if there is no room.
     """
     boxes = np.concatenate([places - radii[:, None], places + radii[:, None]], axis=1)  # left, top, right, bottom
-    found: list[Point | None] = [None] * len(names)
+    places_of_names: list[Point | None] = [None] * len(names)
     for number in np.argsort(-radii, kind="stable"):
         (x, y), r, long, half = places[number], radii[number] + 3.0, _long(names[number]), 0.5 * LETTERS + 1.0
         for left, middle in (
@@ -220,10 +220,10 @@ def _place_names(places: Floats, radii: Floats, names: Sequence[str]) -> list[Po
             box = np.array([left, middle - half, left + long, middle + half])
             covers = (boxes[:, :2] < box[2:]).all(axis=1) & (boxes[:, 2:] > box[:2]).all(axis=1)
             if left > 0.0 and not covers.any():
-                found[number] = (float(left), float(middle))
+                places_of_names[number] = (float(left), float(middle))
                 boxes = np.concatenate([boxes, box[None]])
                 break
-    return found
+    return places_of_names
 
 
 def _orientations(graph: nx.DiGraph, states: Sequence[int]) -> Floats:

@@ -125,9 +125,9 @@ class Portrait:
         at = np.empty((len(rows), along.shape[1]))
         at[:, across], at[:, up] = (corner + (np.stack([columns, rows], axis=1) + 0.5) / [scale, -scale]).T
         at[:, left_out] = hidden[rows, columns]
-        found = np.full((height, width), EMPTY, dtype=np.int16)
-        found[rows, columns] = reorder(self.sites, at)
-        return found
+        postures = np.full((height, width), EMPTY, dtype=np.int16)
+        postures[rows, columns] = reorder(self.sites, at)
+        return postures
 
     @property
     def _towards(self) -> float:
@@ -176,13 +176,13 @@ def portrait_of(variation: Variation) -> Portrait:
     other = trajectory(
         flow, begin, count=(len(variation.order) - 1) * every + 1, every=1, step=course.step, transient=0
     )
-    found = Portrait(variation, flow, every, piece, other)
-    if not np.array_equal(reorder(found.sites, found.points), variation.order):
+    portrait = Portrait(variation, flow, every, piece, other)
+    if not np.array_equal(reorder(portrait.sites, portrait.points), variation.order):
         raise MotionMindError(
             f"the trajectories of {flow.label} give another order here than this variation has: it was made by another "
             "flow of that name, or where numbers round otherwise; vary the piece anew to see it"
         )
-    return found
+    return portrait
 
 
 @jit
@@ -217,7 +217,7 @@ def _nearest(along: Floats, towards: float, width: int, height: int) -> Floats:
 def _spread(shown: Floats, towards: float, disc: Ints) -> Floats:
     """Spread to each pixel the nearest values [H, W, d - 2] among those at the row and column offsets `disc` [K, 2]."""
     height, width, _ = shown.shape
-    found = np.full_like(shown, np.nan)
+    spread = np.full_like(shown, np.nan)
     for row in range(height):
         for column in range(width):
             best, best_y, best_x = -np.inf, -1, -1
@@ -226,5 +226,5 @@ def _spread(shown: Floats, towards: float, disc: Ints) -> Floats:
                 if 0 <= y < height and 0 <= x < width and towards * shown[y, x, 0] > best:
                     best, best_y, best_x = towards * shown[y, x, 0], y, x
             if best_y >= 0:
-                found[row, column] = shown[best_y, best_x]
-    return found
+                spread[row, column] = shown[best_y, best_x]
+    return spread

@@ -17,7 +17,7 @@ LETTERS, SMALL = 13, 10  # heights of letters, pixels
 
 
 def tint(times: int) -> Colour:
-    """Return the colour of a cell that the variation visits so many times."""
+    """Return the colour of a cell that the variation visits `times` times."""
     return mixed(VARIATION, min(0.07 + 0.08 * times, 0.4), CELL) if times else CELL
 
 

@@ -1,7 +1,7 @@
 """Smooth lines as quadratic B-splines with few control points, and as the data of SVG paths.
 
 SVG can write such a spline as the middles of its control polygon's sides alone: each control point is the one before
-mirrored at the middle between them, which is what the command `t` stands for.
+mirrored at the middle between them, as the command `t` means.
 """
 
 from __future__ import annotations

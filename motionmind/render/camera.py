@@ -19,7 +19,7 @@ SMOOTH = 2  # samples a pixel, each way
 # Shares of the picture's height:
 _MARGIN = 0.06  # the free edge around the body
 _TALL = 0.80  # the largest extent of a body, which leaves room for its path
-_FLAT = 0.6  # the least height of a picture, by the height asked for
+_FLAT = 0.6  # the least height of a picture, by the height that `aim` is given
 _WIDE = 2.0  # the greatest width of a picture
 
 

@@ -62,7 +62,7 @@ class Ground:
         self.step = 10.0 ** round(log10(height / human23().height))
 
     def picture(self, line: float) -> Pixels:
-        """Draw the floor with nobody on it [H, W, 3], RGB; `line` is the width of the grid's lines, pixels."""
+        """Draw the empty floor [H, W, 3], RGB; `line` is the width of the grid's lines, pixels."""
         camera = self.camera
         picture = np.tile(np.array(PAPER, dtype=np.float32), (camera.height, camera.width, 1))
         y, x = np.mgrid[: camera.height, : camera.width].astype(np.float32) + np.float32(0.5)

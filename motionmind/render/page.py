@@ -53,7 +53,7 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
     Args:
         motion: the motion, on any skeleton.
         folder: a folder of `player/` with `beside.html`, `beside.css` and `beside.js`.
-        data: what that module reads, as `beside` in the page's data.
+        data: the data that this module reads, as `beside` in the page's data.
     """
     style, beside = (_text(f"{folder}/beside.{suffix}") for suffix in ("css", "html"))
     return _filled(motion, {**_data(motion, 0), "beside": data}, f"{folder}/beside", style, beside)

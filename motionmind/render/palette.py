@@ -30,7 +30,7 @@ SHEET_GROUND: Colour = (240, 237, 233)
 SHEET_FRAME: Colour = (214, 210, 206)
 SHEET_PALE: Colour = (118, 114, 112)  # words of less weight
 PLUMB: Colour = (30, 140, 90)  # the centre of mass, and the line from it to the floor
-SUNK: Colour = (214, 0, 132)  # what is under the floor
+SUNK: Colour = (214, 0, 132)  # body parts under the floor
 
 # Plots.
 PLOT_PALE: Colour = (110, 106, 104)  # words of less weight, and axes

@@ -97,7 +97,7 @@ def png(picture: Image.Image) -> bytes:
     """Encode a contact sheet as PNG, in 256 colours."""
     data = BytesIO()
     # 256 colours take a third of the bytes and look the same. Of the methods to choose them, median cut loses rare
-    # ones, as of what is under the floor, and maximum coverage tints the ground; an octree keeps both. A quarter of
+    # ones, as of feet under the floor, and maximum coverage tints the ground; an octree keeps both. A quarter of
     # the pixels suffices to choose by.
     quarter = picture.resize((ceil(picture.width / 2), ceil(picture.height / 2)), Image.Resampling.NEAREST)
     palette = quarter.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
@@ -164,7 +164,7 @@ class _Sheet:
         self.plan = window_around(ABOVE, halves[0], near, far, scale) if far > near else None
 
     def picture(self, columns: int | None) -> Image.Image:
-        """Draw the whole sheet, with so many postures a row."""
+        """Draw the whole sheet, `columns` postures a row, or about a screen's shape."""
         count = len(self.frames)
         wide = sum(window.width for window in self.windows)
         tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION)

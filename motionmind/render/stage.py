@@ -28,7 +28,7 @@ from motionmind.render.view import VIEWS, to_view
 
 SMALLEST, LARGEST = 120, 2160  # height of a picture, pixels
 GHOST = 0.22  # opacity of ghosts
-_STRIP = 3.4  # height of the caption, by that of its letters
+_STRIP = 3.4  # height of the caption, by its letters'
 _SMALL_BODY = 0.6  # a body curled up smaller than this, by its height, is not magnified
 _MOMENT = 1e-6  # seconds: closer times are equal
 _BLOCK = 64  # frames whose solids are placed at once
@@ -58,7 +58,7 @@ class FigurePlate:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What stays during an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
+    """The layers that stay during an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
 
     insertion: Insertion | None
     backdrop: Pixels
@@ -108,7 +108,7 @@ class Stage:
             id(insertion): ends for insertion in motion.insertions if (ends := _ends(motion, insertion)) is not None
         }
         self._block: tuple[int, tuple[Cones, Ellipsoids]] | None = None  # the last block of frames, and its solids
-        self._last_scene: _Scene | None = None  # that of the last insertion
+        self._last_scene: _Scene | None = None  # of the last insertion
 
         self.line = max(SMOOTH, round(SMOOTH * size / 480))
         self.letters, self.thick = max(10, round(0.026 * size)), max(2, round(size / 160))
@@ -244,7 +244,7 @@ class Stage:
 
     @cached_property
     def _empty(self) -> _Scene:
-        """The stage with nobody on it."""
+        """The empty stage."""
         size = self.camera.height, self.camera.width
         paper = np.full((*size, 3), PAPER, dtype=np.uint8)
         picture = self.ground.picture(0.6 * self.line) if self.ground else paper

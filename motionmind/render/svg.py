@@ -224,7 +224,7 @@ class _Artist:
         return f'<g transform="scale({1 / _FINE:g})" fill="{hexadecimal(SHADOW)}">{text}</g>' if text else ""
 
     def _path(self, lines: Lines, corner: Corner, samples: int = SMOOTH) -> str:
-        """Return the path data of lines in samples, so many a pixel, from a corner (x, y) of the picture, pixels."""
+        """Return the path data of lines, `samples` a pixel, from a corner (x, y) of the picture, pixels."""
         return path(smooth(lines), _FINE / samples, np.multiply(corner, _FINE))
 
     def _words(self, number: int) -> str:

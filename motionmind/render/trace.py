@@ -188,15 +188,15 @@ def _ridges(parts: Int16s, depth: Singles, step: float) -> tuple[Floats, Indices
 @jit
 def _next(parts: Int16s, rises: Singles, x: int, y: int, to: int, step: float) -> tuple[int, int, int]:
     """Find the side that continues a side, or direction -1; of the same part, unless only that one is faint."""
-    found, best, left = (x, y, -1), 0, (to + 3) % 4
+    following, best, left = (x, y, -1), 0, (to + 3) % 4
     ahead_x, ahead_y = x + _X[to], y + _Y[to]
     for then in ((x, y, (to + 1) % 4), (ahead_x, ahead_y, to), (ahead_x + _X[left], ahead_y + _Y[left], left)):
         rise = rises[then[1], then[0], then[2]]
         if rise > _FAINT * step:
             score = 1 + 2 * int(rise > step) + int(parts[then[1], then[0]] == parts[y, x])
             if score > best:
-                found, best = then, score
-    return found
+                following, best = then, score
+    return following
 
 
 @jit
