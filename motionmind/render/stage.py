@@ -58,7 +58,7 @@ class FigurePlate:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """The layers that stay during an insertion: the backdrop [H, W, 3], where no ghost covers it [H, W], and the ghosts."""
+    """The layers that stay during an insertion: backdrop [H, W, 3], where no ghost covers it [H, W], and ghosts."""
 
     insertion: Insertion | None
     backdrop: Pixels
