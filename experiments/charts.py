@@ -1,4 +1,4 @@
-"""Charts as SVG: panels side by side, lines and dots over numbers."""
+"""Charts as SVG: panels side by side, with lines and dots on two axes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
-COLOURS = ("#1f6f8b", "#c0562a", "#5b8c3a", "#7d4f9e", "#b08a1e", "#444444", "#d0558f", "#2e9c8f")
-WIDTH, HEIGHT = 330, 250
-LEFT, RIGHT, TOP, BOTTOM = 52, 12, 30, 42
+from motionmind.render.markup import hexadecimal
+from motionmind.render.palette import SERIES
+
+WIDTH, HEIGHT = 330, 250  # of a panel, pixels
+LEFT, RIGHT, TOP, BOTTOM = 52, 12, 30, 42  # its margins, pixels
 
 
 @dataclass
 class Panel:
-    """One pair of axes, with series of points [(x, y), ...] by name; `log` has x on a logarithmic axis. Where x is
-    but a place it is not `numbered`."""
+    """One pair of axes and the series on them.
+
+    Attributes:
+        title, x, y: titles of the panel and its axes.
+        series: points (x, y) by name; those that are not finite are left out.
+        log: whether the x axis is logarithmic.
+        joined: whether lines join the points of a series.
+        numbered: whether the x axis has numbers.
+    """
 
     title: str
     x: str
@@ -27,12 +36,12 @@ class Panel:
 
 
 def svg(panels: Sequence[Panel], columns: int = 3) -> str:
-    """The panels in rows of so many, and below them what each colour is."""
+    """Draw panels in rows of `columns`, with one legend below them."""
     names = list(dict.fromkeys(name for panel in panels for name in panel.series))
-    colour = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
+    colour = {name: hexadecimal(SERIES[i % len(SERIES)]) for i, name in enumerate(names)}
     columns = min(columns, len(panels))
     rows = math.ceil(len(panels) / columns)
-    legend, x, y = [], 12.0, rows * HEIGHT + 18
+    legend, x, y = [], 12.0, rows * HEIGHT + 18  # pixels
     for name in names:
         length = 26 + 6.6 * len(name)
         if x + length > columns * WIDTH:
@@ -52,6 +61,7 @@ def svg(panels: Sequence[Panel], columns: int = 3) -> str:
 
 
 def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
+    """Draw one panel at the origin, in the colours of the series."""
     points = [p for series in panel.series.values() for p in series if all(map(math.isfinite, p))] or [(1.0, 0.0)]
     xs = [math.log10(x) if panel.log else x for x, _ in points]
     ys = [y for _, y in points]
@@ -66,21 +76,8 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
         up = (y - y0) / (y1 - y0) if y1 > y0 else 0.5
         return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
-    out = [f'<text x="{LEFT}" y="18" font-weight="bold">{escape(panel.title)}</text>']
-    for tick in y_ticks:
-        _, y = at(x0, tick)
-        out.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="#e4e4e4"/>')
-        out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
-    for tick in x_ticks if panel.numbered else ():
-        x, _ = at(tick, y0)
-        shown = 10.0**tick if panel.log else tick
-        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.4g}</text>')
-    middle = (LEFT + WIDTH - RIGHT) / 2
-    out.append(f'<text x="{middle}" y="{HEIGHT - 10}" text-anchor="middle" fill="#666">{escape(panel.x)}</text>')
-    out.append(
-        f'<text transform="translate(11 {HEIGHT / 2 - 8}) rotate(-90)" text-anchor="middle" fill="#666">'
-        f"{escape(panel.y)}</text>"
-    )
+    x_places = [(tick, at(tick, y0)[0]) for tick in (x_ticks if panel.numbered else ())]
+    out = _axes(panel, x_places, [(tick, at(x0, tick)[1]) for tick in y_ticks])
     for name, series in panel.series.items():
         kept = [(math.log10(x) if panel.log else x, y) for x, y in series if math.isfinite(x) and math.isfinite(y)]
         places = [at(*point) for point in kept]
@@ -91,8 +88,26 @@ def _panel(panel: Panel, colour: dict[str, str]) -> list[str]:
     return out
 
 
+def _axes(panel: Panel, x_ticks: Sequence[tuple[float, float]], y_ticks: Sequence[tuple[float, float]]) -> list[str]:
+    """Draw the titles and the ticks of a panel; of each tick the number and its place, pixels."""
+    out = [f'<text x="{LEFT}" y="18" font-weight="bold">{escape(panel.title)}</text>']
+    for tick, y in y_ticks:
+        out.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="#e4e4e4"/>')
+        out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
+    for tick, x in x_ticks:
+        shown = 10.0**tick if panel.log else tick
+        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.4g}</text>')
+    middle = (LEFT + WIDTH - RIGHT) / 2
+    out.append(f'<text x="{middle}" y="{HEIGHT - 10}" text-anchor="middle" fill="#666">{escape(panel.x)}</text>')
+    out.append(
+        f'<text transform="translate(11 {HEIGHT / 2 - 8}) rotate(-90)" text-anchor="middle" fill="#666">'
+        f"{escape(panel.y)}</text>"
+    )
+    return out
+
+
 def _ticks(low: float, high: float) -> list[float]:
-    """Some five round numbers that reach from below `low` to above `high`."""
+    """Choose about five round numbers from `low` or below to `high` or above."""
     if high - low < 1e-12:
         half = 0.05 * abs(low) or 0.5
         low, high = low - half, high + half
@@ -104,8 +119,10 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def _apart(values: list[float]) -> list[float]:
-    """Those of increasing values that can be written side by side: on a logarithmic axis the numbers that there are
-    say more than powers of ten."""
+    """Choose, of increasing values, those with room to be written side by side.
+
+    On a logarithmic axis the values themselves say more than powers of ten.
+    """
     room = 30.0 / (WIDTH - LEFT - RIGHT) * (values[-1] - values[0])
     kept = values[:1]
     for value in values[1:]:

@@ -44,14 +44,13 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     more, such as which states of the joint's parent go with a state. States that no move leads to or from are left out
     of pictures.
     """
-    from motionmind.plots.joint_graph import GRAPHS, write_graph
+    from motionmind.plots.joint_graph import GRAPHS, write_joint_graph
     from motionmind.tween.engine import Engine
 
     check_outputs([(output, GRAPHS)], [])
-    found = Engine.load(corpus, home).joint_graph(joint)
-    write_graph(output, found)
-    alone = sum(not any(other != state for other in (*found.succ[state], *found.pred[state])) for state in found)
+    drawn = write_joint_graph(output, Engine.load(corpus, home), joint)
+    alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
-        f"{output}: {joint}, {len(found)} states, {found.number_of_edges()} transitions; "
+        f"{output}: {joint}, {len(drawn)} states, {drawn.number_of_edges()} transitions; "
         f"{alone} states that none joins to another"
     )

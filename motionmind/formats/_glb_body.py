@@ -12,19 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
+from motionmind.body.mirror import MIDDLE, sides_of
+from motionmind.body.palette import FRONT_COLOUR, SIDE_COLOURS, Colour
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
 FRONT = "front"
 
-# sRGB, as in the pictures: warm is left, cool is right.
-COLOURS: Mapping[str, tuple[int, int, int]] = {
-    LEFT: (222, 98, 66),
-    RIGHT: (62, 118, 190),
-    MIDDLE: (168, 164, 160),
-    FRONT: (255, 226, 120),
-}
+COLOURS: Mapping[str, Colour] = {**SIDE_COLOURS, FRONT: FRONT_COLOUR}
 
 # The prism's section: corners about the bone, starting at its front, in degrees. The two faces beside the first corner
 # are the ridge, narrow enough that a limb seen from the front still shows its side's colour.

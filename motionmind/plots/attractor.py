@@ -1,7 +1,7 @@
-"""The picture of a variation on its attractor, after figures 3 and 4 of Bradley and Stuart, Chaos 8:800 (1998).
+"""A variation on its attractor as a picture, after figures 3 and 4 of Bradley and Stuart, Chaos 8:800 (1998).
 
 Above, the attractor with the cell of each posture, both trajectories, and some of the postures; below, both
-itineraries: which posture comes when, where they part, and where the variation jumps.
+itineraries: the posture at each time, the point where they part, and the variation's jumps.
 """
 
 from __future__ import annotations
@@ -15,52 +15,47 @@ import numpy as np
 
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
-from motionmind.plots.canvas import (
-    Dot,
-    Line,
-    Mark,
-    Plate,
-    Point,
-    Words,
-    font,
-    mixed,
-    png,
-    svg,
-)
+from motionmind.plots import symbols
+from motionmind.plots.brush import Point, font, mixed
+from motionmind.plots.canvas import Plate, png, svg
 from motionmind.plots.cells import HEIGHT, TOP, WIDTH, Field
+from motionmind.plots.marks import Dot, Line, Mark, Words
 from motionmind.plots.portrait import Portrait, portrait_of
-from motionmind.plots.symbols import (
-    EDGE,
-    INK,
-    LETTERS,
-    OTHER,
-    PALE,
-    PIECE,
-    SMALL,
-    jump,
-    pair,
-    parting,
-    reading,
-    round_numbers,
-    site,
-    tint,
-)
+from motionmind.plots.symbols import LETTERS, SMALL
+from motionmind.render.palette import EDGE, INK, PIECE, PLOT_PALE, VARIATION
 from motionmind.variation.variation import Variation
 
-ATTRACTORS = (".png", ".svg", ".html")  # how the files end that `write_attractor` writes
+ATTRACTORS = (".png", ".svg", ".html")  # suffixes that `write_attractor` writes
 
-_MARGIN = 44.0  # pixels
-_TITLE = 24  # height of its letters
+# In pixels:
+_MARGIN = 44.0
+_TITLE = 24  # height of the title's letters
 _UNDER = 80.0  # between the attractor and the itineraries
-_GRAPH = 330.0  # height of these
+_GRAPH = 330.0  # height of the itineraries
 
 
 def write_attractor(path: FilePath, variation: Variation) -> None:
-    """Draw a variation on its attractor, as `.png`, as `.svg`, or as `.html`, a page in which it turns and dances.
+    """Write a picture of a variation on its attractor (`.png`, `.svg`), or a page with both in motion (`.html`).
+
+    A picture has both trajectories, the cell of each posture, some of the postures, and both itineraries; in `.svg`
+    details show under the pointer. On the page the attractor turns in three dimensions, and a body dances beside it.
+
+    Args:
+        path: the file.
+        variation: the variation, as from `vary` or `read_variation`.
 
     Raises:
-        MotionMindError: the suffix is none of these, the attractor cannot be found again (see `portrait_of`), or the
+        MotionMindError: the suffix is unknown, the trajectories cannot be computed again (see `portrait_of`), or the
             file cannot be written.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from motionmind import compose, flow_of, vary
+    >>> piece = compose("corpora/macarena/macarena.score").slice(0, 40)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_attractor(Path(folder) / "rossler.svg", vary(piece, flow=flow_of("rossler")))
+    ...     (Path(folder) / "rossler.svg").read_text()[:4]
+    '<svg'
     """
     suffix = Path(path).suffix.lower()
     if suffix not in ATTRACTORS:
@@ -76,7 +71,7 @@ def write_attractor(path: FilePath, variation: Variation) -> None:
 
 
 def attractor(portrait: Portrait) -> Plate:
-    """All that is in the picture of a variation on its attractor."""
+    """Draw a portrait of a variation: the heading, the attractor, and the itineraries."""
     field = Field(portrait)
     marks = [*_heading(portrait), *field.marks(), *_itineraries(portrait, TOP + HEIGHT + _UNDER)]
     height = ceil(TOP + HEIGHT + _UNDER + _GRAPH + 2 * _MARGIN)
@@ -89,22 +84,33 @@ def _title(portrait: Portrait) -> str:
 
 
 def _heading(portrait: Portrait) -> Iterator[Mark]:
-    """What it is, and what is what."""
+    """Yield the title, a summary and the legend."""
     course, count = portrait.variation.course, len(portrait.sites)
     yield Words((_MARGIN, _MARGIN), _title(portrait), _TITLE, INK)
     nudge = ", ".join(f"{value:.4g}" for value in course.nudge)
-    told = f"{_many(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
+    summary = f"{_count(count, 'posture')}, a site each, {portrait.every} steps of {course.step:g} apart. "
     if portrait.parting is None:
-        told += f"The variation begins ({nudge}) beside the piece and stays with it to its end"
-        told += f"; then it jumps {_many(len(portrait.jumps), 'time')}." if portrait.jumps else "."
+        summary += f"The variation begins ({nudge}) beside the piece and stays with it to its end"
+        summary += f"; then it jumps {_count(len(portrait.jumps), 'time')}." if portrait.jumps else "."
     else:
-        told += (
+        summary += (
             f"The variation begins ({nudge}) beside the piece, parts from it after "
-            f"{_many(portrait.parting, 'posture')} of {len(portrait.points)}, "
-            f"and jumps {_many(len(portrait.jumps), 'time')}."
+            f"{_count(portrait.parting, 'posture')} of {len(portrait.points)}, "
+            f"and jumps {_count(len(portrait.jumps), 'time')}."
         )
-    yield Words((_MARGIN, _MARGIN + 30), told, LETTERS, INK)
-    x, y = _MARGIN, _MARGIN + 60
+    yield Words((_MARGIN, _MARGIN + 30), summary, LETTERS, INK)
+    yield from _legend(_MARGIN, _MARGIN + 60)
+    yield Words(
+        (_MARGIN, _MARGIN + 84),
+        "The cells are those of the map, in all coordinates, where they cut the attractor; of its sheets that lie "
+        "behind one another the one nearest to the viewer is drawn. Coordinates have no unit.",
+        LETTERS,
+        PLOT_PALE,
+    )
+
+
+def _legend(x: float, y: float) -> Iterator[Mark]:
+    """Yield the signs of the picture and their meanings, in a line from a point on."""
     for swatch, words in (
         ("piece", "the piece, a site for each posture"),
         ("other", "the variation: at each point the posture in whose cell it is"),
@@ -115,34 +121,27 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
         line = np.array([[x, y], [x + 26, y]])
         if swatch == "piece":
             yield Line(line, PIECE, 2.6)
-            yield site((x + 13, y), 3.0)
+            yield symbols.site((x + 13, y), 3.0)
         elif swatch == "other":
-            yield Line(line, OTHER, 1.3)
-            yield reading((x + 13, y), 2.4)
+            yield Line(line, VARIATION, 1.3)
+            yield symbols.point((x + 13, y), 2.4)
         elif swatch == "jump":
-            yield jump((x + 13, y), 4.2)
+            yield symbols.jump((x + 13, y), 4.2)
         elif swatch == "part":
-            yield from parting((x + 13, y), 6.0)
+            yield from symbols.parting((x + 13, y), 6.0)
         else:
             for n, times in enumerate((0, 1, 3)):
-                yield Dot((x + 4 + 9 * n, y), 5.5, tint(times), EDGE, 0.8)
-        yield Words((x + 33, y), words, LETTERS, PALE)
-        x += 33 + 1.12 * font(LETTERS).getlength(words) + 20  # a browser's letters may be wider
-    yield Words(
-        (_MARGIN, _MARGIN + 84),
-        "The cells are those of the map, in all coordinates, where they cut the attractor; of its sheets that lie "
-        "behind one another the one nearest to the viewer is drawn. Coordinates have no unit.",
-        LETTERS,
-        PALE,
-    )
+                yield Dot((x + 4 + 9 * n, y), 5.5, symbols.tint(times), EDGE, 0.8)
+        yield Words((x + 33, y), words, LETTERS, PLOT_PALE)
+        x += 33 + 1.12 * font(LETTERS).getlength(words) + 20  # letters of a browser may be wider
 
 
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _itineraries(portrait: Portrait, top: float) -> Iterator[Mark]:
-    """Which posture comes when: the piece's are a straight line, the variation's runs lie beside it."""
+    """Yield the posture at each time: of the piece, a straight line; of the variation, a line for each run."""
     order, count = portrait.order, len(portrait.sites)
     long = max(len(order), count)
     left, right, bottom = _MARGIN + 40.0, WIDTH - _MARGIN, top + _GRAPH
@@ -154,28 +153,30 @@ def _itineraries(portrait: Portrait, top: float) -> Iterator[Mark]:
     size = float(np.clip(0.35 * x_step, 1.0, 3.0))
     yield Line(np.array([at(0, 0), (right, bottom)]), EDGE, 0.8)
     yield Line(np.array([at(0, 0), at(0, count - 1)]), EDGE, 0.8)
-    for tick in round_numbers(0.0, max(long - 1.0, 1.0)):
-        yield Words((at(tick, 0)[0], bottom + 14.0), f"{tick:g}", SMALL, PALE, "middle")
-    for tick in round_numbers(0.0, max(count - 1.0, 1.0)):
-        yield Words((left - 10.0, at(0, tick)[1]), f"{tick:g}", SMALL, PALE, "end")
-    yield Words((left, top - 40.0), "posture of the piece", LETTERS, PALE)
-    yield Words((right, bottom + 34.0), "place in the movement", LETTERS, PALE, "end")
+    for tick in symbols.round_numbers(0.0, max(long - 1.0, 1.0)):
+        yield Words((at(tick, 0)[0], bottom + 14.0), f"{tick:g}", SMALL, PLOT_PALE, "middle")
+    for tick in symbols.round_numbers(0.0, max(count - 1.0, 1.0)):
+        yield Words((left - 10.0, at(0, tick)[1]), f"{tick:g}", SMALL, PLOT_PALE, "end")
+    yield Words((left, top - 40.0), "posture of the piece", LETTERS, PLOT_PALE)
+    yield Words((right, bottom + 34.0), "place in the movement", LETTERS, PLOT_PALE, "end")
     yield Line(np.array([at(0, 0), at(count - 1, count - 1)]), PIECE, 2.6)
     starts = [0, *sorted(portrait.jumps), len(order)]
     for before, after in pairwise(starts):
         run = np.array([at(n, order[n]) for n in range(before, after)])
         if before:
-            yield Line(np.array([at(before - 1, order[before - 1]), run[0]]), mixed(OTHER, 0.45), 0.7, 2.0)
+            yield Line(np.array([at(before - 1, order[before - 1]), run[0]]), mixed(VARIATION, 0.45), 0.7, 2.0)
         if len(run) > 1:
-            yield Line(run, OTHER, 1.3)
+            yield Line(run, VARIATION, 1.3)
         for n, place in enumerate(run, before):
             if n != before or not before:
-                yield reading(pair(place), 0.8 * size)
+                yield symbols.point(symbols.pair(place), 0.8 * size)
         if before:
             seam = portrait.jumps[before]
-            yield jump(pair(run[0]), 1.3 * size, f"jump from posture {seam.start} to {seam.end}, seam {seam.number}")
+            yield symbols.jump(
+                symbols.pair(run[0]), 1.3 * size, f"jump from posture {seam.start} to {seam.end}, seam {seam.number}"
+            )
     if portrait.parting is not None:
         n = portrait.parting
         yield Line(np.array([(at(n, 0)[0], bottom), (at(n, 0)[0], top - 8.0)]), INK, 0.8, 3.0)
-        yield from parting(at(n, float(order[n])), 5.0)
+        yield from symbols.parting(at(n, float(order[n])), 5.0)
         yield Words((at(n, 0)[0], top - 18.0), f"they part at {n}", LETTERS, INK, "middle")

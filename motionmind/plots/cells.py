@@ -1,4 +1,4 @@
-"""The attractor in a picture: the cells of postures, both trajectories through them, and some of the postures."""
+"""The attractor in a picture: the postures' cells, both trajectories through them, and some of the postures."""
 
 from __future__ import annotations
 
@@ -11,54 +11,42 @@ import numpy as np
 
 from motionmind._typing import Floats, Int16s, Pixels
 from motionmind.body.motion import Posture
-from motionmind.plots.canvas import (
-    FINE,
-    LETTER,
-    Dot,
-    Inset,
-    Line,
-    Mark,
-    Region,
-    Words,
-)
+from motionmind.plots import symbols
+from motionmind.plots.brush import FINE
+from motionmind.plots.marks import LETTER, Dot, Inset, Line, Mark, Region, Words
 from motionmind.plots.portrait import Portrait
 from motionmind.plots.scene import Room
-from motionmind.plots.symbols import (
-    EDGE,
-    INK,
-    LETTERS,
-    OTHER,
-    PALE,
-    PIECE,
-    SMALL,
-    jump,
-    pair,
-    parting,
-    reading,
-    round_numbers,
-    site,
-    tint,
-)
+from motionmind.plots.symbols import LETTERS, SMALL
 from motionmind.render.body_shape import shape_of
-from motionmind.render.camera import SMOOTH, VIEWS
+from motionmind.render.camera import SMOOTH
 from motionmind.render.depth_buffer import DepthBuffer
-from motionmind.render.figure import colour, draw, halved, seen
-from motionmind.render.ground import PAPER
+from motionmind.render.figure import colour, draw, halved
+from motionmind.render.palette import EDGE, INK, PAPER, PIECE, PLOT_PALE, VARIATION
 from motionmind.render.trace import outlines, smooth
+from motionmind.render.view import VIEWS, to_view
 
 WIDTH = 1400  # of the picture, pixels
-TOP, HEIGHT = 150.0, 900.0  # where the field begins, and how high it is
-_WIDE, _HIGH = 960.0, 820.0  # the most that the attractor may take of it
+TOP, HEIGHT = 150.0, 900.0  # the field's upper edge and its height, pixels
+_WIDE, _HIGH = 960.0, 820.0  # greatest size of the attractor, pixels
 _AIR = 6  # pixels around the attractor
-_APART = 22.0  # pixels from there to the axes
-_FIGURE = 104.0  # height of a body at rest
-_FIGURES = 16  # at most
-_NUMBERS = 160  # beside sites, at most
+_APART = 22.0  # pixels from the attractor to the axes
+_FIGURE = 104.0  # height of a body at rest, pixels
+_FIGURES = 16  # figures, at most
+_NUMBERS = 160  # numbers beside sites, at most
 _CLEAR = 4.0  # pixels between a figure and its leader
 
 
 class Field:
-    """Where the attractor is in the picture, and what is on it."""
+    """The attractor's place in the picture, and the marks on it.
+
+    Attributes:
+        portrait: the variation on its attractor.
+        low, high: least and greatest values [2] of the two coordinates shown.
+        scale: pixels to a unit of these.
+        width, height: size of the attractor with some air around it, pixels.
+        corner: its upper left corner in the picture, x and y in pixels.
+        visits: how often the variation visits each cell [N].
+    """
 
     def __init__(self, portrait: Portrait) -> None:
         self.portrait = portrait
@@ -71,83 +59,91 @@ class Field:
         self.visits = np.bincount(portrait.order, minlength=len(portrait.sites))
 
     def at(self, points: Floats) -> Floats:
-        """Where points [..., d] are in the picture [..., 2], pixels."""
+        """Project points [..., d] of the flow to the picture [..., 2], pixels."""
         return self._in_picture(self.portrait.seen(points))
 
     def _in_picture(self, places: Floats) -> Floats:
-        """The same of places [..., 2] in the plane that is seen."""
+        """Convert the two coordinates shown [..., 2] to pixels [..., 2]."""
         shown = (places - [self.low[0], self.high[1]]) * [self.scale, -self.scale]
         return np.asarray(shown + self.corner + _AIR)
 
     @cached_property
     def cells(self) -> Int16s:
-        """The posture whose cell each pixel is in, from `corner` on."""
+        """The posture whose cell each pixel is in [height, width], from `corner` on; EMPTY beside the attractor."""
         corner = np.array([self.low[0] - _AIR / self.scale, self.high[1] + _AIR / self.scale])
         return self.portrait.cells(corner, self.scale, self.width, self.height)
 
     def marks(self) -> Iterator[Mark]:
-        """All of it."""
+        """Yield all marks."""
         yield from self._cells()
         yield from self._frame()
         yield from self._trajectories()
         yield from self._figures_and_numbers()
 
     def _cells(self) -> Iterator[Mark]:
-        found = smooth(outlines(self.cells))
-        areas = found.areas()
-        for n in np.argsort(-np.abs(areas), kind="stable"):  # what lies in a hole lies over it
-            one, posture = found.only(np.arange(len(areas)) == n), int(found.labels[n])
+        regions = smooth(outlines(self.cells))
+        areas = regions.areas()
+        for n in np.argsort(-np.abs(areas), kind="stable"):  # regions in a hole lie over it
+            outline, posture = regions.only(np.arange(len(areas)) == n), int(regions.labels[n])
             hole = areas[n] < 0.0
             yield Region(
-                one,
+                outline,
                 self.corner,
-                PAPER if hole else tint(int(self.visits[posture])),
+                PAPER if hole else symbols.tint(int(self.visits[posture])),
                 EDGE,
                 0.7,
-                "" if hole else self._told(posture),
+                "" if hole else self._describe_posture(posture),
             )
 
     def _frame(self) -> Iterator[Mark]:
-        """Both axes, as far as the attractor reaches, with round numbers."""
+        """Yield both axes, as far as the attractor reaches, with round numbers."""
         across, up, _ = self.portrait.axes
         names = [self.portrait.flow.dimensions[i] for i in (across, up)]
         for axis, outwards in ((0, (0.0, 1.0)), (1, (-1.0, 0.0))):
             out = np.array(outwards)
             ends = self._on_axis(axis, np.array([self.low[axis], self.high[axis]])) + _APART * out
-            ticks = round_numbers(self.low[axis], self.high[axis])
-            yield Line(ends, PALE, 0.8)
+            ticks = symbols.round_numbers(self.low[axis], self.high[axis])
+            yield Line(ends, PLOT_PALE, 0.8)
             for tick, at in zip(ticks, self._on_axis(axis, ticks) + _APART * out, strict=True):
-                yield Line(np.stack([at, at + 5.0 * out]), PALE, 0.8)
-                yield Words(pair(at + 12.0 * out), f"{tick:g}", SMALL, PALE, "middle" if axis == 0 else "end")
-            yield Words(pair(ends[1] + 14.0 * np.abs(out[::-1]) * [1.0, -1.0]), names[axis], LETTERS, PALE, "middle")
+                yield Line(np.stack([at, at + 5.0 * out]), PLOT_PALE, 0.8)
+                yield Words(
+                    symbols.pair(at + 12.0 * out), f"{tick:g}", SMALL, PLOT_PALE, "middle" if axis == 0 else "end"
+                )
+            yield Words(
+                symbols.pair(ends[1] + 14.0 * np.abs(out[::-1]) * [1.0, -1.0]),
+                names[axis],
+                LETTERS,
+                PLOT_PALE,
+                "middle",
+            )
 
     def _on_axis(self, axis: int, values: Floats) -> Floats:
-        """Where values [N] of a coordinate are on the left or lower edge of what the attractor takes [N, 2], pixels."""
+        """Project values [N] of a coordinate to the attractor's lower or left edge [N, 2], pixels."""
         places = np.tile(self.low, (len(values), 1))
         places[:, axis] = values
         return self._in_picture(places)
 
     @cached_property
     def size(self) -> float:
-        """The radius of a site, pixels: as there is room."""
+        """The radius of a site, pixels: smaller the more there are."""
         return float(np.clip(40.0 / np.sqrt(len(self.portrait.sites)), 1.0, 4.0))
 
     def _trajectories(self) -> Iterator[Mark]:
         portrait, size = self.portrait, self.size
         yield Line(self.at(portrait.piece), PIECE, 0.75 * size)
-        yield Line(self.at(portrait.other), OTHER, 0.36 * size)
+        yield Line(self.at(portrait.other), VARIATION, 0.36 * size)
         for posture, at in enumerate(self.at(portrait.sites)):
-            yield site(pair(at), size, self._told(posture))
+            yield symbols.site(symbols.pair(at), size, self._describe_posture(posture))
         for n, at in enumerate(self.at(portrait.points)):
             if n in portrait.jumps:
-                yield jump(pair(at), 1.2 * size, self._read(n))
+                yield symbols.jump(symbols.pair(at), 1.2 * size, self._describe_point(n))
             else:
-                yield reading(pair(at), 0.65 * size, self._read(n))
+                yield symbols.point(symbols.pair(at), 0.65 * size, self._describe_point(n))
         if portrait.parting is not None:
-            yield from parting(pair(self.at(portrait.points[portrait.parting])), 6.0)
+            yield from symbols.parting(symbols.pair(self.at(portrait.points[portrait.parting])), 6.0)
 
-    def _told(self, posture: int) -> str:
-        """What is known of a posture: when it comes in the piece, and where in the variation."""
+    def _describe_posture(self, posture: int) -> str:
+        """Describe a posture: its time in the piece, and its places in the variation."""
         piece = self.portrait.variation.piece
         time = float(piece.motion.times[piece.frames[posture]])
         places = np.flatnonzero(self.portrait.order == posture).tolist()
@@ -156,8 +152,8 @@ class Field:
             f"posture {posture} of the piece, {time:.2f} s\nin the variation: {f'at {listed}' if places else 'never'}"
         )
 
-    def _read(self, n: int) -> str:
-        """What is known of a point of the variation."""
+    def _describe_point(self, n: int) -> str:
+        """Describe a point of the variation."""
         text = f"at {n} in the variation: posture {self.portrait.order[n]}"
         if n in self.portrait.jumps:
             seam = self.portrait.jumps[n]
@@ -165,7 +161,7 @@ class Field:
         return text
 
     def _figures_and_numbers(self) -> Iterator[Mark]:
-        """Some postures, each joined to its site, and the numbers of others."""
+        """Yield figures of some postures, joined to their sites, and the numbers of others."""
         portrait = self.portrait
         sites, size = self.at(portrait.sites), self.size
         room = Room(WIDTH, ceil(TOP + HEIGHT))
@@ -178,7 +174,7 @@ class Field:
         marked: set[int] = set()
         for posture in self._far_apart():
             pixels = _figure(portrait.variation.piece.ends(posture, posture)[0])
-            figure = Inset((0.0, 0.0), pixels, self._told(posture))
+            figure = Inset((0.0, 0.0), pixels, self._describe_posture(posture))
             wide, high = figure.size
             place = room.near(posture, sites[posture], wide + 2 * _CLEAR, high + 1.6 * LETTERS)
             if place is None:
@@ -188,7 +184,9 @@ class Field:
             room.join(place, wide + 2 * _CLEAR, high + 1.6 * LETTERS, leader)
             marked.add(posture)
             yield Line(leader, INK, 0.8)
-            yield Dot(pair(sites[posture]), max(1.25 * size, 3.0), PIECE, INK, 1.2, self._told(posture))
+            yield Dot(
+                symbols.pair(sites[posture]), max(1.25 * size, 3.0), PIECE, INK, 1.2, self._describe_posture(posture)
+            )
             yield replace(figure, at=(left, top))
             yield Words((left + 0.5 * wide, top + high + 0.8 * LETTERS), str(posture), LETTERS, INK, "middle")
             if len(marked) == _FIGURES:
@@ -196,7 +194,7 @@ class Field:
         yield from self._numbers(sites, marked)
 
     def _far_apart(self) -> Iterator[int]:
-        """Postures whose figures are to be shown: the first, that at which they part, then far from one another."""
+        """Yield postures to show as figures: the first, the one where they part, then ones far from all before."""
         portrait = self.portrait
         sites = self.at(portrait.sites)
         first = [0] + ([int(portrait.order[portrait.parting])] if portrait.parting is not None else [])
@@ -208,7 +206,7 @@ class Field:
             far = np.minimum(far, np.linalg.norm(sites - sites[posture], axis=1))
 
     def _numbers(self, sites: Floats, marked: set[int]) -> Iterator[Mark]:
-        """Numbers beside sites where there is room, the roundest first."""
+        """Yield numbers beside sites where there is room, the roundest first."""
         size, left_over = self.size, _NUMBERS
         boxes = np.concatenate([sites - size, sites + size], axis=1)
         for posture in sorted(range(len(sites)), key=lambda n: (-_roundness(n), n)):
@@ -229,17 +227,17 @@ class Field:
 
 
 def _figure(posture: Posture) -> Pixels:
-    """A posture as a small picture [FINE h, FINE w, 4], three quarters from the front, with nothing behind it."""
+    """Draw a posture as a small picture [FINE h, FINE w, 4], RGBA, three quarters from the front."""
     body = shape_of(posture.skeleton)
-    cones, balls = seen(*body.solids(posture.rotations, posture.root), VIEWS["quarter"], posture.root)
+    cones, balls = to_view(*body.solids(posture.rotations, posture.root), VIEWS["quarter"], posture.root)
     low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
     (left, bottom), (right, top) = low.min(axis=0), high.max(axis=0)
     scale, rim = SMOOTH * FINE * _FIGURE / body.height, 2 * SMOOTH * FINE
     width, height = (SMOOTH * ceil((length * scale + 2 * rim) / SMOOTH) for length in (right - left, top - bottom))
-    canvas = DepthBuffer(left - rim / scale, top + rim / scale, width, height, scale)
-    draw(canvas, cones, balls)
+    buffer = DepthBuffer(left - rim / scale, top + rim / scale, width, height, scale)
+    draw(buffer, cones, balls)
     paper = np.full((height, width, 3), PAPER, dtype=np.uint8)
-    picture = colour(canvas, body, paper, line=3)
+    picture = colour(buffer, body, paper, line=3)
     drawn = 255 * (picture != paper).any(axis=-1, keepdims=True).repeat(3, axis=-1).astype(np.uint8)
     opacity = halved(drawn)[..., :1]
     share = np.maximum(opacity, 1) / 255.0
@@ -248,7 +246,7 @@ def _figure(posture: Posture) -> Pixels:
 
 
 def _edge(pixels: Pixels, corner: Floats, site: Floats) -> Floats:
-    """Where a leader from a site ends, just before what is drawn of a figure: x, y, pixels."""
+    """Return the point [2], pixels, just before a figure's nearest pixel, where a leader from its site ends."""
     rows, columns = np.nonzero(pixels[..., 3])
     places = corner + np.stack([columns, rows], axis=1) / FINE
     nearest = places[np.argmin(np.linalg.norm(places - site, axis=1))]
@@ -257,5 +255,5 @@ def _edge(pixels: Pixels, corner: Floats, site: Floats) -> Floats:
 
 
 def _roundness(number: int) -> int:
-    """How round a number is."""
+    """Count the round numbers (2, 5, 10, ...) that divide a number."""
     return sum(number % step == 0 for step in (2, 5, 10, 20, 50, 100, 500, 1000))

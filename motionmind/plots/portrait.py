@@ -1,9 +1,9 @@
-"""What a variation looks like on its attractor: both trajectories, the sites, and the cells in which postures live.
+"""A variation on its attractor: both trajectories, the sites of postures, and their cells.
 
-The map from points to postures is three-dimensional: a point belongs to the site that is nearest in all coordinates.
-The Voronoi diagram of sites that are projected onto a page is another partition, in which points that are seen in one
-cell may belong to another. So cells are drawn where the map is used: on the attractor itself. It lies in thin sheets;
-where some are behind one another, the one nearest to the viewer is seen, as with any surface.
+A point of the flow belongs to the site that is nearest in all coordinates. The Voronoi diagram of the sites projected
+to the page is a different partition, in which a point seen in one cell may belong to another. So cells are drawn where
+the map is used: on the attractor itself. It lies in thin sheets; as with any surface, the one nearest to the viewer is
+seen.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from motionmind.render.solids import EMPTY
 from motionmind.variation.review import Cut, Seam
 from motionmind.variation.variation import Variation
 
-MOST = 10_000  # postures of a piece or of a variation: more cells than a picture has room for
-MOST_STEPS = 200_000  # of a trajectory, lines each
-SHEETS = 2_000_000  # steps of the trajectory that shows where the attractor is
-_USUAL = {"lorenz": ("x", "z"), "chua": ("x", "z")}  # in which coordinates a flow is best seen, if not the first two
-_SOFT = 4.0  # pixels: what of the attractor's outline is finer is chance
-_GAP = 3  # pixels, at least half a gap between strands of the trajectory that is not one of the attractor
+MOST = 10_000  # postures of a piece or of a variation, at most: a picture has no room for more cells
+MOST_STEPS = 200_000  # steps of a trajectory, at most: each is a line
+SHEETS = 2_000_000  # steps of the trajectory that fills the attractor
+_USUAL = {"lorenz": ("x", "z"), "chua": ("x", "z")}  # coordinates that show a flow best, if not its first two
+_SOFT = 4.0  # pixels: finer details of the attractor's outline are chance
+_GAP = 3  # pixels: narrower gaps (half widths) between strands of the trajectory are none of the attractor's
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,11 @@ class Portrait:
     """A variation on its attractor.
 
     Attributes:
-        variation: as the trajectory gave it, with what was edited before postures were moved.
-        flow: whose attractor it is.
-        every: steps of the integration from one posture to the next.
-        piece: the piece's trajectory, all its steps [(N - 1) every + 1, d].
-        other: the variation's [(L - 1) every + 1, d].
+        variation: the variation, with those edits only that come before any that moved postures.
+        flow: the flow.
+        every: integration steps from one posture to the next.
+        piece: the piece's trajectory, every step [(N - 1) every + 1, d], in the flow's coordinates.
+        other: the variation's trajectory, every step [(L - 1) every + 1, d].
     """
 
     variation: Variation
@@ -52,59 +52,62 @@ class Portrait:
 
     @property
     def sites(self) -> Floats:
-        """Where the piece's postures lie [N, d]."""
+        """The points of the piece's postures [N, d]."""
         return self.piece[:: self.every]
 
     @property
     def points(self) -> Floats:
-        """Where the variation's are read [L, d]."""
+        """The points of the variation's postures [L, d]."""
         return self.other[:: self.every]
 
     @property
     def order(self) -> Ints:
-        """The posture of the piece that comes at each point [L]."""
+        """The posture of the piece at each point [L]."""
         return self.variation.order
 
     @property
     def parting(self) -> int | None:
-        """The first point at which it jumps, while the piece goes on; None where it stays with it to its end."""
+        """The first point at which it jumps while the piece continues; None if it follows the piece to its end."""
         first = min(self.jumps, default=len(self.sites))
         return first if first < len(self.sites) else None
 
     @cached_property
     def jumps(self) -> dict[int, Seam]:
-        """The seams, by the point at which the posture comes that does not follow in the piece."""
+        """The seams, by the point whose posture does not follow its predecessor in the piece."""
         return {seam.at + 1: seam for seam in self.variation.seams}
 
     @cached_property
     def axes(self) -> tuple[int, int, tuple[int, ...]]:
-        """Which coordinates go to the right and up, and which are left out, one at least: chaos takes three."""
+        """Indices of the coordinates shown to the right and up, and of those left out, at least one."""
         names = list(self.flow.dimensions)
         across, up = (names.index(name) for name in _USUAL.get(self.flow.name, names[:2]))
         return across, up, tuple(i for i in range(len(names)) if i not in (across, up))
 
     def seen(self, points: Floats) -> Floats:
-        """Where points [..., d] are in the picture [..., 2], in the flow's coordinates."""
+        """Return the two coordinates of points [..., d] that the picture shows [..., 2]."""
         return np.asarray(points[..., self.axes[:2]])
 
     def in_space(self, points: Floats) -> Floats:
-        """The same, and towards the viewer [..., 3]."""
+        """Return the coordinates of points [..., d] to the right, up and towards the viewer [..., 3]."""
         return np.concatenate([self.seen(points), self._towards * points[..., self.axes[2][:1]]], axis=-1)
 
     @cached_property
     def sheets(self) -> Floats:
-        """Points all over the attractor [SHEETS, d], along one trajectory."""
+        """Points all over the attractor, along one trajectory [SHEETS, d]."""
         return trajectory(
             self.flow, self.piece[-1], count=SHEETS, every=1, step=self.variation.course.step, transient=0
         )
 
     def cells(self, corner: Floats, scale: float, width: int, height: int) -> Int16s:
-        """The posture whose cell each pixel of the attractor is in [height, width]; EMPTY beside the attractor.
+        """Find the posture whose cell each pixel is in.
 
         Args:
-            corner: the picture's upper left corner [2], in the flow's coordinates.
+            corner: the picture's upper left corner [2], in the coordinates shown.
             scale: pixels to a unit of these.
-            width, height: of the picture, pixels.
+            width, height: size of the picture, pixels.
+
+        Returns:
+            Numbers of postures [height, width]; EMPTY beside the attractor.
         """
         from scipy.ndimage import binary_erosion, gaussian_filter
 
@@ -115,32 +118,35 @@ class Portrait:
         disc = y * y + x * x <= _GAP * _GAP
         hidden = _nearest(along, self._towards, width, height)
         hidden = _spread(hidden, self._towards, np.argwhere(disc) - _GAP)
-        there = binary_erosion(~np.isnan(hidden[..., 0]), disc)
-        # The fringe, where few strands of the trajectory come, is made as smooth as the attractor is.
-        there = (gaussian_filter(there.astype(np.float32), _SOFT) > 0.5) & ~np.isnan(hidden[..., 0])
-        rows, columns = np.nonzero(there)
+        covered = binary_erosion(~np.isnan(hidden[..., 0]), disc)
+        # Few strands of the trajectory reach the fringe, which is smoothed to look like the attractor's.
+        covered = (gaussian_filter(covered.astype(np.float32), _SOFT) > 0.5) & ~np.isnan(hidden[..., 0])
+        rows, columns = np.nonzero(covered)
         at = np.empty((len(rows), along.shape[1]))
         at[:, across], at[:, up] = (corner + (np.stack([columns, rows], axis=1) + 0.5) / [scale, -scale]).T
         at[:, left_out] = hidden[rows, columns]
-        found = np.full((height, width), EMPTY, dtype=np.int16)
-        found[rows, columns] = reorder(self.sites, at)
-        return found
+        postures = np.full((height, width), EMPTY, dtype=np.int16)
+        postures[rows, columns] = reorder(self.sites, at)
+        return postures
 
     @property
     def _towards(self) -> float:
-        """1 where more of the first coordinate that is left out is nearer, else -1: space is right-handed."""
+        """1 if greater values of the first coordinate left out are nearer, else -1; axes are right-handed."""
         across, up, left_out = self.axes
         return 1.0 if len(left_out) != 1 or (up - across) % 3 == 1 else -1.0
 
 
 def portrait_of(variation: Variation) -> Portrait:
-    """A variation on its attractor, which is found again from its course.
+    """Compute a variation's trajectories again from its course.
 
-    Edits from the first on that moves postures are left out: what follows no trajectory any more is not on it.
+    The first edit that moves postures and all later ones are left out, since they follow no trajectory.
+
+    Args:
+        variation: the variation.
 
     Raises:
-        MotionMindError: its flow is not one of `motionmind.chaos.flows`, its course is none, its trajectories give
-            another order here, or it has more postures than can be drawn.
+        MotionMindError: its flow is not one of `motionmind.chaos.flows`, its course is invalid, its trajectories give
+            a different order on this machine, or it has too many postures to draw.
     """
     course = variation.course
     most = max(len(variation.piece), len(variation.order))
@@ -170,23 +176,26 @@ def portrait_of(variation: Variation) -> Portrait:
     other = trajectory(
         flow, begin, count=(len(variation.order) - 1) * every + 1, every=1, step=course.step, transient=0
     )
-    found = Portrait(variation, flow, every, piece, other)
-    if not np.array_equal(reorder(found.sites, found.points), variation.order):
+    portrait = Portrait(variation, flow, every, piece, other)
+    if not np.array_equal(reorder(portrait.sites, portrait.points), variation.order):
         raise MotionMindError(
             f"the trajectories of {flow.label} give another order here than this variation has: it was made by another "
             "flow of that name, or where numbers round otherwise; vary the piece anew to see it"
         )
-    return found
+    return portrait
 
 
 @jit
 def _nearest(along: Floats, towards: float, width: int, height: int) -> Floats:
-    """The coordinates that are left out [H, W, d - 2] where a trajectory passes, nearest to the viewer; else nan.
+    """Find, for each pixel that a trajectory passes, the coordinates left out where it is nearest to the viewer.
 
     Args:
-        along: the trajectory [N, d]: column and row, in pixels, and the coordinates that are left out.
-        towards: 1 where more of the first of these is nearer, else -1.
-        width, height: of the picture.
+        along: the trajectory [N, d]: column and row, in pixels, and the coordinates left out.
+        towards: 1 if greater values of the first of these are nearer, else -1.
+        width, height: size of the picture, pixels.
+
+    Returns:
+        The coordinates left out [H, W, d - 2]; nan elsewhere.
     """
     d = along.shape[1]
     shown = np.full((height, width, d - 2), np.nan)
@@ -206,10 +215,9 @@ def _nearest(along: Floats, towards: float, width: int, height: int) -> Floats:
 
 @jit
 def _spread(shown: Floats, towards: float, disc: Ints) -> Floats:
-    """What is nearest to the viewer about each pixel [H, W, d - 2], among those that are off by the rows and columns
-    of `disc` [K, 2]."""
+    """Spread to each pixel the nearest values [H, W, d - 2] among those at the row and column offsets `disc` [K, 2]."""
     height, width, _ = shown.shape
-    found = np.full_like(shown, np.nan)
+    spread = np.full_like(shown, np.nan)
     for row in range(height):
         for column in range(width):
             best, best_y, best_x = -np.inf, -1, -1
@@ -218,5 +226,5 @@ def _spread(shown: Floats, towards: float, disc: Ints) -> Floats:
                 if 0 <= y < height and 0 <= x < width and towards * shown[y, x, 0] > best:
                     best, best_y, best_x = towards * shown[y, x, 0], y, x
             if best_y >= 0:
-                found[row, column] = shown[best_y, best_x]
-    return found
+                spread[row, column] = shown[best_y, best_x]
+    return spread

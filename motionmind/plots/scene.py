@@ -1,4 +1,4 @@
-"""Where there is room in a picture of an attractor for figures, and how they are joined to what they show."""
+"""Free room for figures in a picture of an attractor, and the leaders that join them to their sites."""
 
 from __future__ import annotations
 
@@ -8,18 +8,24 @@ from math import ceil, floor
 import numpy as np
 
 from motionmind._typing import Floats, Int16s, Ints
-from motionmind.plots.canvas import Point
+from motionmind.plots.brush import Point
 from motionmind.render.solids import EMPTY
 
-_GRAIN = 4  # pixels: where there is room is looked for on squares of this size
-_FAR = 230.0  # pixels from a figure to what it shows, at most
-_TRIED = 1000  # places for a figure
+_GRAIN = 4  # side of the squares in which room is counted, pixels
+_FAR = 230.0  # greatest distance from a figure to its site, pixels
+_TRIED = 1000  # places tried for a figure, at most
 
 
 class Room:
-    """What is free of a picture, in squares of _GRAIN pixels, and the figures that took some of it.
+    """The free room of a picture, in squares of _GRAIN pixels.
 
-    Outside the attractor a square is free for all figures; in a cell, beside the trajectories, for that of its posture.
+    Outside the attractor, a square is free for any figure; in a cell, off the trajectories, for that of its posture.
+
+    Attributes:
+        taken: squares that are not free for all figures [h, w].
+        cells: the posture whose figure may still use a taken square [h, w]; EMPTY if none.
+        figures: squares that figures cover [h, w].
+        leaders: the ends of leaders, [2, 2] each, pixels.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -29,32 +35,40 @@ class Room:
         self.leaders: list[Floats] = []
 
     def take(self, left: float, top: float, right: float, bottom: float) -> None:
-        """A box is not free any more."""
+        """Take a box, pixels."""
         self.taken[self._box(left, top, right, bottom)] = True
 
     def cover(self, corner: Point, cells: Int16s) -> None:
-        """Cells [h, w] are there from a corner on."""
+        """Take the attractor's cells [h, w], a posture a pixel, from a corner on, each for its own posture's figure."""
         rows, columns = np.nonzero(cells != EMPTY)
         squares = (rows + int(corner[1])) // _GRAIN, (columns + int(corner[0])) // _GRAIN
         self.taken[squares] = True
         self.cells[squares] = cells[rows, columns]
 
     def trace(self, points: Floats) -> None:
-        """A trajectory passes these points [N, 2]."""
+        """Take the squares along a trajectory [N, 2], pixels."""
         for a, b in pairwise(points):
             squares = self._along(a, b)
             self.taken[squares], self.cells[squares] = True, EMPTY
 
     def join(self, corner: Point, width: float, height: float, leader: Floats) -> None:
-        """A figure stands in a box, and a leader [2, 2] goes from it to its site."""
+        """Take a box for a figure, and a leader [2, 2] from it to its site, pixels."""
         for squares in (self._box(*corner, corner[0] + width, corner[1] + height), self._along(*leader)):
             self.taken[squares], self.cells[squares] = True, EMPTY
         self.figures[self._box(*corner, corner[0] + width, corner[1] + height)] = True
         self.leaders.append(leader)
 
     def near(self, posture: int, site: Floats, width: float, height: float) -> Point | None:
-        """The upper left corner of the box nearest to a posture's site that is free for its figure, and from which a
-        leader passes no other figure and crosses no other leader; None where there is none."""
+        """Find the free box nearest to a posture's site whose leader meets no other figure and no other leader.
+
+        Args:
+            posture: the posture's number.
+            site: its site in the picture [2], pixels.
+            width, height: size of the box, pixels.
+
+        Returns:
+            The box's upper left corner, pixels; None if no box is free.
+        """
         taken = self.taken & (self.cells != posture)
         wide, high = ceil(width / _GRAIN), ceil(height / _GRAIN)
         sums = np.pad(np.cumsum(np.cumsum(taken, axis=0), axis=1), ((1, 0), (1, 0)))
@@ -78,14 +92,14 @@ class Room:
         return rows, slice(max(floor(left / _GRAIN), 0), ceil(right / _GRAIN))
 
     def _along(self, a: Floats, b: Floats) -> tuple[Ints, Ints]:
-        """The squares between two points, as rows and columns."""
+        """Return the rows and columns of the squares between two points."""
         share = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / _GRAIN))[:, None]
         columns, rows = np.floor((a + share * (b - a)) / _GRAIN).astype(np.int64).T
         return rows, columns
 
 
 def _cross(a: Floats, b: Floats, c: Floats, d: Floats) -> bool:
-    """Whether the segments from a to b and from c to d cross."""
+    """Return whether the segments from a to b and from c to d cross."""
 
     def side(p: Floats, q: Floats, r: Floats) -> float:
         return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))

@@ -1,82 +1,33 @@
-"""One posture as a picture of a body: from solids to colours, with lines where one part passes in front of another."""
+"""One posture as a picture: a body's solids in a depth buffer, then in colours, with lines around its parts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Pixels
-from motionmind.body.mirror import LEFT, MIDDLE, RIGHT
 from motionmind.geometry import rotations as rot
-from motionmind.render.body_shape import FACE, HAIR, MARK, BodyShape
+from motionmind.render import raster
+from motionmind.render.body_solids import BodyShape
 from motionmind.render.depth_buffer import DepthBuffer
+from motionmind.render.palette import BRIDGED, COLOURS, INK, INSERTED
 from motionmind.render.solids import Cones, Ellipsoids
 
-COLOURS = {
-    LEFT: (222, 98, 66),
-    RIGHT: (62, 118, 190),
-    MIDDLE: (168, 164, 160),
-    FACE: (244, 216, 190),
-    HAIR: (84, 70, 62),
-    MARK: (255, 226, 120),
-}
-INSERTED = COLOURS | {LEFT: (190, 95, 130), RIGHT: (95, 105, 195), MIDDLE: (140, 90, 200)}  # what the engine made
-BRIDGED = (20, 190, 120)  # balls around joints amid a move that no corpus attests
-INK = (34, 30, 34)
-STEP = 0.016  # metres by which a part must stand before another for a line between them
-_HAZE = 0.30  # share of white in what is farthest from the viewer
-_DEEP = 0.45  # metres before and behind the root between which the haze grows, on a body 1.70 m tall
-_STANDS_OUT = 1.2  # radius of a bridged joint's ball by that of the body there
-_LEAST_BALL = 0.050  # metres, on a body 1.70 m tall
+STEP = 0.016  # metres a part must stand before another for a line between them, on a body 1.70 m tall
+_HAZE = 0.30  # share of white at the farthest
+_DEEP = 0.45  # metres before and behind the root over which haze grows, on a body 1.70 m tall
+_STANDS_OUT = 1.2  # radius of a bridged joint's ball, by the body's own radius there
+_LEAST_BALL = 0.050  # its least radius, metres, on a body 1.70 m tall
 
 
-@dataclass(frozen=True)
-class View:
-    """A direction to look from, by the world's directions (unit vectors, at right angles) in the picture.
+def draw(buffer: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[int] | None = None) -> None:
+    """Draw one posture's solids into a depth buffer, numbered as in `BodyShape.parts`.
 
-    Attributes:
-        name: what is seen, and from where.
-        right, up: what points to the picture's right and to its upper edge.
-        towards: what points to the viewer.
-    """
-
-    name: str
-    right: tuple[float, float, float]
-    up: tuple[float, float, float]
-    towards: tuple[float, float, float]
-
-    @property
-    def axes(self) -> Floats:
-        """The matrix [3, 3] that takes the world's coordinates to the viewer's."""
-        return np.array([self.right, self.up, self.towards])
-
-
-# The stage is seen along -z, so that what faces the audience looks along +z; the performer's left is then stage left.
-FRONT = View("front, as the audience sees it", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-STAGE_RIGHT = View(
-    "side, from stage right: the audience is to the right", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)
-)
-STAGE_LEFT = View(
-    "side, from stage left: the audience is to the left", (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
-)
-ABOVE = View("from above: the audience is below", (1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
-
-
-def seen(cones: Cones, balls: Ellipsoids, view: View, origin: Floats) -> tuple[Cones, Ellipsoids]:
-    """Solids in a viewer's axes, with `origin` [..., 3] of the world, metres, in the middle of the view."""
-    turn, origin = view.axes.T, np.asarray(origin)[..., None, :]
-    return (
-        Cones((cones.a - origin) @ turn, (cones.b - origin) @ turn, cones.a_radius, cones.b_radius),
-        Ellipsoids((balls.centre - origin) @ turn, view.axes @ balls.axes),
-    )
-
-
-def draw(canvas: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[int] | None = None) -> None:
-    """Draw one posture's solids ([N, 3], in the viewer's axes) on a canvas, those numbered in `only` if it is given.
-
-    The solids' numbers are those of `Body.parts`.
+    Args:
+        buffer: the depth buffer.
+        cones, balls: the solids [N, 3] in the viewer's axes, metres.
+        only: numbers of the solids to draw; all by default.
     """
     numbers = np.arange(len(cones.a) + len(balls.centre), dtype=np.int16)
     if only is not None:
@@ -85,24 +36,29 @@ def draw(canvas: DepthBuffer, cones: Cones, balls: Ellipsoids, only: frozenset[i
         few, others = numbers[numbers < balls_from], numbers[numbers >= balls_from] - balls_from
         cones = Cones(cones.a[few], cones.b[few], cones.a_radius[few], cones.b_radius[few])
         balls = Ellipsoids(balls.centre[others], balls.axes[others])
-    canvas.draw(cones, balls, numbers)
+    buffer.draw(cones, balls, numbers)
 
 
-def plain(body: BodyShape) -> Floats:
-    """RGB [N, 3] of a body's solids, from 0 to 255: left is warm, right is cool, the trunk is neutral."""
+def given_colours(body: BodyShape) -> Floats:
+    """Return the RGB [N, 3], 0 to 255, of a body's solids: warm on the left, cool on the right, the trunk neutral."""
     return np.array([COLOURS[paint] for paint in body.paints], dtype=np.float64)
 
 
-def inserted(body: BodyShape) -> Floats:
-    """RGB [N, 3] of a body's solids where the engine made the movement: violet, left still warmer than right."""
+def inserted_colours(body: BodyShape) -> Floats:
+    """Return the RGB [N, 3], 0 to 255, of a body's solids in inserted movement: violet, the left still warmer."""
     return np.array([INSERTED[paint] for paint in body.paints], dtype=np.float64)
 
 
 def bridge_balls(body: BodyShape, joints: Floats, which: Bools) -> Ellipsoids:
-    """Balls around the bridged ones, `which` [J], of a body's joints, which are at `joints` [..., J, 3], metres.
+    """Build the balls that mark bridged joints, larger than the body is there.
 
-    They are larger than the body is there. Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they
-    have the numbers after those of `Body.parts`, by which `colour` knows them.
+    Drawn after the body's own balls, as `balls.joined(bridge_balls(...))`, they have the numbers after those of
+    `BodyShape.parts`, by which `colour` knows them.
+
+    Args:
+        body: the body.
+        joints: positions of its joints [..., J, 3], metres.
+        which: the bridged ones [J].
     """
     radii = _girths(body)[which]
     return Ellipsoids(joints[..., which, :], radii[:, None, None] * np.eye(3))
@@ -110,7 +66,7 @@ def bridge_balls(body: BodyShape, joints: Floats, which: Bools) -> Ellipsoids:
 
 @lru_cache(maxsize=8)
 def _girths(body: BodyShape) -> Floats:
-    """Radii [J] in metres of balls that stand out from the solids that the joints are in."""
+    """Compute the radii [J], metres, of balls that stand out from the solids around the joints."""
     skeleton, rest = body.skeleton, np.tile(rot.IDENTITY, (len(body.skeleton), 1))
     cones, balls = body.solids(rest, np.zeros(3))
     joints = skeleton.positions(rest, np.zeros(3))[:, None]
@@ -126,34 +82,41 @@ def _girths(body: BodyShape) -> Floats:
 
 
 def haze(body: BodyShape) -> tuple[float, float, float]:
-    """The depths where haze begins and where it is full, metres in the viewer's axes, and how much white that is."""
+    """Return the depths where haze begins and is full, metres in the viewer's axes, and its share of white there."""
     return _DEEP * body.size, -_DEEP * body.size, _HAZE
 
 
 def colour(
-    canvas: DepthBuffer, body: BodyShape, background: Pixels, line: int = 2, paints: Floats | None = None
+    buffer: DepthBuffer, body: BodyShape, background: Pixels, line: int = 2, paints: Floats | None = None
 ) -> Pixels:
-    """The picture [H, W, 3] of what is on a canvas, before a background of the same shape.
+    """Paint a depth buffer before a background.
 
-    The solids have the RGB `paints` [N, 3], `plain(body)` by default; any whose number is beyond those of the body are
-    balls around bridged joints. What is farther is paler. A line, `line` pixels wide, runs round each part where it
-    stands before another, and is drawn on that other, so that the nearer part keeps its shape.
+    Farther surfaces are paler. A line runs around each part where it stands before another, and lies on the farther
+    one, so that the nearer keeps its shape. Solids numbered beyond the body's are balls around bridged joints.
+
+    Args:
+        buffer: the depth buffer [H, W].
+        body: the body drawn in it.
+        background: the picture behind it [H, W, 3], RGB; left as it is.
+        line: width of the lines, pixels.
+        paints: RGB of the body's solids [N, 3], 0 to 255; `given_colours(body)` by default.
+
+    Returns:
+        The picture [H, W, 3].
     """
-    from motionmind.render import raster
-
     names = {name: number for number, name in enumerate(dict.fromkeys(body.parts))}
     joints = len(body.skeleton)  # no more can be bridged
     parts = np.array([names[part] for part in body.parts] + [len(names)] * joints)
-    colours = np.concatenate([plain(body) if paints is None else paints, np.tile(BRIDGED, (joints, 1))]).astype(float)
+    colours = np.concatenate([given_colours(body) if paints is None else paints, np.tile(BRIDGED, (joints, 1))]).astype(
+        float
+    )
     picture = background.copy()
     ink = np.array(INK, dtype=np.uint8)
-    shown = canvas.solid, canvas.depth, canvas.shade
-    raster.colour(picture, *shown, colours, parts, haze(body), STEP * body.size, line, ink)
+    arrays = buffer.solid, buffer.depth, buffer.shade
+    raster.colour(picture, *arrays, colours, parts, haze(body), STEP * body.size, line, ink)
     return picture
 
 
 def halved(picture: Pixels) -> Pixels:
-    """A picture [H, W, 3] at half its width and height, each pixel the mean of four."""
-    from motionmind.render import raster
-
+    """Return a picture [H, W, 3] at half its width and height [H // 2, W // 2, 3], each pixel the mean of four."""
     return raster.halved(picture)

@@ -1,6 +1,6 @@
 """Films and stills of movement: `.gif` and `.mp4`, and one posture as `.png`.
 
-Frames are drawn one after another as they are encoded; never are more than two of them held.
+Frames are drawn as they are encoded, and at most two are held in memory.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
-from motionmind.render.stage import HOLD, SLOWEST, Stage, frame_rate, frame_times
+from motionmind.render.stage import Stage
+from motionmind.render.timing import HOLD, SLOWEST, frame_rate, frame_times
 
-_GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second, at most: by default; and the most that browsers show in time
+_GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second: at most by default; at most of all, as browsers play it
 _MP4_RATE, _MP4_MOST = 60.0, 120.0
-_COLOURS = 255  # of a GIF's palette; one more stands for what has not changed
+_COLOURS = 255  # of a GIF's palette; one more stands for unchanged pixels
 _SAMPLES = 10  # frames from which the palette is chosen
-_CELLS = 64  # of each of red, green and blue that are looked up as one colour of the palette
-_SHIFT = 2  # bits that these leave of a byte
+_CELLS = 64  # levels of each of red, green and blue that are told apart when the palette is looked up
+_SHIFT = 2  # bits of a byte below such a level
 _QUALITY = 17  # x264's constant rate factor, at which drawn figures show no blocks
 
 
 def write_film(
     path: FilePath, motion: Motion, *, fps: float | None = None, view: str = "quarter", size: int = 480, first: int = 0
 ) -> None:
-    """Film a motion: `.gif`, which loops and holds its last posture for 0.8 s, or `.mp4` (H.264).
+    """Film a motion as `.gif`, which loops and holds its last posture for 0.8 s, or as `.mp4` (H.264).
 
-    The first and the last posture are among the frames. Times are honest: a GIF lasts as long as the motion, to a
-    hundredth of a second and but for the hold, an MP4 to a frame.
+    The frames include the first and the last posture. A GIF lasts as long as the motion to a hundredth of a second, the
+    hold aside, an MP4 to a frame.
 
     Args:
-        path: where it goes.
-        motion: movement on any skeleton.
-        fps: frames a second; by default the motion's own, at most 25 in a GIF and 60 in an MP4, and 25 where it
-            has fewer than 12.
-        view: from where it is seen, as `Stage` has it.
-        size: height in pixels, as `Stage` has it.
-        first: number of the first frame, as `Stage` has it.
+        path: the file.
+        motion: the motion, on any skeleton.
+        fps: frames a second, from 0.01 to 50 in a GIF, to 120 in an MP4; by default the motion's own (25 if fewer than
+            12), at most 25 in a GIF and 60 in an MP4.
+        view: the name of one of `view.VIEWS`.
+        size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
+        first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
         MotionMindError: the suffix is another, a number is out of range, the extra for MP4 is not installed, or the
@@ -65,7 +66,7 @@ def write_film(
 
 
 def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: int = 480) -> None:
-    """Draw a motion of one posture as `.png`; arguments and errors as for `write_film`."""
+    """Draw a motion of one posture as `.png`; arguments and errors as of `write_film`."""
     if len(motion) != 1 or Path(path).suffix.lower() != ".png":
         raise MotionMindError(f"{path}: a still is a .png of one posture, not of {len(motion)}")
     file = BytesIO()
@@ -77,40 +78,40 @@ def write_still(path: FilePath, motion: Motion, *, view: str = "quarter", size: 
 
 
 def gif(stage: Stage) -> bytes:
-    """The film of a stage as a GIF: of each frame only the box that has changed, and in it only what has."""
+    """Encode the film of a stage as a GIF; each frame holds only the box that changed, and in it the changed pixels."""
     palette, height, width = _palette(stage), stage.camera.height, stage.camera.width
     table = np.full(_CELLS**3, -1, dtype=np.int16)
     shown = np.full((height, width), _COLOURS, dtype=np.uint8)
     parts = [
         b"GIF89a" + _short(width) + _short(height) + b"\xf7\x00\x00",  # 0xf7: one palette of 256 colours
         palette.tobytes(),
-        b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00",  # loops for ever
+        b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00",  # loops forever
     ]
     for picture, hold in zip(stage.frames(), _delays(stage), strict=True):
         changed = np.empty_like(shown)
         top, bottom, left, right = _index(picture, palette, table, shown, changed)
         box = Image.fromarray(changed[top:bottom, left:right])
-        # Leave the frame before where this one is transparent, which is what has not changed.
+        # Unchanged pixels are transparent, and show the frame before.
         parts.append(b"\x21\xf9\x04\x05" + _short(hold) + bytes([_COLOURS, 0]))
         parts += GifImagePlugin.getdata(box, (left, top))
     return b"".join([*parts, b";"])
 
 
 def _delays(stage: Stage) -> list[int]:
-    """How long each frame is shown, in hundredths of a second: roundings do not add up."""
+    """Return how long each frame is shown, in hundredths of a second; rounding errors do not add up."""
     marks = np.round(100.0 * (stage.motion.times - stage.motion.times[0])).astype(int)
     return [*np.diff(marks).tolist(), round(100.0 * HOLD)]
 
 
 def _palette(stage: Stage) -> Pixels:
-    """Colours [256, 3] for all frames, so that nothing flickers: from frames of all kinds, the last one unused.
+    """Choose one palette [256, 3] for all frames, to avoid flicker, from a sample of them; its last colour is unused.
 
-    A colour counts by the root of how often it is there, or paper and floor would leave nothing for small things.
+    A colour counts by the root of its frequency; otherwise paper and floor would leave no colours for small details.
     """
-    of_each_kind = [np.flatnonzero(kind)[:1] for kind in (stage.motion.inserted(), stage.motion.bridged().any(axis=1))]
+    special = [np.flatnonzero(kind)[:1] for kind in (stage.motion.inserted(), stage.motion.bridged().any(axis=1))]
     even = np.linspace(0, len(stage) - 1, _SAMPLES).astype(int)
     tally = np.zeros((_CELLS**3, 4))
-    for picture in stage.frames(np.unique(np.concatenate([even, *of_each_kind])).tolist()):
+    for picture in stage.frames(np.unique(np.concatenate([even, *special])).tolist()):
         _count(picture, tally)
     cells = tally[tally[:, 3] > 0.0]
     colours = np.round(cells[:, :3] / cells[:, 3:]).astype(np.uint8)
@@ -126,7 +127,7 @@ def _short(number: int) -> bytes:
 
 @jit
 def _count(picture: Pixels, tally: Floats) -> None:
-    """Add the colours of a picture [H, W, 3] to the sums of red, green and blue in each cell, and their number."""
+    """Add a picture's pixels [H, W, 3] to the sums of red, green and blue, and the counts, of their cells [C, 4]."""
     for row in picture:
         for r, g, b in row:
             cell = ((r >> _SHIFT) * _CELLS + (g >> _SHIFT)) * _CELLS + (b >> _SHIFT)
@@ -140,17 +141,17 @@ def _count(picture: Pixels, tally: Floats) -> None:
 def _index(
     picture: Pixels, palette: Pixels, table: Int16s, shown: Pixels, changed: Pixels
 ) -> tuple[int, int, int, int]:
-    """Bring a picture [H, W, 3] onto the palette, and find what is new in it.
+    """Map a picture to the palette, and find the pixels that changed.
 
     Args:
-        picture: the picture.
+        picture: RGB [H, W, 3].
         palette: RGB [256, 3].
-        table: the palette's colour nearest to each cell's middle, -1 where it has not been asked for; it is filled in.
-        shown: what the frame before showed [H, W]; what this one shows, afterwards.
-        changed: takes this frame's colours where they are new, else the last of the palette.
+        table: index of the palette's colour nearest to each cell's middle [C], -1 while unknown; filled in.
+        shown: indices that the frame before showed [H, W]; updated to this frame's.
+        changed: receives this frame's indices [H, W] where they changed, elsewhere the palette's last.
 
     Returns:
-        The box of what is new: its first row, the row after it, its first column, and the column after it.
+        The box of changed pixels: first row, row after the last, first column, column after the last.
     """
     height, width = shown.shape
     top, bottom, left, right = height, 0, width, 0
@@ -172,7 +173,7 @@ def _index(
             if table[cell] != shown[y, x]:
                 shown[y, x] = changed[y, x] = table[cell]
                 top, bottom, left, right = min(top, y), y + 1, min(left, x), max(right, x + 1)
-    if bottom == 0:  # nothing is new, but a frame has a pixel at least
+    if bottom == 0:  # nothing changed, but a frame has at least one pixel
         return 0, 1, 0, 1
     return top, bottom, left, right
 
@@ -181,7 +182,15 @@ def _index(
 
 
 def mp4(stage: Stage, rate: float) -> bytes:
-    """The film of a stage as H.264 in an MP4, at `rate` frames a second; MotionMindError where no encoder is there."""
+    """Encode the film of a stage as H.264 in an MP4.
+
+    Args:
+        stage: the stage.
+        rate: frames a second.
+
+    Raises:
+        MotionMindError: the encoder is not installed, or fails.
+    """
     try:
         import imageio_ffmpeg
     except ImportError:
@@ -190,7 +199,7 @@ def mp4(stage: Stage, rate: float) -> bytes:
         file, log = Path(folder) / "film.mp4", Path(folder) / "log"
         try:
             command = [imageio_ffmpeg.get_ffmpeg_exe(), *_arguments(stage, rate), str(file)]
-            with log.open("w+b") as said, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as encoder:
+            with log.open("w+b") as output, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=output) as encoder:
                 _feed(encoder.stdin, stage.frames())
         except (RuntimeError, OSError) as error:
             raise MotionMindError(f"the MP4 encoder cannot be run: {error}") from error
@@ -201,8 +210,11 @@ def mp4(stage: Stage, rate: float) -> bytes:
 
 
 def _arguments(stage: Stage, rate: float) -> list[str]:
-    # Colours are brought to BT.709 and said to be so, or players guess, and reds turn orange. The number of threads is
-    # fixed, because it shows in the bytes.
+    """Return the encoder's arguments.
+
+    Colours are converted to BT.709 and declared so; otherwise players guess, and reds turn orange. The number of
+    threads is fixed because the bytes depend on it.
+    """
     size = f"{stage.camera.width}x{stage.camera.height}"
     raw = f"-f rawvideo -pix_fmt rgb24 -s {size} -r {Fraction(rate).limit_denominator(1001)}"
     video = f"-c:v libx264 -preset medium -crf {_QUALITY} -tune animation -threads 2"
@@ -213,6 +225,7 @@ def _arguments(stage: Stage, rate: float) -> list[str]:
 
 
 def _feed(pipe: IO[bytes] | None, pictures: Iterator[Pixels]) -> None:
+    """Write pictures to the encoder, until it gives up."""
     assert pipe is not None
     try:
         for picture in pictures:

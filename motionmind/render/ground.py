@@ -12,25 +12,26 @@ from motionmind._typing import Floats, Pixels, Singles
 from motionmind.body.human import human23
 from motionmind.render.camera import Camera, Corner
 from motionmind.render.depth_buffer import DepthBuffer
-from motionmind.render.figure import View, draw, seen
+from motionmind.render.figure import draw
+from motionmind.render.palette import GRID, GROUND, PAPER, SHADOW
 from motionmind.render.solids import Cones, Ellipsoids
+from motionmind.render.view import View, to_view
 
-PAPER, GROUND, GRID, SHADOW = (252, 251, 249), (234, 230, 224), (217, 212, 205), (52, 44, 60)
-_APRON = 1.1  # of a body's height: around the path, over which the floor fades into the paper
-# Layers of a shadow: how dark it is on the floor, and of a body's height the height at which it is e times paler, and
-# by how much its edge is soft. The first tells what touches the floor, the second where the body is.
+_APRON = 1.1  # width over which the floor around the path fades into the paper, by the body's height
+# Layers of a shadow: darkness on the floor; then, by the body's height, the height over which it falls by e, and the
+# width of its soft edge. The first layer shows what touches the floor, the second where the body is.
 _LAYERS = ((0.40, 0.06, 0.011), (0.32, 0.40, 0.035))
-_FINE = 110.0  # samples of a shadow to a body's height
+_FINE = 110.0  # samples of a shadow over a body's height
 _UNDER = View("from under the floor", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Shadow:
-    """How dark the floor is, in a part of the picture.
+    """The darkness of the floor in a part of the picture.
 
     Attributes:
-        corner: x and y, pixels, of its upper left corner.
-        dark: darkness [h, w] from 0 to 1.
+        corner: x and y of the part's upper left corner, pixels.
+        dark: darkness [h, w], 0 to 1.
     """
 
     corner: Corner
@@ -38,53 +39,59 @@ class Shadow:
 
 
 class Ground:
-    """The floor at height 0, with a grid, where the path is; around it it fades into the paper.
+    """The floor at height 0 under a path, with a grid; around the path it fades into the paper.
 
     Attributes:
-        camera: what sees it.
+        camera: the camera.
         low, high: least and greatest x and z [2] of the path, metres.
-        apron: how far beyond these the floor has faded, metres.
-        step: metres between the grid's lines: one for people, a hundredth for insects.
+        apron: distance from these over which the floor fades, metres.
+        step: spacing of the grid, metres: a power of ten, 1 for people, 0.01 for insects.
     """
 
     def __init__(self, camera: Camera, low: Floats, high: Floats, height: float) -> None:
-        """The floor for a path of a body that is `height` metres tall."""
+        """The floor under a path.
+
+        Args:
+            camera: the camera.
+            low, high: least and greatest x and z of the path [2], metres.
+            height: height of the body, metres.
+        """
         self.camera, self.low, self.high = camera, low, high
         self._height = height
         self.apron = _APRON * height
         self.step = 10.0 ** round(log10(height / human23().height))
 
     def picture(self, line: float) -> Pixels:
-        """The floor with nobody on it [H, W, 3], its lines so many pixels wide."""
+        """Draw the empty floor [H, W, 3], RGB; `line` is the width of the grid's lines, pixels."""
         camera = self.camera
         picture = np.tile(np.array(PAPER, dtype=np.float32), (camera.height, camera.width, 1))
         y, x = np.mgrid[: camera.height, : camera.width].astype(np.float32) + np.float32(0.5)
-        there, lines = np.ones_like(x), np.zeros_like(x)
+        opacity, lines = np.ones_like(x), np.zeros_like(x)
         for axis, row in enumerate(camera.on_floor):
             place = row[0] * x + row[1] * y + (row[2] + camera.origin[2 * axis])
             beyond = np.maximum(self.low[axis] - place, place - self.high[axis]) / self.apron
             share = np.clip(beyond, 0.0, 1.0)
-            there *= 1.0 - share * share * (3.0 - 2.0 * share)
+            opacity *= 1.0 - share * share * (3.0 - 2.0 * share)
             steps = place / self.step
             off = np.abs(steps - np.round(steps)) * self.step / np.hypot(row[0], row[1])  # pixels from a line's middle
             lines = np.maximum(lines, np.clip(0.5 * line + 0.5 - off, 0.0, 1.0))
-        for ink, share in ((GROUND, there), (GRID, there * lines)):
+        for ink, share in ((GROUND, opacity), (GRID, opacity * lines)):
             picture += share[..., None] * (np.array(ink, dtype=np.float32) - picture)
         return np.round(picture).astype(np.uint8)
 
     def shadow(self, cones: Cones, balls: Ellipsoids) -> Shadow:
-        """The shadow of solids of the world: the floor is the darker the lower what is over it.
+        """Cast the shadow of solids [N, 3] in the world, metres: darker under what is lower.
 
-        It is a depth buffer seen from under the floor, softened, and laid on the floor, which is an affine map.
+        A depth buffer seen from under the floor is softened and mapped onto the floor by an affine map.
         """
         camera, soft = self.camera, self._height * max(soft for _, _, soft in _LAYERS)
         fine = _FINE / self._height
-        cones, balls = seen(cones, balls, _UNDER, camera.origin)
+        cones, balls = to_view(cones, balls, _UNDER, camera.origin)
         low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)[..., :2]
         (left, near), (right, far) = low.min(axis=0) - 3.0 * soft, high.max(axis=0) + 3.0 * soft
-        canvas = DepthBuffer(left, far, ceil((right - left) * fine), ceil((far - near) * fine), fine)
-        draw(canvas, cones, balls)
-        touching, over = (self._layer(canvas, fine, *layer) for layer in _LAYERS)
+        buffer = DepthBuffer(left, far, ceil((right - left) * fine), ceil((far - near) * fine), fine)
+        draw(buffer, cones, balls)
+        touching, over = (self._layer(buffer, fine, *layer) for layer in _LAYERS)
 
         corners = camera.to_pixels(camera.origin + [(x, 0.0, z) for x in (left, right) for z in (near, far)])
         x, y = (max(floor(edge), 0) for edge in corners.min(axis=0))
@@ -97,15 +104,21 @@ class Ground:
         )
         return Shadow((x, y), np.asarray(laid, dtype=np.float32) / 255.0)
 
-    def _layer(self, canvas: DepthBuffer, fine: float, dark: float, fall: float, soft: float) -> Image.Image:
-        """One of `_LAYERS`, 255 for black, of what a canvas shows from under the floor, `fine` samples to a metre."""
-        cast = dark * np.exp(np.minimum(canvas.depth, 0.0) / np.float32(fall * self._height))  # depth is -height
+    def _layer(self, buffer: DepthBuffer, fine: float, dark: float, fall: float, soft: float) -> Image.Image:
+        """Draw one of `_LAYERS`, 255 for black, from a depth buffer under the floor, `fine` samples to a metre."""
+        cast = dark * np.exp(np.minimum(buffer.depth, 0.0) / np.float32(fall * self._height))  # depth is -height
         image = Image.fromarray(np.round(255.0 * cast).astype(np.uint8))
         return image.filter(ImageFilter.GaussianBlur(soft * self._height * fine))
 
 
 def darken(picture: Pixels, shadow: Shadow, bare: Singles) -> None:
-    """Lay a shadow on a picture [H, W, 3], as far as the floor is `bare` [H, W], from 0 to 1."""
+    """Lay a shadow on a picture, in place.
+
+    Args:
+        picture: RGB [H, W, 3].
+        shadow: the shadow.
+        bare: how far the floor shows at each pixel [H, W], 0 to 1.
+    """
     (x, y), (height, width) = shadow.corner, shadow.dark.shape
     box = slice(y, y + height), slice(x, x + width)
     dark = (shadow.dark * bare[box])[..., None]

@@ -1,4 +1,4 @@
-"""Movement as pictures, films and pages: which of them a file's suffix asks for."""
+"""Motions as pictures, films and pages, chosen by the file's suffix."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.render import PICTURES
 
-ON_A_SHEET = 48  # postures on a sheet where nobody says which
+ON_A_SHEET = 48  # postures on a sheet, at most
 _FILMED = (".gif", ".mp4", ".svg")
 
 
@@ -23,30 +23,42 @@ def write_picture(
     size: int | None = None,
     first: int = 0,
 ) -> None:
-    """Draw a motion on any skeleton, as the suffix says.
+    """Write a motion as a picture, a film or a page, as the file's suffix says.
 
-    `.png` is one posture, or a sheet of up to 48, evenly spread and numbered (`contact_sheet` has more to choose);
+    `.png` is one posture, or a sheet of up to 48, evenly spread and numbered (`contact_sheet` has more options);
     `.gif`, `.mp4` and `.svg` are films; `.html` is a page that plays the motion in any browser, from disk, offline.
-    What the engine inserted has another colour, the joints that are bridged are marked, and the postures between which
-    it goes on show as ghosts.
+    Inserted movement has another colour, bridged joints are marked, and the insertion's end postures show as ghosts.
 
     Args:
-        path: where it goes.
-        motion: the movement.
-        fps: frames a second of a film; None takes the motion's own, at most 25 in a GIF and 60 in an MP4 (25 where it
-            has fewer than 12), and 12 in an SVG.
-        view: from where a film or a posture is seen: "quarter" (the default), "front", "side", "left" or "top".
-        size: height of a film or a posture in pixels, 480 by default; it is less high where the movement is flat.
-        first: the number of the motion's first frame, where it is a part of something longer.
+        path: the file.
+        motion: the motion, on any skeleton.
+        fps: frames a second of a film, from 0.01 to 50 (GIF), 120 (MP4) or 60 (SVG); by default 12 in an SVG, elsewhere
+            the motion's own (25 if fewer than 12), at most 25 in a GIF and 60 in an MP4.
+        view: viewpoint of a film or of one posture: "quarter" (the default), "front", "side", "left" or "top".
+        size: height of a film or of one posture, pixels, from 120 to 2160, by default 480; a flat movement makes the
+            picture lower.
+        first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
-        MotionMindError: the suffix is unknown, an option is not for what it asks for, or the file cannot be written.
+        MotionMindError: the suffix is unknown, an option does not apply to it or is out of range, the extra for MP4 is
+            not installed, or the file cannot be written.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, write_picture
+    >>> body = human23()
+    >>> posture = Posture(body, np.tile([0.0, 0.0, 0.0, 1.0], (len(body), 1)), np.array([0.0, 0.95, 0.0]))
+    >>> with TemporaryDirectory() as folder:
+    ...     write_picture(Path(folder) / "rest.png", posture.as_motion(), view="front", size=240)
+    ...     (Path(folder) / "rest.png").read_bytes()[1:4]
+    b'PNG'
     """
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURES:
         raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; pictures end in {', '.join(PICTURES)}")
     _check(path, suffix, len(motion), fps=fps, view=view, size=size)
-    seen: dict[str, Any] = {key: value for key, value in (("view", view), ("size", size)) if value is not None}
+    options: dict[str, Any] = {key: value for key, value in (("view", view), ("size", size)) if value is not None}
     if suffix == ".html":
         from motionmind.render.page import write_page
 
@@ -54,7 +66,7 @@ def write_picture(
     elif suffix == ".svg":
         from motionmind.render.svg import write_svg
 
-        write_svg(path, motion, fps=fps, first=first, **seen)
+        write_svg(path, motion, fps=fps, first=first, **options)
     elif suffix == ".png" and len(motion) > 1:
         from motionmind.render.sheet import contact_sheet, evenly, png
 
@@ -62,15 +74,15 @@ def write_picture(
     elif suffix == ".png":
         from motionmind.render.film import write_still
 
-        write_still(path, motion, **seen)
+        write_still(path, motion, **options)
     else:
         from motionmind.render.film import write_film
 
-        write_film(path, motion, fps=fps, first=first, **seen)
+        write_film(path, motion, fps=fps, first=first, **options)
 
 
 def _check(path: FilePath, suffix: str, frames: int, **options: object) -> None:
-    """Options are for what can follow them: to draw without them, and say nothing, would surprise."""
+    """Refuse options that do not apply to a suffix, instead of silently ignoring them."""
     allowed = {"fps", "view", "size"} if suffix in _FILMED else set[str]()
     if suffix == ".png" and frames == 1:
         allowed = {"view", "size"}

@@ -1,7 +1,7 @@
-"""Inner loops of the pictures: solids into a depth buffer, the buffer into colours. They know neither bodies nor views.
+"""Compiled inner loops: from solids to a depth buffer, from the buffer to colours. They know no bodies and no views.
 
-Lengths are metres in the viewer's axes, x to the right, y up, z towards the viewer; parallel projection. Canvases are
-passed as their arrays `solid`, `depth` and `shade` [H, W], and as their `place`.
+Lengths are metres in the viewer's axes, x to the right, y up, z towards the viewer; parallel projection. A depth buffer
+is passed as its arrays `solid`, `depth` and `shade` [H, W], and its `place`.
 """
 
 from __future__ import annotations
@@ -14,51 +14,52 @@ from motionmind._typing import Floats, Indices, Int16s, Pixels, Singles
 from motionmind.jit import jit
 from motionmind.render.solids import EMPTY
 
-Place = tuple[float, float, float]  # x and y of a canvas's upper left corner, and its pixels to a metre
+Place = tuple[float, float, float]  # x and y of a buffer's upper left corner, metres, and pixels to a metre
 Buffers = tuple[Int16s, Singles, Singles, Place]
 
-_UP, _TOWARDS = 0.6, 0.8  # where light comes from: above the viewer; no side, so that a mirrored body looks mirrored
-_SHADE = 0.62  # brightness of what the light does not reach
-_HAIR = 0.001  # pixels: surfaces no farther apart are one, but for rounding
-_END_ON = 1e-3  # of a cone's thickness: one whose ends lie no farther apart in the picture is drawn as two balls
+# The light comes from above the viewer, and from neither side: a mirrored body looks mirrored.
+_UP, _TOWARDS = 0.6, 0.8
+_SHADE = 0.62  # brightness where the light does not reach
+_HAIR = 0.001  # pixels: surfaces closer than this coincide, but for rounding
+_END_ON = 1e-3  # a cone is drawn as two balls if its ends lie closer in the picture, by its thickness
 
 
 @jit
 def draw(
     solid: Int16s, depth: Singles, shade: Singles, place: Place, cones: Floats, balls: Floats, numbers: Int16s
 ) -> None:
-    """Draw solids on a canvas: what is nearest stays, and of solids that touch, as in a joint, the higher number.
+    """Draw solids into a depth buffer: the nearest wins, and of solids that touch, as in a joint, the higher number.
 
     Args:
-        solid, depth, shade, place: the canvas.
-        cones: of each round cone its ends' centres and their radii [N, 8].
-        balls: of each ellipsoid the centre, and A A' of the matrix A whose columns are its half axes [M, 4, 3].
-        numbers: what the canvas calls them [N + M].
+        solid, depth, shade, place: the buffer; its arrays are updated.
+        cones: centres and radii of each round cone's ends, ax ay az bx by bz a_radius b_radius [N, 8], metres.
+        balls: each ellipsoid's centre, and A A' for the matrix A with its half axes as columns [M, 4, 3].
+        numbers: numbers of the solids, cones first [N + M].
     """
-    canvas = solid, depth, shade, place
+    buffer = solid, depth, shade, place
     for i in range(len(cones)):
         ax, ay, az, bx, by, bz, a, b = cones[i]
         if (bx - ax) ** 2 + (by - ay) ** 2 - (b - a) ** 2 >= _END_ON * max(a, b) ** 2:
-            _cone(canvas, (ax, ay, az, a), (bx, by, bz, b), numbers[i])
-        else:  # seen from an end: one ball hides all but the rim of the other
-            _ellipsoid(canvas, (ax, ay, az), (a * a, 0.0, 0.0, a * a, 0.0, a * a), numbers[i])
-            _ellipsoid(canvas, (bx, by, bz), (b * b, 0.0, 0.0, b * b, 0.0, b * b), numbers[i])
+            _cone(buffer, (ax, ay, az, a), (bx, by, bz, b), numbers[i])
+        else:  # seen from an end: one ball hides the other up to its rim
+            _ellipsoid(buffer, (ax, ay, az), (a * a, 0.0, 0.0, a * a, 0.0, a * a), numbers[i])
+            _ellipsoid(buffer, (bx, by, bz), (b * b, 0.0, 0.0, b * b, 0.0, b * b), numbers[i])
     for i in range(len(balls)):
         (x, y, z), (xx, xy, xz), (_, yy, yz), (_, _, zz) = balls[i]
-        _ellipsoid(canvas, (x, y, z), (xx, xy, xz, yy, yz, zz), numbers[len(cones) + i])
+        _ellipsoid(buffer, (x, y, z), (xx, xy, xz, yy, yz, zz), numbers[len(cones) + i])
 
 
 @jit
 def _cone(
-    canvas: Buffers, a: tuple[float, float, float, float], b: tuple[float, float, float, float], number: int
+    buffer: Buffers, a: tuple[float, float, float, float], b: tuple[float, float, float, float], number: int
 ) -> None:
-    """A round cone that is not seen from an end; of each end the centre and the radius.
+    """Draw a round cone that is not seen from an end; `a` and `b` are its ends' centres and radii.
 
-    Its surface is the farthest that any of its balls comes towards the viewer: at the pixel p the greatest
+    Its surface is the greatest z that any of its balls reaches: at the pixel p the greatest
     a_z + t d_z + sqrt(q(t)) for t in [0, 1], with q(t) = r(t)^2 - |p - c(t)|^2 in the picture's plane, where
     q(t) = Q (A + 2 B t - t^2) and Q > 0. Without bounds it would be at t = B + d_z sqrt((B^2 + A) / (d_z^2 + Q)).
     """
-    shade, place = canvas[2:]
+    shade, place = buffer[2:]
     ax, ay, az, radius = a
     dx, dy, dz, widening = b[0] - ax, b[1] - ay, b[2] - az, b[3] - radius
     Q = dx * dx + dy * dy - widening * widening
@@ -82,24 +83,24 @@ def _cone(
             square = A + t * (2.0 * B - t)
             if square > 0.0:
                 towards = sqrt(Q * square)
-                if _shows(canvas, row, column, az + t * dz + towards, number):
+                if _shows(buffer, row, column, az + t * dz + towards, number):
                     bright = (_UP * (y - t * dy) + _TOWARDS * towards) / (radius + t * widening)
                     shade[row, column] = _SHADE + (1.0 - _SHADE) * max(bright, 0.0)
 
 
 @jit
 def _ellipsoid(
-    canvas: Buffers,
+    buffer: Buffers,
     centre: tuple[float, float, float],
     square: tuple[float, float, float, float, float, float],
     number: int,
 ) -> None:
-    """An ellipsoid v' s^-1 v = 1 about its centre; `square` is the upper half of s = A A', row by row.
+    """Draw an ellipsoid v' s^-1 v = 1 about its centre; `square` is the upper half of s = A A', row by row.
 
     Over the pixel p of its shadow, the ellipse p' S^-1 p < 1 with S the picture's corner of s, the surface is at
     k p + sqrt(d (1 - p' S^-1 p)), where k = S^-1 (s_xz, s_yz) and d = s_zz - k (s_xz, s_yz).
     """
-    shade, place = canvas[2:]
+    shade, place = buffer[2:]
     xx, xy, xz, yy, yz, zz = square
     det = xx * yy - xy * xy
     ixx, ixy, iyy = yy / det, -xy / det, xx / det
@@ -117,7 +118,7 @@ def _ellipsoid(
             rest = 1.0 - px * x - py * y
             if rest > 0.0:
                 towards = sqrt(d * rest)
-                if _shows(canvas, row, column, centre[2] + kx * x + ky * y + towards, number):
+                if _shows(buffer, row, column, centre[2] + kx * x + ky * y + towards, number):
                     nz = towards / d
                     nx, ny = px - kx * nz, py - ky * nz
                     bright = (_UP * ny + _TOWARDS * nz) / sqrt(nx * nx + ny * ny + nz * nz)
@@ -126,15 +127,15 @@ def _ellipsoid(
 
 @jit
 def _between(low: float, high: float, origin: float, scale: float, count: int) -> tuple[int, int]:
-    """The first of `count` pixels, `scale` to a metre from `origin` on, between two places, and the one after."""
+    """Return the range of pixels between `low` and `high`, metres, of `count` pixels, `scale` a metre from `origin`."""
     first, after = (low - origin) * scale, (high - origin) * scale
     return int(min(max(first, 0.0), count)), ceil(min(max(after, 0.0), count))
 
 
 @jit
-def _shows(canvas: Buffers, row: int, column: int, z: float, number: int) -> bool:
-    """Put a solid's surface at z into a pixel, and tell whether it is seen there."""
-    solid, depth, _, place = canvas
+def _shows(buffer: Buffers, row: int, column: int, z: float, number: int) -> bool:
+    """Put a solid's surface at depth z into a pixel; return whether the pixel shows it."""
+    solid, depth, _, place = buffer
     ahead, hair = z - depth[row, column], _HAIR / place[2]
     depth[row, column] = max(depth[row, column], z)
     if ahead <= hair and (ahead < -hair or number < solid[row, column]):
@@ -156,17 +157,19 @@ def colour(
     line: int,
     ink: Pixels,
 ) -> None:
-    """Paint what a canvas shows over a picture [H, W, 3].
+    """Paint the solids in a depth buffer over a picture.
+
+    Lines run around the body, and where one part stands before another, on the farther one.
 
     Args:
-        picture: what is behind it, painted over.
-        solid, depth, shade: the canvas.
-        paints: RGB of the solids [N, 3].
-        parts: which part each is of [N]: between two parts, and round the body, there is a line.
-        haze: the depth at which it begins, that at which it is whole, and the share of white that it is then.
-        step: metres that a part must stand before another for a line between them; the line is on that other.
-        line: its width in pixels.
-        ink: its RGB [3].
+        picture: the background [H, W, 3], RGB; painted over.
+        solid, depth, shade: the buffer.
+        paints: RGB of the solids [N, 3], 0 to 255.
+        parts: the part that each solid belongs to [N].
+        haze: the depths, metres, where haze begins and where it is full, and its share of white there.
+        step: how far a part must stand before another for a line between them, metres.
+        line: width of the lines, pixels.
+        ink: RGB of the lines [3].
     """
     height, width = solid.shape
     clear, whole, most = haze
@@ -197,13 +200,13 @@ def colour(
 
 @jit
 def halved(picture: Pixels) -> Pixels:
-    """A picture [H, W, 3] at half its width and height, each pixel the mean of four."""
+    """Return a picture [H, W, 3] at half its width and height [H // 2, W // 2, 3], each pixel the mean of four."""
     height, width = len(picture) // 2, picture.shape[1] // 2
     half = np.empty((height, width, 3), dtype=np.uint8)
     for row in range(height):
         for column in range(width):
             for channel in range(3):
-                four = 2  # rounds
+                four = 2  # to round, not truncate
                 for at in range(4):
                     four += picture[2 * row + at // 2, 2 * column + at % 2, channel]
                 half[row, column, channel] = four // 4

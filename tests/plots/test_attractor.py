@@ -25,19 +25,12 @@ from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score
 from motionmind.plots import portrait as portraits
 from motionmind.plots.attractor import ATTRACTORS, attractor, write_attractor
-from motionmind.plots.canvas import (
-    Dot,
-    Inset,
-    Line,
-    Plate,
-    Region,
-    Words,
-    png,
-    svg,
-)
+from motionmind.plots.canvas import Plate, png, svg
+from motionmind.plots.marks import Dot, Inset, Line, Region, Words
 from motionmind.plots.portrait import Portrait, portrait_of
 from motionmind.plots.scene import Room
-from motionmind.plots.symbols import OTHER, PIECE, round_numbers
+from motionmind.plots.symbols import round_numbers
+from motionmind.render.palette import PIECE, VARIATION
 from motionmind.render.solids import EMPTY
 from motionmind.variation.piece import Piece
 from motionmind.variation.variation import Variation, vary
@@ -166,7 +159,7 @@ def test_sites_and_points_are_drawn_where_the_axes_say(portrait: Portrait, plate
 
 
 def test_every_step_of_both_trajectories_is_drawn_and_passes_its_sites(portrait: Portrait, plate: Plate) -> None:
-    for ink, title, count in ((PIECE, "posture", 131), (OTHER, "at", 180)):
+    for ink, title, count in ((PIECE, "posture", 131), (VARIATION, "at", 180)):
         points = lines(plate, ink)[0].points
         assert len(points) == (count - 1) * portrait.every + 1
         places = np.array([dots(plate, title)[n].at for n in range(count)])
@@ -182,7 +175,7 @@ def test_both_itineraries_are_drawn_and_every_jump(portrait: Portrait, plate: Pl
     assert jumps == sorted(2 * [(seam.start, seam.end, seam.number) for seam in seams])
 
     top = max(mark.at[1] for mark in dots(plate, "at").values())
-    below = [m for m in plate.marks if isinstance(m, Dot) and m.at[1] > top + 50.0 and OTHER in (m.fill, m.rim)]
+    below = [m for m in plate.marks if isinstance(m, Dot) and m.at[1] > top + 50.0 and VARIATION in (m.fill, m.rim)]
     places = {round(mark.at[0], 6): mark.at[1] for mark in below}  # a parting lies on a jump
     heights = [places[x] for x in sorted(places)]
     assert len(heights) == len(portrait.order)
@@ -260,7 +253,7 @@ def test_png_shows_what_svg_does(plate: Plate) -> None:
     image = Image.open(BytesIO(png(plate))).convert("RGB")
     assert image.size == (plate.width, plate.height)
     found = 0
-    for title, ink in (("posture", PIECE), ("at", OTHER)):
+    for title, ink in (("posture", PIECE), ("at", VARIATION)):
         for dot in dots(plate, title).values():
             alone = not any(
                 mark is not dot and isinstance(mark, Dot) and np.hypot(*np.subtract(mark.at, dot.at)) < 8.0
@@ -403,7 +396,7 @@ def test_the_page_follows_the_variation_on_its_attractor(browser: Any, tmp_path:
         assert tab.inner_text("#site") == str(variation.order[n])
         assert f"posture {variation.order[n]} of the piece, at {n} of 59" in tab.inner_text("#reading")
     shot = np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB")).astype(int)
-    for ink in (PIECE, OTHER):
+    for ink in (PIECE, VARIATION):
         assert (np.abs(shot - ink).max(axis=-1) < 40).sum() > 50
     context.close()
     assert [line for line in said if not re.search("GPU stall|WebGL context could not", line)] == []

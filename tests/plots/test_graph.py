@@ -14,14 +14,9 @@ from command_line import Run
 from PIL import Image
 
 from motionmind.errors import MotionMindError
-from motionmind.plots.joint_graph import (
-    GRAPHS,
-    GraphLayout,
-    draw,
-    png,
-    svg,
-    write_graph,
-)
+from motionmind.plots.canvas import png, svg
+from motionmind.plots.graph_layout import GraphLayout, lay_out
+from motionmind.plots.joint_graph import GRAPHS, graph_plate, write_graph
 from motionmind.tween.engine import Engine
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -71,17 +66,17 @@ def assert_readable(drawing: GraphLayout) -> None:
 @pytest.mark.parametrize(("corpus", "joint"), GRAPHS_OF)
 def test_the_picture_has_every_state_and_transition_and_can_be_read(corpus: str, joint: str) -> None:
     graph = graph_of(corpus, joint)
-    drawing = draw(graph)
+    drawing = lay_out(graph)
     assert_readable(drawing)
     assert len(drawing.circles) == len(graph)
     assert len(drawing.arrows) == sum(a != b for a, b in graph.edges)
     named = sum(circle.words_at is not None for circle in drawing.circles)
     assert named > 0.7 * len(graph)
-    root = ElementTree.fromstring(svg(drawing))
+    root = ElementTree.fromstring(svg(graph_plate(graph)))
     assert len(root.findall(f".//{SVG}circle")) == len(graph)
     assert len(root.findall(f".//{SVG}polygon")) == len(drawing.arrows)
     assert len(root.findall(f".//{SVG}text")) == named + 2
-    image = Image.open(BytesIO(png(drawing)))
+    image = Image.open(BytesIO(png(graph_plate(graph))))
     assert image.size == (drawing.width, drawing.height)
     for circle in drawing.circles:
         assert image.getpixel((round(circle.at[0]), round(circle.at[1]))) == (58, 104, 160)
@@ -89,7 +84,7 @@ def test_the_picture_has_every_state_and_transition_and_can_be_read(corpus: str,
 
 def test_arrows_join_the_circles_that_they_are_between_and_tell_how_likely_they_are() -> None:
     graph = graph_of("ballet", "left_shoulder")
-    drawing = draw(graph)
+    drawing = lay_out(graph)
     circles = dict(zip(graph, drawing.circles, strict=True))
     told = {arrow.title: arrow for arrow in drawing.arrows}
     for a, b, data in graph.edges(data=True):
@@ -110,7 +105,7 @@ def test_arrows_join_the_circles_that_they_are_between_and_tell_how_likely_they_
 
 def test_likely_states_are_larger_and_near_orientations_lie_nearer() -> None:
     graph = graph_of("ballet", "left_hip")
-    drawing, visits = draw(graph), [data["visits"] for _, data in graph.nodes(data=True)]
+    drawing, visits = lay_out(graph), [data["visits"] for _, data in graph.nodes(data=True)]
     radii = [circle.radius for circle in drawing.circles]
     assert np.argsort(visits, kind="stable").tolist() == np.argsort(radii, kind="stable").tolist()
     q = np.array([data["orientation"] for _, data in graph.nodes(data=True)])
@@ -121,31 +116,32 @@ def test_likely_states_are_larger_and_near_orientations_lie_nearer() -> None:
 
 
 def test_what_no_transition_joins_is_left_out_and_counted() -> None:
-    drawing = draw(toy([(0, 1), (1, 2), (2, 0), (4, 4)], 6))
+    drawing = lay_out(toy([(0, 1), (1, 2), (2, 0), (4, 4)], 6))
     assert [circle.name for circle in drawing.circles] == ["0", "1", "2"]
     assert drawing.heading == ("knee (toys): 6 states, 3 transitions between them; 3 that no transition joins left out")
-    assert draw(toy([(0, 1)], 2)).heading.endswith("them")
+    assert lay_out(toy([(0, 1)], 2)).heading.endswith("them")
 
 
 @pytest.mark.parametrize("edges", [[], [(0, 0)], [(0, 1)], [(0, 1), (1, 0), (2, 3)], [(0, 1), (2, 3), (4, 5), (5, 4)]])
 def test_small_graphs_and_parts_that_hang_on_nothing_have_their_places(edges: list[tuple[int, int]]) -> None:
-    drawing = draw(toy(edges, 6))
+    graph = toy(edges, 6)
+    drawing = lay_out(graph)
     assert_readable(drawing)
     assert len(drawing.circles) == len({state for a, b in edges if a != b for state in (a, b)})
-    ElementTree.fromstring(svg(drawing))
-    assert Image.open(BytesIO(png(drawing))).size == (drawing.width, drawing.height)
+    ElementTree.fromstring(svg(graph_plate(graph)))
+    assert Image.open(BytesIO(png(graph_plate(graph)))).size == (drawing.width, drawing.height)
 
 
 def test_states_of_one_orientation_do_not_lie_on_each_other() -> None:
     graph = toy([(a, b) for a in range(5) for b in range(5)], 5)
     for state in graph:
         graph.nodes[state]["orientation"] = (0.0, 0.0, 0.0, 1.0)
-    assert_readable(draw(graph))
+    assert_readable(lay_out(graph))
 
 
 def test_the_facing_goes_round() -> None:
     graph = graph_of("walk-hexapod", "facing")
-    drawing = draw(graph)
+    drawing = lay_out(graph)
     places = np.array([circle.at for circle in drawing.circles])
     centre = places.mean(axis=0)
     assert np.ptp(np.linalg.norm(places - centre, axis=1)) < 1.0
@@ -172,7 +168,7 @@ def test_states_tell_which_of_their_parents_states_they_go_with() -> None:
             names = {engine.space.label(parent, p) for p in seen}
             assert {name for name, _ in data["given"]} <= names
         name, chance = graph.nodes[0]["given"][0]
-        assert f"{chance:.0%} where left_hip is {name}" in draw(graph).circles[0].title
+        assert f"{chance:.0%} where left_hip is {name}" in lay_out(graph).circles[0].title
 
 
 def test_other_programs_read_all_of_it(tmp_path: Path) -> None:
@@ -216,4 +212,4 @@ def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run, tmp_path: Path) -> 
 def test_names_that_xml_cannot_hold_are_written_as_it_can() -> None:
     graph = toy([(0, 1), (1, 0)], 2)
     graph.nodes[0]["label"] = 'a<b & "c"\x01'
-    ElementTree.fromstring(svg(draw(graph)))
+    ElementTree.fromstring(svg(graph_plate(graph)))

@@ -26,11 +26,13 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.render import film
-from motionmind.render.camera import VIEWS
-from motionmind.render.figure import BRIDGED, COLOURS, INSERTED
+from motionmind.render.camera import SMOOTH
 from motionmind.render.film import write_film, write_still
+from motionmind.render.palette import BRIDGED, COLOURS, INSERTED
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import HOLD, LARGEST, SMALLEST, SMOOTH, FigurePlate, Stage, frame_times
+from motionmind.render.stage import LARGEST, SMALLEST, FigurePlate, Stage
+from motionmind.render.timing import HOLD, frame_times
+from motionmind.render.view import VIEWS
 
 SMALL = 200  # pixels: pictures for tests
 UP = human23().height * 0.55  # metres from the floor to the root of a person who stands
@@ -116,7 +118,7 @@ ODD = {
 
 def touched(drawing: FigurePlate, stage: Stage) -> tuple[Floats, Floats]:
     """The rows and columns of the picture, pixels, that a body covers."""
-    rows, columns = np.nonzero(drawing.canvas.solid != EMPTY)
+    rows, columns = np.nonzero(drawing.buffer.solid != EMPTY)
     x, y = drawing.corner
     return rows / SMOOTH + y, columns / SMOOTH + x
 
@@ -147,7 +149,7 @@ def test_all_of_the_body_is_in_the_picture(name: str, view: str) -> None:
             assert free <= rows.min() <= rows.max() <= camera.height - stage.strip - free
             assert free <= columns.min() <= columns.max() <= camera.width - free
             largest = max(largest, np.ptp(rows), np.ptp(columns))
-            edge = drawing.canvas.solid.copy()
+            edge = drawing.buffer.solid.copy()
             edge[1:-1, 1:-1] = EMPTY
             assert (edge == EMPTY).all()  # nothing is cut off by its own box
         assert stage.picture(number).shape == (camera.height, camera.width, 3)
@@ -210,7 +212,7 @@ def test_shadows_darken_the_floor_and_no_ghost() -> None:
         dark[stage.drawing(number).box] = 0.0
         haunted = np.zeros(dark.shape, dtype=bool)
         for ghost in stage.ghosts(number):
-            haunted[ghost.box] = ghost.canvas.solid[::SMOOTH, ::SMOOTH] != EMPTY
+            haunted[ghost.box] = ghost.buffer.solid[::SMOOTH, ::SMOOTH] != EMPTY
         fallen = behind.astype(float).sum(axis=-1) - picture.sum(axis=-1)
         clear = dark > 0.05
         assert (fallen[clear & ~haunted] > 10.0).all()
@@ -228,7 +230,7 @@ def test_a_mirrored_motion_has_a_mirrored_picture() -> None:
         for stage in stages:
             picture = np.zeros((SMOOTH * stage.camera.height, SMOOTH * stage.camera.width), dtype=bool)
             rows, columns = (slice(SMOOTH * box.start, SMOOTH * box.stop) for box in stage.drawing(number).box)
-            picture[rows, columns] = stage.drawing(number).canvas.solid != EMPTY
+            picture[rows, columns] = stage.drawing(number).buffer.solid != EMPTY
             bodies.append(picture)
         assert (bodies[0] != bodies[1][:, ::-1]).sum() < 0.01 * bodies[0].sum()
         pictures = [stage.picture(number)[: -stage.strip].astype(int).sum(axis=-1) for stage in stages]
@@ -251,8 +253,8 @@ def test_ghosts_are_the_ends_of_the_insertion_that_goes_on() -> None:
         for ghost, end in zip(ghosts, (2, 6), strict=False):
             own = stage.drawing(end)
             assert ghost.corner == own.corner
-            assert (ghost.canvas.solid == own.canvas.solid).all()
-            filled = own.canvas.solid.reshape(own.canvas.solid.shape[0] // 2, 2, -1, 2) != EMPTY
+            assert (ghost.buffer.solid == own.buffer.solid).all()
+            filled = own.buffer.solid.reshape(own.buffer.solid.shape[0] // 2, 2, -1, 2) != EMPTY
             covered[own.box] |= filled.any(axis=(1, 3))
             assert changed[own.box][filled.all(axis=(1, 3))].mean() > 0.95
             assert np.abs(stage.backdrop(number) - alone)[own.box].max() < 100  # pale

@@ -23,18 +23,12 @@ from motionmind.body.mirror import LEFT, RIGHT
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.render import figure
+from motionmind.render import palette
 from motionmind.render.body_shape import shape_of
 from motionmind.render.depth_buffer import DepthBuffer
-from motionmind.render.figure import (
-    FRONT,
-    STAGE_RIGHT,
-    colour,
-    draw,
-    halved,
-    seen,
-)
+from motionmind.render.figure import colour, draw, halved
 from motionmind.render.sheet import _Sheet
+from motionmind.render.view import FRONT, STAGE_RIGHT, to_view
 
 GOLDEN = Path(__file__).parent / "golden"
 OFF = 16  # of 255, in any of red, green and blue: more is another colour, or another edge
@@ -92,9 +86,9 @@ def hand() -> Pixels:
     posture = bent(human44(), left_elbow=(-0.9, 0.0, 0.0), left_wrist=(-0.5, 0.0, 0.2), **curled)
     body = shape_of(posture.skeleton)
     fingers = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index("left_fingers")]
-    canvas = DepthBuffer(-0.15, 0.1, 360, 240, 1200.0)
-    draw(canvas, *seen(*body.solids(posture.rotations, posture.root), FRONT, fingers))
-    return halved(colour(canvas, body, np.full((240, 360, 3), 255, dtype=np.uint8)))
+    buffer = DepthBuffer(-0.15, 0.1, 360, 240, 1200.0)
+    draw(buffer, *to_view(*body.solids(posture.rotations, posture.root), FRONT, fingers))
+    return halved(colour(buffer, body, np.full((240, 360, 3), 255, dtype=np.uint8)))
 
 
 def inserted() -> Pixels:
@@ -148,10 +142,10 @@ def test_a_knee_that_bends_is_noticed() -> None:
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_colours_that_are_exchanged_are_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for palette in (figure.COLOURS, figure.INSERTED):
-        exchanged = {LEFT: palette[RIGHT], RIGHT: palette[LEFT]}
+    for colours in (palette.COLOURS, palette.INSERTED):
+        exchanged = {LEFT: colours[RIGHT], RIGHT: colours[LEFT]}
         for side, paint in exchanged.items():
-            monkeypatch.setitem(palette, side, paint)
+            monkeypatch.setitem(colours, side, paint)
     assert off(PICTURES[name](), golden(name)) > SHARE
 
 

@@ -26,8 +26,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import motions
 from motionmind.notation.read import read_score
 from motionmind.render.body_shape import shape_of
-from motionmind.render.figure import BRIDGED, COLOURS, INSERTED
 from motionmind.render.page import packed, page, write_page
+from motionmind.render.palette import BRIDGED, COLOURS, INSERTED
 
 CORPORA = Path(__file__).parents[2] / "corpora"
 SIZE = {"width": 640, "height": 480}

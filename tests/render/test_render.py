@@ -26,31 +26,19 @@ from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.render import sheet as sheets
-from motionmind.render.body_shape import FACE, BodyShape, shape_of
+from motionmind.render.body_shape import shape_of
+from motionmind.render.body_solids import BodyShape
+from motionmind.render.camera import SMOOTH
 from motionmind.render.depth_buffer import DepthBuffer
-from motionmind.render.figure import (
-    ABOVE,
-    COLOURS,
-    FRONT,
-    INK,
-    INSERTED,
-    STAGE_LEFT,
-    STAGE_RIGHT,
-    View,
-    bridge_balls,
-    colour,
-    draw,
-    halved,
-    inserted,
-    plain,
-    seen,
-)
+from motionmind.render.figure import bridge_balls, colour, draw, given_colours, halved, inserted_colours
+from motionmind.render.palette import COLOURS, FACE, INK, INSERTED, SHEET_FLOOR, SHEET_PAPER, SUNK
 from motionmind.render.sheet import MOST, contact_sheet
 from motionmind.render.solids import EMPTY, Cones, Ellipsoids
+from motionmind.render.view import ABOVE, FRONT, STAGE_LEFT, STAGE_RIGHT, View, to_view
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 SCALE = 100.0  # pixels a metre
-HALF = 1.5  # metres from the middle of a test's canvas to its edges
+HALF = 1.5  # metres from the middle of a test's buffer to its edges
 VIEWS = [FRONT, STAGE_RIGHT, STAGE_LEFT, ABOVE]
 NAMES = human23().names
 seeds = st.integers(0, 2**32 - 1)
@@ -81,18 +69,18 @@ def mirrored(posture: Posture) -> Posture:
 
 
 def drawn(posture: Posture, view: View, origin: Floats | None = None) -> tuple[BodyShape, DepthBuffer]:
-    """A body on a canvas of 3 m by 3 m about the origin, which is the root's place by default."""
+    """A body on a buffer of 3 m by 3 m about the origin, which is the root's place by default."""
     body = shape_of(posture.skeleton)
-    canvas = DepthBuffer(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
+    buffer = DepthBuffer(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
     solids = body.solids(posture.rotations, posture.root)
-    draw(canvas, *seen(*solids, view, posture.root if origin is None else origin))
-    return body, canvas
+    draw(buffer, *to_view(*solids, view, posture.root if origin is None else origin))
+    return body, buffer
 
 
-def shown(body: BodyShape, canvas: DepthBuffer, *, part: str = "", paint: str = "") -> Bools:
+def shown(body: BodyShape, buffer: DepthBuffer, *, part: str = "", paint: str = "") -> Bools:
     """Which pixels [H, W] show a part, or a paint."""
     wanted = [part in {"", p} and paint in {"", c} for p, c in zip(body.parts, body.paints, strict=True)]
-    return np.array([*wanted, False])[canvas.solid]
+    return np.array([*wanted, False])[buffer.solid]
 
 
 def centre(pixels: Bools) -> Floats:
@@ -120,16 +108,16 @@ def moved(motion: Motion, *by: float) -> Motion:
     return replace(motion, root=np.add(motion.root, by))
 
 
-def cone(canvas: DepthBuffer, number: int, a: Floats, b: Floats, a_radius: float, b_radius: float) -> None:
+def cone(buffer: DepthBuffer, number: int, a: Floats, b: Floats, a_radius: float, b_radius: float) -> None:
     """Draw one round cone."""
     one = Cones(a[None], b[None], np.array([a_radius]), np.array([b_radius]))
-    canvas.draw(one, Ellipsoids(np.empty((0, 3)), np.empty((0, 3, 3))), np.array([number], dtype=np.int16))
+    buffer.draw(one, Ellipsoids(np.empty((0, 3)), np.empty((0, 3, 3))), np.array([number], dtype=np.int16))
 
 
-def ellipsoid(canvas: DepthBuffer, number: int, centre: Floats, axes: Floats) -> None:
+def ellipsoid(buffer: DepthBuffer, number: int, centre: Floats, axes: Floats) -> None:
     """Draw one ellipsoid."""
     none = Cones(*np.empty((2, 0, 3)), *np.empty((2, 0)))
-    canvas.draw(none, Ellipsoids(centre[None], axes[None]), np.array([number], dtype=np.int16))
+    buffer.draw(none, Ellipsoids(centre[None], axes[None]), np.array([number], dtype=np.int16))
 
 
 # --- solids ---------------------------------------------------------------------------------------------------------
@@ -141,19 +129,19 @@ def test_a_cone_is_the_union_of_its_balls(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.uniform(-0.8, 0.8, (2, 3)) * rng.choice([1.0, 0.1], (2, 3))
     radii = rng.uniform(0.02, 0.4, 2)
-    canvas = DepthBuffer(-1.5, 1.5, 60, 60, 20.0)
-    cone(canvas, 7, a, b, *radii)
+    buffer = DepthBuffer(-1.5, 1.5, 60, 60, 20.0)
+    cone(buffer, 7, a, b, *radii)
     balls = DepthBuffer(-1.5, 1.5, 60, 60, 20.0)
     for t in np.linspace(0.0, 1.0, 250):
         radius = radii[0] + t * (radii[1] - radii[0])
         ellipsoid(balls, 7, a + t * (b - a), radius * np.eye(3))
     if np.linalg.norm((b - a)[:2]) > abs(radii[1] - radii[0]):  # else it is drawn as the two balls at its ends
-        assert (canvas.solid != balls.solid).mean() < 0.003  # pixels at the very rim
-        both = (canvas.solid == 7) & (balls.solid == 7)
-        assert np.abs(canvas.depth[both] - balls.depth[both]).max() < 0.02
-        assert np.abs(canvas.depth[both] - balls.depth[both]).mean() < 1e-3
+        assert (buffer.solid != balls.solid).mean() < 0.003  # pixels at the very rim
+        both = (buffer.solid == 7) & (balls.solid == 7)
+        assert np.abs(buffer.depth[both] - balls.depth[both]).max() < 0.02
+        assert np.abs(buffer.depth[both] - balls.depth[both]).mean() < 1e-3
     else:
-        assert not ((canvas.solid == 7) & (balls.solid == EMPTY)).any()
+        assert not ((buffer.solid == 7) & (balls.solid == EMPTY)).any()
 
 
 @given(seeds)
@@ -162,10 +150,10 @@ def test_an_ellipsoid_contains_its_axes_ends_and_no_more(seed: int) -> None:
     rng = np.random.default_rng(seed)
     radii = rng.uniform(0.1, 0.5, 3)
     axes = rot.to_matrix(rot.normalise(rng.normal(size=4))) * radii
-    canvas = DepthBuffer(-1.0, 1.0, 200, 200, 100.0)
-    ellipsoid(canvas, 0, np.zeros(3), axes)
-    rows, columns = np.nonzero(canvas.solid == 0)
-    x, y, z = (columns + 0.5) / 100 - 1.0, 1.0 - (rows + 0.5) / 100, canvas.depth[rows, columns]
+    buffer = DepthBuffer(-1.0, 1.0, 200, 200, 100.0)
+    ellipsoid(buffer, 0, np.zeros(3), axes)
+    rows, columns = np.nonzero(buffer.solid == 0)
+    x, y, z = (columns + 0.5) / 100 - 1.0, 1.0 - (rows + 0.5) / 100, buffer.depth[rows, columns]
     on = np.linalg.norm(np.linalg.inv(axes) @ np.stack([x, y, z]), axis=0)
     assert np.abs(on - 1.0).max() < 1e-4
     # Its shadow is an ellipse, whose area is known.
@@ -176,7 +164,7 @@ def test_an_ellipsoid_contains_its_axes_ends_and_no_more(seed: int) -> None:
 def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None:
     posture = random_posture(4)
     _, together = drawn(posture, FRONT)
-    cones, balls = seen(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
+    cones, balls = to_view(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
     alone = DepthBuffer(-HALF, HALF, int(2 * HALF * SCALE), int(2 * HALF * SCALE), SCALE)
     for number in range(len(cones.a) + len(balls.centre)):
         draw(alone, cones, balls, frozenset([number]))
@@ -189,7 +177,7 @@ def test_solids_drawn_together_hide_one_another_as_if_drawn_one_by_one() -> None
 def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
     posture = random_posture(9)
     _, whole = drawn(posture, FRONT)
-    solids = seen(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
+    solids = to_view(*shape_of(human23()).solids(posture.rotations, posture.root), FRONT, posture.root)
     rows, columns = slice(135, 165), slice(130, 170)  # the trunk and what is about it, cut on all sides
     part = DepthBuffer(columns.start / SCALE - HALF, HALF - rows.start / SCALE, 40, 30, SCALE)
     draw(part, *solids)
@@ -200,10 +188,10 @@ def test_a_canvas_shows_its_part_of_what_a_larger_one_shows() -> None:
 
 
 def test_what_goes_through_something_is_seen_on_both_sides_of_it() -> None:
-    canvas = DepthBuffer(-1.0, 1.0, 100, 100, 50.0)
-    cone(canvas, 0, np.array([-0.8, 0.0, 0.0]), np.array([0.8, 0.0, 0.0]), 0.1, 0.1)
-    cone(canvas, 1, np.array([-0.8, 0.0, -0.5]), np.array([0.8, 0.0, 0.5]), 0.1, 0.1)
-    middle_row = canvas.solid[50]
+    buffer = DepthBuffer(-1.0, 1.0, 100, 100, 50.0)
+    cone(buffer, 0, np.array([-0.8, 0.0, 0.0]), np.array([0.8, 0.0, 0.0]), 0.1, 0.1)
+    cone(buffer, 1, np.array([-0.8, 0.0, -0.5]), np.array([0.8, 0.0, 0.5]), 0.1, 0.1)
+    middle_row = buffer.solid[50]
     assert (middle_row[20:45] == 0).all()
     assert (middle_row[55:80] == 1).all()
 
@@ -318,23 +306,23 @@ def test_a_body_without_any_extent_can_be_drawn() -> None:
 
 
 def test_the_performers_left_is_on_the_audiences_right() -> None:
-    body, canvas = drawn(standing(), FRONT)
-    assert centre(shown(body, canvas, paint=LEFT))[0] > 0.1
-    assert centre(shown(body, canvas, paint=RIGHT))[0] < -0.1
-    picture = colour(canvas, body, np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8)).astype(int)
+    body, buffer = drawn(standing(), FRONT)
+    assert centre(shown(body, buffer, paint=LEFT))[0] > 0.1
+    assert centre(shown(body, buffer, paint=RIGHT))[0] < -0.1
+    picture = colour(buffer, body, np.full((*buffer.solid.shape, 3), 255, dtype=np.uint8)).astype(int)
     warm = picture[..., 0] - picture[..., 2]
-    assert np.median(warm[shown(body, canvas, paint=LEFT)]) > 80
-    assert np.median(warm[shown(body, canvas, paint=RIGHT)]) < -80
+    assert np.median(warm[shown(body, buffer, paint=LEFT)]) > 80
+    assert np.median(warm[shown(body, buffer, paint=RIGHT)]) < -80
 
 
 @pytest.mark.parametrize(("view", "front"), [(STAGE_RIGHT, 1.0), (STAGE_LEFT, -1.0)], ids=["right", "left"])
 def test_from_the_side_the_face_and_the_toes_look_to_the_audience(view: View, front: float) -> None:
-    body, canvas = drawn(standing(), view)
-    head = centre(shown(body, canvas, part="head"))
-    assert front * (centre(shown(body, canvas, paint=FACE))[0] - head[0]) > 0.02
+    body, buffer = drawn(standing(), view)
+    head = centre(shown(body, buffer, part="head"))
+    assert front * (centre(shown(body, buffer, paint=FACE))[0] - head[0]) > 0.02
     near = RIGHT if view is STAGE_RIGHT else LEFT
-    assert front * centre(shown(body, canvas, part=f"{near}_foot"))[0] > 0.02
-    assert not shown(body, canvas, part=f"{LEFT if near == RIGHT else RIGHT}_thigh").any()
+    assert front * centre(shown(body, buffer, part=f"{near}_foot"))[0] > 0.02
+    assert not shown(body, buffer, part=f"{LEFT if near == RIGHT else RIGHT}_thigh").any()
 
 
 def test_the_face_is_seen_only_by_those_whom_it_looks_at() -> None:
@@ -356,8 +344,8 @@ def test_the_kneecap_is_on_the_side_to_which_the_knee_points(flexion: float, tur
     assert np.allclose(beak / np.linalg.norm(beak), ahead)
     for view in (FRONT, STAGE_RIGHT):
         points = view.axes @ ahead
-        body, canvas = drawn(posture, view)
-        cap, limb = shown(body, canvas, part="left_kneecap"), shown(body, canvas, part="left_thigh")
+        body, buffer = drawn(posture, view)
+        cap, limb = shown(body, buffer, part="left_kneecap"), shown(body, buffer, part="left_thigh")
         if abs(points[0]) > 0.4 and cap.any() and limb.any():
             offset = centre(cap) - place(posture, "left_knee", view)[:2]
             assert points[0] * offset[0] > 0.0
@@ -377,31 +365,31 @@ def test_the_nearer_leg_covers_the_farther(front: str) -> None:
             for (side, z), ahead in zip(swing.items(), (-0.25, 0.25) if front == "left" else (0.25, -0.25), strict=True)
         }
     )
-    body, canvas = drawn(posture, FRONT)
-    both = np.ones(canvas.solid.shape, dtype=bool)
+    body, buffer = drawn(posture, FRONT)
+    both = np.ones(buffer.solid.shape, dtype=bool)
     for side in swing:
         alone = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part == f"{side}_shank")
-        draw(alone, *seen(*body.solids(posture.rotations, posture.root), FRONT, posture.root), only)
+        draw(alone, *to_view(*body.solids(posture.rotations, posture.root), FRONT, posture.root), only)
         both &= alone.solid != EMPTY
     assert both.sum() > 100
     other = "right" if front == "left" else "left"
-    assert not shown(body, canvas, part=f"{other}_shank")[both].any()
+    assert not shown(body, buffer, part=f"{other}_shank")[both].any()
 
 
 @given(seeds)
 @settings(max_examples=30)
 def test_each_pixel_shows_the_nearest_solid(seed: int) -> None:
     posture = random_posture(seed)
-    body, canvas = drawn(posture, FRONT)
-    solids = seen(*body.solids(posture.rotations, posture.root), FRONT, posture.root)
+    body, buffer = drawn(posture, FRONT)
+    solids = to_view(*body.solids(posture.rotations, posture.root), FRONT, posture.root)
     for solid in np.random.default_rng(seed).choice(len(body.parts), 5):
         alone = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         draw(alone, *solids, frozenset({int(solid)}))
-        assert (canvas.depth >= alone.depth).all()
-        mine = canvas.solid == solid
+        assert (buffer.depth >= alone.depth).all()
+        mine = buffer.solid == solid
         assert np.allclose(
-            canvas.depth[mine], alone.depth[mine], rtol=0.0, atol=0.002 / SCALE
+            buffer.depth[mine], alone.depth[mine], rtol=0.0, atol=0.002 / SCALE
         )  # but for who touches it
 
 
@@ -409,55 +397,55 @@ def test_each_pixel_shows_the_nearest_solid(seed: int) -> None:
 @settings(max_examples=30)
 def test_a_mirrored_posture_gives_the_mirrored_picture_with_the_colours_exchanged(seed: int) -> None:
     posture = random_posture(seed)
-    body, canvas = drawn(posture, FRONT)
+    body, buffer = drawn(posture, FRONT)
     _, other = drawn(mirrored(posture), FRONT)
     swap = {LEFT: RIGHT, RIGHT: LEFT}
-    differ = np.zeros(canvas.solid.shape, dtype=bool)
+    differ = np.zeros(buffer.solid.shape, dtype=bool)
     for paint in set(body.paints):
-        here, there = shown(body, canvas, paint=paint), shown(body, other, paint=swap.get(paint, paint))
+        here, there = shown(body, buffer, paint=paint), shown(body, other, paint=swap.get(paint, paint))
         differ |= here != there[:, ::-1]
     assert differ.mean() < 2e-4  # pixels whose middle is on an edge to the last digit
-    assert np.abs(canvas.shade - other.shade[:, ::-1])[~differ].max() < 0.02
+    assert np.abs(buffer.shade - other.shade[:, ::-1])[~differ].max() < 0.02
 
 
 @pytest.mark.parametrize("view", [FRONT, STAGE_RIGHT], ids=["front", "side"])
 def test_a_limb_before_another_has_a_line_round_it_and_one_that_goes_on_has_none(view: View) -> None:
     crossed = standing(left_shoulder=[0.0, -1.9, 0.0], left_elbow=[0.0, -0.4, 0.0])
-    body, canvas = drawn(crossed, FRONT)
-    picture = colour(canvas, body, np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8))
+    body, buffer = drawn(crossed, FRONT)
+    picture = colour(buffer, body, np.full((*buffer.solid.shape, 3), 255, dtype=np.uint8))
     ink = (picture == INK).all(axis=-1)
-    arm = shown(body, canvas, part="left_forearm") | shown(body, canvas, part="left_hand")
+    arm = shown(body, buffer, part="left_forearm") | shown(body, buffer, part="left_hand")
     beside = np.zeros_like(arm)
     beside[1:] |= arm[:-1]
-    beside &= shown(body, canvas, part="trunk")
+    beside &= shown(body, buffer, part="trunk")
     assert beside.sum() > 10
     assert ink[beside].mean() > 0.9
 
-    body, canvas = drawn(standing(), view)
-    picture = colour(canvas, body, np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8))
+    body, buffer = drawn(standing(), view)
+    picture = colour(buffer, body, np.full((*buffer.solid.shape, 3), 255, dtype=np.uint8))
     ink = (picture == INK).all(axis=-1)
     x, y, _ = place(standing(), "right_knee", view)
     row, column = int((HALF - y) * SCALE), int((x + HALF) * SCALE)
     assert not ink[row + 8 : row + 14, column - 1 : column + 2].any()  # thigh and shank are one leg
 
 
-def lines(canvas: DepthBuffer, parts: Floats, step: float, width: int) -> Bools:
+def lines(buffer: DepthBuffer, parts: Floats, step: float, width: int) -> Bools:
     """Pixels with one of another part that is nearer by a step within `width` above, below or beside them."""
-    part = np.where(canvas.solid == EMPTY, -1, parts[canvas.solid])
+    part = np.where(buffer.solid == EMPTY, -1, parts[buffer.solid])
     here, found = np.s_[width:-width, width:-width], np.zeros(part.shape, dtype=bool)
     for by in range(1, width + 1):
         for shift, axis in ((by, 0), (-by, 0), (by, 1), (-by, 1)):
-            other, depth = (np.roll(array, shift, axis) for array in (part, canvas.depth))
-            found[here] |= ((part != other) & (depth > canvas.depth + step))[here]
+            other, depth = (np.roll(array, shift, axis) for array in (part, buffer.depth))
+            found[here] |= ((part != other) & (depth > buffer.depth + step))[here]
     return found
 
 
 @pytest.mark.parametrize("width", [1, 2, 5])
 def test_lines_are_where_a_nearer_part_is_near(width: int) -> None:
-    body, canvas = drawn(random_posture(12), STAGE_RIGHT)
+    body, buffer = drawn(random_posture(12), STAGE_RIGHT)
     parts = np.unique(body.parts, return_inverse=True)[1].astype(float)
-    picture = colour(canvas, body, np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8), width)
-    assert np.array_equal((picture == INK).all(axis=-1), lines(canvas, parts, 0.016 * body.size, width))
+    picture = colour(buffer, body, np.full((*buffer.solid.shape, 3), 255, dtype=np.uint8), width)
+    assert np.array_equal((picture == INK).all(axis=-1), lines(buffer, parts, 0.016 * body.size, width))
 
 
 def test_what_is_farther_is_paler() -> None:
@@ -517,11 +505,11 @@ def test_nothing_is_cut_off(seed: int, kind: str) -> None:
     sheet = sheets._Sheet(motion, [0, 1, 2], STAGE_RIGHT)
     for at in range(3):
         for window in sheet.windows:
-            canvas = sheets._canvas(window)
-            draw(canvas, *sheet._solids(at, window.view))
-            edge = np.concatenate([canvas.solid[0], canvas.solid[-1], canvas.solid[:, 0], canvas.solid[:, -1]])
+            buffer = window.buffer()
+            draw(buffer, *sheet._solids(at, window.view))
+            edge = np.concatenate([buffer.solid[0], buffer.solid[-1], buffer.solid[:, 0], buffer.solid[:, -1]])
             assert (edge == EMPTY).all()
-            assert (canvas.solid != EMPTY).sum() > 200
+            assert (buffer.solid != EMPTY).sum() > 200
 
 
 def test_one_floor_and_one_scale_for_the_whole_sheet() -> None:
@@ -532,9 +520,9 @@ def test_one_floor_and_one_scale_for_the_whole_sheet() -> None:
         pictures = [np.asarray(sheet._view(at, window)).astype(int) for at in (0, 1)]
         tops = []
         for pixels in pictures:
-            floor = round(window.pixel(0.0, 0.0)[1]) // sheets._SMOOTH
-            assert (pixels[floor, [0, -1]] == sheets._FLOOR).all()
-            assert (pixels[floor - 1, [0, -1]] == sheets._PAPER).all()
+            floor = round(window.to_samples(0.0, 0.0)[1]) // SMOOTH
+            assert (pixels[floor, [0, -1]] == SHEET_FLOOR).all()
+            assert (pixels[floor - 1, [0, -1]] == SHEET_PAPER).all()
             assert (np.ptp(pixels[floor - 5 : floor], axis=-1) > 60).any()  # feet on it
             tops.append(np.flatnonzero((pixels < 128).any(axis=(1, 2)))[0])
         assert tops[0] > tops[1] + 20  # who stands on the toes is taller than who bends
@@ -557,7 +545,7 @@ def test_what_is_under_the_floor_is_marked() -> None:
     def marked(sinks: float) -> int:
         sheet = sheets._Sheet(moved(motion, 0.0, -sinks, 0.0), [0], STAGE_RIGHT)
         pixels = np.asarray(sheet._view(0, sheet.windows[0])).astype(int)
-        return int((np.abs(pixels - sheets._SUNK).max(axis=-1) < 30).sum())
+        return int((np.abs(pixels - SUNK).max(axis=-1) < 30).sum())
 
     assert marked(0.0) == 0
     assert marked(0.05) > 50
@@ -570,7 +558,7 @@ def test_turned_out_feet_are_wider_from_above() -> None:
         body = shape_of(posture.skeleton)
         feet = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
         only = frozenset(i for i, part in enumerate(body.parts) if part.endswith("_foot"))
-        draw(feet, *seen(*body.solids(posture.rotations, posture.root), ABOVE, posture.root), only)
+        draw(feet, *to_view(*body.solids(posture.rotations, posture.root), ABOVE, posture.root), only)
         return np.ptp(np.argwhere(feet.solid != EMPTY), axis=0) / SCALE
 
     ahead = plan()
@@ -642,25 +630,25 @@ def test_the_ball_of_a_bridged_joint_is_around_it_and_seen_from_somewhere(joint:
     assert bridge_balls(body, joints, ~which).centre.shape == (len(NAMES) - 1, 3)
     green = 0
     for view in VIEWS:
-        canvas = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
-        draw(canvas, *seen(cones, balls.joined(ball), view, posture.root))
-        assert canvas.solid.max() <= len(body.parts)
-        picture = colour(canvas, body, np.full((300, 300, 3), 255, dtype=np.uint8)).astype(int)
-        ball_itself = picture[(canvas.solid == len(body.parts)) & (picture != INK).any(axis=-1)]
+        buffer = DepthBuffer(-HALF, HALF, 300, 300, SCALE)
+        draw(buffer, *to_view(cones, balls.joined(ball), view, posture.root))
+        assert buffer.solid.max() <= len(body.parts)
+        picture = colour(buffer, body, np.full((300, 300, 3), 255, dtype=np.uint8)).astype(int)
+        ball_itself = picture[(buffer.solid == len(body.parts)) & (picture != INK).any(axis=-1)]
         assert (ball_itself[:, 1] > ball_itself[:, [0, 2]].max(axis=-1)).all()
         green += len(ball_itself)
     assert green > 60
 
 
 def test_what_the_engine_made_has_other_colours_and_its_marks_keep_theirs() -> None:
-    body, canvas = drawn(standing(), FRONT)
-    white = np.full((*canvas.solid.shape, 3), 255, dtype=np.uint8)
-    recorded, made = colour(canvas, body, white), colour(canvas, body, white, paints=inserted(body))
-    assert np.array_equal(colour(canvas, body, white, paints=plain(body)), recorded)
+    body, buffer = drawn(standing(), FRONT)
+    white = np.full((*buffer.solid.shape, 3), 255, dtype=np.uint8)
+    recorded, made = colour(buffer, body, white), colour(buffer, body, white, paints=inserted_colours(body))
+    assert np.array_equal(colour(buffer, body, white, paints=given_colours(body)), recorded)
     for paint in COLOURS:
-        there = shown(body, canvas, paint=paint) & (recorded != INK).any(axis=-1)
+        there = shown(body, buffer, paint=paint) & (recorded != INK).any(axis=-1)
         assert (made[there] != recorded[there]).any() == (COLOURS[paint] != INSERTED[paint])
-    left, right = (made[shown(body, canvas, paint=side)].astype(int) for side in (LEFT, RIGHT))
+    left, right = (made[shown(body, buffer, paint=side)].astype(int) for side in (LEFT, RIGHT))
     assert np.median(left[:, 0] - left[:, 2]) > 20 > -20 > np.median(right[:, 0] - right[:, 2])
 
 
@@ -688,11 +676,11 @@ def test_the_balls_of_bridges_have_room() -> None:
     motion = tween(("right_fingers", 0), ("left_toes", 0), ("atlantal", 0))
     sheet = sheets._Sheet(motion, [1], STAGE_RIGHT)
     for window in sheet.windows:
-        canvas, _ = sheet._easel(window)
-        draw(canvas, *sheet._solids(0, window.view))
-        assert (canvas.solid >= len(sheet.body.parts)).any()
+        buffer, _ = sheet._backdrop(window)
+        draw(buffer, *sheet._solids(0, window.view))
+        assert (buffer.solid >= len(sheet.body.parts)).any()
         for edge in np.s_[0, -1, (..., 0), (..., -1)]:
-            assert (canvas.solid[edge] == EMPTY).all()
+            assert (buffer.solid[edge] == EMPTY).all()
 
 
 # --- the command ----------------------------------------------------------------------------------------------------
@@ -910,5 +898,5 @@ def test_a_sheet_has_columns_and_two_sides(options: dict[str, object]) -> None:
 def test_a_body_far_under_or_over_the_floor_keeps_its_colours() -> None:
     for height in (-30.0, 30.0):
         pixels = np.asarray(contact_sheet(moved(standing().as_motion(), 0.0, height, 0.0))).astype(int)
-        assert (np.abs(pixels - sheets._SUNK).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
+        assert (np.abs(pixels - SUNK).max(axis=-1) < 30).sum() < 300  # but for the words that explain it
         assert (pixels[..., 0] - pixels[..., 2] > 60).sum() > 500

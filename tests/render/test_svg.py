@@ -25,11 +25,13 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
-from motionmind.render.camera import VIEWS
+from motionmind.render.bspline import path
 from motionmind.render.solids import EMPTY
-from motionmind.render.stage import Stage, frame_times
+from motionmind.render.stage import Stage
 from motionmind.render.svg import svg, write_svg
-from motionmind.render.trace import Lines, outlines, path, ridges, smooth
+from motionmind.render.timing import frame_times
+from motionmind.render.trace import Lines, outlines, ridges, smooth
+from motionmind.render.view import VIEWS
 
 CHROMIUM = Path("/usr/bin/chromium")
 SVG = "{http://www.w3.org/2000/svg}"
