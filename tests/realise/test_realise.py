@@ -1,4 +1,4 @@
-"""From a path of states to movement: splines, durations, the root, ways, detail, and the whole."""
+"""From a path of states to movement: splines, durations, the root, walks, detail, and the whole."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from motionmind._typing import Floats, Int32s
 from motionmind.body.anatomy_file import anatomy_named
+from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.limbs import parts_of
 from motionmind.body.limits import find_loose, within_limits
@@ -23,10 +24,13 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
-from motionmind.realise.realise import _headings, realise
-from motionmind.realise.root import lowest, root_trajectory, stand
+from motionmind.realise.headings import turn_with_path
+from motionmind.realise.marginals import posterior_marginals
+from motionmind.realise.mean_walk import mean_rotations
+from motionmind.realise.realise import realise
+from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import durations
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, mean_rotations, posterior_marginals
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -160,12 +164,12 @@ def test_bodies_stand_as_high_as_they_are_told() -> None:
     q, root = rot.normalise(rng.normal(size=(20, 23, 4))), rng.normal(size=(20, 3))
     heights = rng.uniform(0.0, 0.5, 20)
     placed = stand(human23(), q, root, heights)
-    np.testing.assert_allclose(lowest(human23(), q, placed), heights, atol=1e-12)
+    np.testing.assert_allclose(lowest_height(human23(), q, placed), heights, atol=1e-12)
     np.testing.assert_array_equal(placed[:, [0, 2]], root[:, [0, 2]])
 
 
 def test_a_foot_that_stands_carries_the_body() -> None:
-    """A body that sways over its feet: from the postures alone the root's way is found again."""
+    """A body that sways over its feet: from the postures alone the root's trajectory is found again."""
     stander, rest = human23(), np.tile(rot.IDENTITY, (30, 23, 1))
     sway = rot.from_axis_angle([1.0, 0.0, 0.0], 0.2 * np.sin(np.arange(30) / 5.0))
     rest[:, [stander.index("left_hip"), stander.index("right_hip")]] = sway[:, None]
@@ -205,7 +209,7 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
 
 
-# --- ways -------------------------------------------------------------------------------------------------------------
+# --- walks -----------------------------------------------------------------------------------------------------------
 
 
 def test_each_joint_is_in_one_part_of_each_size() -> None:
@@ -226,11 +230,11 @@ def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
     count, steps = 4, 3
     begins, ends = np.array([0, 1, 2, 2]), np.array([1, 2, 3, 0])
     shares = np.array([1.0, 1.0, 0.3, 0.7])
-    kinds = np.array([0, 1, 0, 1], dtype=np.int32)
+    clusters = np.array([0, 1, 0, 1], dtype=np.int32)
     near = rng.uniform(0.1, 1.0, (steps + 1, count))
     go = np.zeros((count, count))
     go[begins, ends] = shares
-    alike = (kinds[:, None] == kinds) / 2.0
+    alike = (clusters[:, None] == clusters) / 2.0
     move = go @ (
         STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * np.full((count, count), 0.25)
     )
@@ -239,7 +243,7 @@ def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
         weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
         expected[np.arange(steps + 1), walked] += weight
     expected /= expected.sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, kinds, near), expected, atol=1e-12)
+    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, near), expected, atol=1e-12)
 
 
 def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
@@ -442,7 +446,7 @@ def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned)
     motion = walk()
     for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
         found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
-        assert lowest(human23(), found.rotations, found.root).min() > -1e-3
+        assert lowest_height(human23(), found.rotations, found.root).min() > -1e-3
 
 
 def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
@@ -450,15 +454,15 @@ def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
     motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
     a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
     found = realised(walking, rows, a, b)
-    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), 0.3, atol=0.01)
+    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), 0.3, atol=0.01)
 
 
 def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
     sunk = walk(sink=0.11)
     found = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
-    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), -0.11, atol=1e-9)
+    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), -0.11, atol=1e-9)
     up = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
-    heights = lowest(human23(), up.rotations, up.root)
+    heights = lowest_height(human23(), up.rotations, up.root)
     assert np.all(np.diff(heights) > -1e-9)
     assert np.diff(heights).max() < 0.01
 
@@ -470,7 +474,7 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     known = learned(replace(jumping, root=root))
     grounded, rows = walk(), list(range(5, 18))
     found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, np.full(23, 1e-6))
-    heights = lowest(human23(), found.rotations, found.root)
+    heights = lowest_height(human23(), found.rotations, found.root)
     assert heights.argmax() in (5, 6, 7)
     assert 0.1 < heights.max() <= 0.25 + 1e-9
     assert heights[[0, 1, 2, -3, -2, -1]].max() < 0.03
@@ -540,7 +544,7 @@ def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Floats) 
         turn = np.radians(356.0 + speed * keys)
         path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
         a, b = rot.about_vertical(turn[[0, -1]])
-        found = _headings(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
+        found = turn_with_path(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
         np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
 
 
@@ -549,7 +553,7 @@ def test_headings_stay_in_their_states() -> None:
     for _ in range(20):
         path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
         a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
-        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
+        found = turn_with_path(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
         off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
         assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
         assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9
