@@ -445,12 +445,12 @@ class Engine(LearnedCorpus):
         return fit_network(self.corpus.skeleton.names, parents, states, sizes, weights)
 
     def info(self) -> dict[str, Any]:
-        """What the corpus is and how large: see `survey.info`."""
-        return survey.summarise(self.corpus, self.grammar)
+        """Summarise the corpus, as plain values: see `motionmind.learned.summary.CorpusSummary`."""
+        return survey.to_plain(survey.summarise(self.corpus, self.grammar))
 
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
-        """How well the corpus hangs together: see `survey.check`."""
-        return survey.check_corpus(self.corpus, self.grammar, self.states, pairs, seed)
+        """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
+        return survey.to_plain(survey.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
 
 
 def _stay(path: States) -> Certificate:

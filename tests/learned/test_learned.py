@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ import motionmind
 from motionmind.corpus import store
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.persistence import load
+from motionmind.learned.summary import CorpusCheck, CorpusSummary, summarise, to_plain
 from motionmind.tween.engine import Engine
 
 PACKAGE = Path(motionmind.__file__).parent
@@ -52,6 +54,20 @@ def test_an_engine_is_what_its_corpus_is_learned_as(built: Path) -> None:
     assert type(learned) is LearnedCorpus
     np.testing.assert_array_equal(engine.states, learned.states)
     assert engine.load_seconds > 0.0
+
+
+# --- summaries --------------------------------------------------------------------------------------------------------
+
+
+def test_summaries_are_plain_values_in_the_order_of_their_fields(built: Path) -> None:
+    engine = Engine.load(str(built))
+    info, check = engine.info(), engine.check(pairs=10)
+    assert tuple(info) == CorpusSummary.__struct_fields__
+    assert tuple(check) == CorpusCheck.__struct_fields__
+    assert list(check.items())[: len(info)] == list(info.items())
+    assert info == json.loads(json.dumps(info))
+    weighted = replace(engine.corpus, rate=np.float64(2.0))
+    assert type(to_plain(summarise(weighted, engine.grammar))["rate"]) is float
 
 
 # --- the fingerprint --------------------------------------------------------------------------------------------------
