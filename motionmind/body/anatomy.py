@@ -110,7 +110,7 @@ class Anatomy:
     path: str
 
     def paired(self, joint: str) -> bool:
-        """Whether the joint exists on the left and on the right."""
+        """Return whether the joint exists on the left and on the right."""
         return joint not in self.skeleton.names
 
     def named(self, joint: str, side: str) -> int:
