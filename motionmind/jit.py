@@ -1,4 +1,4 @@
-"""One door to numba: functions are compiled once and kept on disk, for the very sources they were compiled from."""
+"""The one place that uses numba: functions are compiled once, and kept on disk for the exact sources they came from."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def jit(function: _F) -> _F:
 
     It may call other compiled functions of its own folder and of `geometry`, and runs beside other threads.
     """
-    theirs = config.CACHE_DIR  # read when a function is decorated; nobody else's functions are to move
+    theirs = config.CACHE_DIR  # numba reads it when a function is decorated; other packages' functions stay put
     config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent)
     try:
         return cast(_F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
@@ -32,16 +32,21 @@ def jit(function: _F) -> _F:
 
 
 def either(function: _F) -> _F:
-    """A function for compiled code to call, and for Python, where nothing is compiled."""
+    """Return `function` for calls from compiled code, where it is compiled, and from Python, where it is not."""
     registered: _F = register_jitable(function)
     return registered
 
 
 def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> Any:
-    """`function` compiled for numba's `signature` alone, and told by its address: one compiled loop serves all such.
+    """Compile `function` for one signature, to be passed by address: one compiled loop serves all such functions.
 
-    A loop that is given a function of `jit` would be compiled for it anew in every process. An exception inside is
-    lost. `keep` stores it on disk: for functions of this package, which may be closures over others and over values.
+    A loop that is passed a function of `jit` would be compiled for it anew in every process. Exceptions raised inside
+    are lost.
+
+    Args:
+        function: a function, which may be a closure over others and over values.
+        signature: numba's signature of it.
+        keep: whether to store it on disk, as for functions of this package.
 
     Raises:
         numba.core.errors.NumbaError: it cannot be compiled.
@@ -55,18 +60,18 @@ def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> A
 
 
 def is_compiled(package: str) -> bool:
-    """Whether compiled code of a package of this one, as "search", is on disk; that takes the search half a minute."""
+    """Return whether compiled code of a subpackage such as "search" is on disk; the search takes half a minute."""
     source = Path(__file__).parent / package
     return next(Path(_folder(source)).glob(f"{source.name}_*/*.nbi"), None) is not None
 
 
 @cache
 def _folder(source: Path) -> str:
-    """Where compiled code is kept: a folder named after the state of all sources in `source` and in `geometry`.
+    """Return the folder of compiled code, named after the state of all sources in `source` and in `geometry`.
 
-    numba's own cache looks only at the file that a function is in: of a function that calls into another file it would
-    go on using the old code after that file changed. It is in the user's cache directory, or where that cannot be
-    written in the system's for temporary files, as a folder that nobody else may write to.
+    numba's own cache looks only at the file that a function is in: after a change to another file that the function
+    calls into, it would go on using the old code. The folder is in the user's cache directory or, if that cannot be
+    written, in the system's temporary one, where nobody else may write to it.
     """
     if given := os.environ.get("NUMBA_CACHE_DIR"):
         return given

@@ -40,7 +40,7 @@ KINDS = ("danced", "hold A", "slerp", "spline", "whole bodies", "path", "mean")
 
 
 def jobs(setting: Setting) -> list[dict[str, Any]]:
-    """Windows of the odd sequences; what the engine does was tried on windows of the even ones."""
+    """Return a job for each odd sequence, with its windows; the engine was tuned on windows of the even ones."""
     data = str(setting.data) if setting.data else None
     name = next(iter(recorded(data, "cmu-05")), "karate")
     out = []
@@ -64,13 +64,13 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def kept_apart(sequence: str) -> bool:
-    """Whether nothing was tried on a sequence: recordings go by their numbers, others by their names' lengths."""
+    """Return whether a sequence was left out of all tuning: odd-numbered recordings, and names of odd length."""
     found = re.search(r"(\d+)$", sequence)
     return (int(found[1]) if found else len(sequence)) % 2 == 1
 
 
 def work(data: str | None, name: str, sequence: str, seconds: float, windows: list[list[int]]) -> list[Row]:
-    """What is put between the ends of windows of one sequence by what was learned from the others."""
+    """Fill the windows of one sequence with what was learned from the others, and measure each method's result."""
     frames = round(seconds * FPS)
     engine, who, spread = _engine(data, name, sequence), judge(data, name, frames), _spread(data, name, frames)
     out = []
@@ -102,7 +102,7 @@ def work(data: str | None, name: str, sequence: str, seconds: float, windows: li
 
 
 def made(engine: Engine, real: Motion, seconds: float) -> Iterator[tuple[str, Made]]:
-    """What is danced between the ends of `real`, and what each competitor puts there."""
+    """Yield the real movement between the ends of `real`, then each method's, with the method's name."""
     a, b = real.posture(0), real.posture(-1)
     share = np.linspace(0.0, 1.0, len(real))[:, None]
     line = a.root + share * (b.root - a.root)
@@ -125,7 +125,7 @@ def made(engine: Engine, real: Motion, seconds: float) -> Iterator[tuple[str, Ma
 
 
 def _tween(engine: Engine, a: Posture, b: Posture, seconds: float) -> Any:
-    """A tween in the usual number of moves, or in the least that there must be."""
+    """Return a tween in the usual number of moves or, if none exists, in as few as it needs."""
     try:
         return engine.tween(a, b, duration=seconds, node_budget=BUDGET, fps=FPS)
     except NoPathError:
@@ -140,7 +140,7 @@ def _engine(data: str | None, name: str, sequence: str) -> Engine:
 
 @lru_cache(maxsize=4)
 def judge(data: str | None, name: str, frames: int) -> StyleClassifier:
-    """Who tells the corpus from others."""
+    """Return a classifier that tells the corpus from others by windows of its movement."""
     names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
     return fit_style_classifier(
         {
@@ -153,10 +153,10 @@ def judge(data: str | None, name: str, frames: int) -> StyleClassifier:
 
 @lru_cache(maxsize=4)
 def _spread(data: str | None, name: str, frames: int) -> Floats:
-    """What L2P is measured by: the spread of positions in all windows that lie half their length apart.
+    """Return the unit of L2P: the spread of positions in all windows that lie half their length apart, metres.
 
-    A coordinate that hardly ever changes, as across the hips of a body that is seen from where its root is, counts as
-    if it spread by a millimetre.
+    A coordinate that hardly changes, as across the hips of a body seen from its root, counts as if it spread by a
+    millimetre.
     """
     windows = []
     for pieces in movement(data, name, frames).values():
@@ -168,17 +168,17 @@ def _spread(data: str | None, name: str, frames: int) -> Floats:
 
 
 def _power(rotations: Floats) -> float:
-    """What a window weighs in NPSS: the squares of all Fourier coefficients' real parts."""
+    """Return a window's weight in NPSS: the sum of squares of all Fourier coefficients' real parts."""
     flips = np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True) < 0.0
     sign = np.concatenate([np.ones((1, *flips.shape[1:])), np.cumprod(np.where(flips, -1.0, 1.0), axis=0)])
     return float(np.sum(np.fft.fft(rotations * sign, axis=0).real ** 2))
 
 
-# --- what is told -----------------------------------------------------------------------------------------------------
+# --- the report -------------------------------------------------------------------------------------------------------
 
 
 def summary(rows: list[Row]) -> list[Row]:
-    """A row a gap and kind: means; NPSS by power; jerk as the place of the median among what was danced."""
+    """Return a row for each gap and method: means; NPSS weighted by power; jerk beside the range of real movement."""
     out = []
     for seconds in dict.fromkeys(row["seconds"] for row in rows):
         here = [row for row in rows if row["seconds"] == seconds]

@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def build(options: argparse.Namespace) -> None:
-    """Learn and save the corpus."""
+    """Learn the corpus and save it."""
     recorded = gather("recorded", (own_skeleton(read_motion(f)) for f in files(options)), rate=RATE, skip=1)
     clips = [recorded.motion(clip) for clip in recorded.clips]
     times = options.times[0]
@@ -70,7 +70,7 @@ def build(options: argparse.Namespace) -> None:
 
 
 def ask(options: argparse.Namespace) -> None:
-    """Load it, and join random pairs of postures."""
+    """Load the corpus, and join random pairs of its postures."""
     Engine.load("ballet")  # imports what loading takes
     before, began = resident(), perf_counter()
     engine = Engine.load("bench", options.home)
@@ -93,8 +93,10 @@ def files(options: argparse.Namespace) -> list[Path]:
 
 
 def copies(clips: list[Motion], times: int, degrees: float, seed: int) -> Iterator[Motion]:
-    """The clips, so many times over: once as they are, then with every joint but the root turned a little, by an angle
-    that holds for the whole copy."""
+    """Yield the clips as they are, then copies in which every joint but the root is turned by a small random angle.
+
+    A joint's angle is the same throughout a copy, `degrees` in the mean.
+    """
     rng = np.random.default_rng(seed)
     yield from clips
     for copy in range(1, times):
@@ -105,17 +107,17 @@ def copies(clips: list[Motion], times: int, degrees: float, seed: int) -> Iterat
 
 
 def posture(engine: Engine, index: int) -> Posture:
-    """A posture of the corpus."""
+    """Return a posture of the corpus."""
     return Posture(engine.corpus.skeleton, engine.corpus.rotations[index], engine.corpus.root[index])
 
 
 def peak() -> float:
-    """The most memory that this process held, MB."""
+    """Return the peak memory of this process, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def resident() -> float:
-    """Memory that this process holds, MB."""
+    """Return the memory that this process holds now, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 2**20
 

@@ -1,11 +1,11 @@
-"""Anatomy: the angles by which people describe a body's joints, how far each goes, and what its parts weigh.
+"""Anatomy: the angles by which people describe a body's joints, their ranges, and the weight of its parts.
 
 A joint's rotation is a *swing* and a *twist*. The twist is the turn about the bone's own length (`long`); the swing
-tips the bone, by a rotation vector at right angles to it whose two coefficients are flexion and abduction, or what the
-joint calls them. Unlike three turns one after another this has no order to remember and no gimbal lock within 180
-degrees; for movement in one plane it is what a goniometer reads. A limb is twisted, then swung; pelvis, spine and head
-turn with the twist outermost, so that they lean in the frame that they have turned to. Source: Baerlocher and Boulic,
-"Parametrization and range of motion of the ball-and-socket joint", Deformable Avatars (2001).
+tips the bone, by a rotation vector at right angles to it whose two coefficients are flexion and abduction, under
+whatever names the joint has for them. Unlike three turns in sequence this has no order to remember and no gimbal lock
+within 180 degrees; for movement in one plane it is the angle that a goniometer reads. A limb is twisted, then swung;
+pelvis, spine and head have the twist outermost: they lean in the frame they have turned to. Source: Baerlocher and
+Boulic, "Parametrization and range of motion of the ball-and-socket joint", Deformable Avatars (2001).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from functools import cached_property
 import msgspec
 import numpy as np
 
-from motionmind._typing import Floats, Indices
+from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
@@ -29,8 +29,8 @@ class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     Attributes:
         about: the axis about which it is positive on the left side: "x", "-z".
-        range: least and greatest, degrees.
-        opposite: what its negative is called.
+        range: least and greatest angle, degrees.
+        opposite: the name of its negative, as extension is flexion's.
     """
 
     about: str
@@ -39,12 +39,12 @@ class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def axis(self) -> int:
-        """0, 1 or 2 for x, y or z."""
+        """The axis as 0, 1 or 2 for x, y or z."""
         return "xyz".index(self.about[-1])
 
     @property
     def sign(self) -> float:
-        """1 or -1."""
+        """1 or -1: the sense of a positive angle about the axis."""
         return -1.0 if self.about.startswith("-") else 1.0
 
 
@@ -54,11 +54,11 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     Attributes:
         angles: by name.
         long: the axis of the twist.
-        outer: whether the twist comes last, rather than the swing.
-        rest: degrees about z from the skeleton's rest to where all angles are 0.
-        against: the joint in whose frame the angles are measured, where it is not the parent.
-        mass: of the segment, as a share of the body's.
-        centre: its centre of mass in the joint's frame, metres.
+        outer: whether the twist is applied after the swing, not before it.
+        rest: degrees about z from the skeleton's rest pose to the pose in which all angles are 0.
+        against: the joint in whose frame the angles are measured, if not the parent.
+        mass: mass of the segment, as a share of the body's.
+        centre: centre of mass of the segment in the joint's frame, metres.
     """
 
     angles: dict[str, Angle]
@@ -71,9 +71,14 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Leg(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which joints make a leg that can be placed on the floor: two bones and a foot that bends at its ball.
+    """The joints of a leg that can be placed on the floor: two bones and a foot that bends at its ball.
 
-    `heel` is the heel's place in the left ankle's frame, metres: no joint, but on the floor all the same.
+    Attributes:
+        hip: the joint at the top of the thigh; this and the next are names without a side.
+        knee: the joint between the two long bones.
+        ankle: the joint that the foot turns about.
+        toes: the ball of the foot.
+        heel: place of the heel in the left ankle's frame, metres: not a joint, but it touches the floor.
     """
 
     hip: str
@@ -88,13 +93,13 @@ class Anatomy:
     """A skeleton with its anatomy.
 
     Attributes:
-        skeleton: its joints.
-        layers: which joints each layer of a score moves, without their sides: the columns of a phrase.
-        joints: by name; of a pair, without its side.
-        groups: joints that share angles, as `head` is cervical and atlantal: group -> joint -> angle -> how much of it
-            that joint takes.
-        leg: the joints of a leg that can stand, in the layer where they are.
-        path: the file that says so.
+        skeleton: the tree of joints.
+        layers: the joints, without their sides, that each layer of a score moves: the columns of a phrase.
+        joints: each joint's anatomy by name; a pair's without its side.
+        groups: joints that share angles, as `head` is cervical and atlantal: group -> joint -> angle -> the share of it
+            that the joint takes.
+        leg: the joints of a leg that can stand; None on a body without such legs.
+        path: the file that the anatomy was read from.
     """
 
     skeleton: Skeleton
@@ -105,49 +110,38 @@ class Anatomy:
     path: str
 
     def paired(self, joint: str) -> bool:
-        """Whether there is a left and a right one."""
+        """Return whether the joint exists on the left and on the right."""
         return joint not in self.skeleton.names
 
     def named(self, joint: str, side: str) -> int:
-        """Index in the skeleton of a joint, of that side where it is a pair."""
+        """Return the index in the skeleton of a joint; of a pair, the one on `side`."""
         return self.skeleton.index(f"{side}_{joint}" if self.paired(joint) else joint)
 
     def anatomy(self, name: str) -> tuple[str, Joint]:
-        """The joint that is called `name` in the skeleton: its name without the side, and what is said of it."""
+        """Return the name without a side, and the anatomy, of the joint that the skeleton calls `name`."""
         side, _, joint = name.partition("_")
         joint = joint if side in SIDES else name
         return joint, self.joints[joint]
 
     def leg_joints(self, leg: Leg, side: str) -> list[int]:
-        """Indices of a leg's joints, from the hip down to where the foot ends."""
+        """Return the indices of a leg's joints, from the hip down to the end of the foot."""
         return [self.named(joint, side) for joint in (leg.hip, leg.knee, leg.ankle)] + self.foot(leg.toes, side)
 
     def foot(self, toes: str, side: str) -> list[int]:
-        """Indices of a foot's joints from `toes` on, down to where it ends: the rows of its knuckles."""
+        """Return the indices of a foot's joints from `toes` to its end: the rows of its knuckles."""
         foot = [self.named(toes, side)]
         while len(below := self.skeleton.children(foot[-1])) == 1:
             foot += below
         return foot
 
-    def lowest(self, rotations: Floats, root: Floats) -> tuple[Floats, Indices]:
-        """Height [T] of a body's lowest point, metres, and the joint [T] that it belongs to."""
-        count = len(self.skeleton)
-        heights = self.skeleton.positions_and_tips(rotations, root)[..., 1]
-        owners = np.tile(np.arange(count), 2)
-        if self.leg is not None:
-            ankles = np.array([self.named(self.leg.ankle, side) for side in SIDES])
-            turned = self.skeleton.global_rotations(rotations)[..., ankles, :]
-            heels = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]) * self.leg.heel
-            heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
-            owners = np.concatenate([owners, ankles])
-        at = heights.argmin(axis=-1)
-        return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], owners[at]
-
     def rotations(self, degrees: Mapping[str, Floats]) -> Floats:
-        """Local rotations [T, J, 4] from angles, by the skeleton's names of joints.
+        """Return local rotations [T, J, 4] from angles.
 
-        `degrees[name]` is [T, 3] about x, y and z as `Joint` says, as for the left side; a joint that is not given is
-        at 0. Angles that are measured against another frame are taken to the parent's.
+        Angles that are measured against another frame than the parent's are converted.
+
+        Args:
+            degrees: by the joints' names in the skeleton, angles [T, 3] about x, y and z (see `Joint`), right joints'
+                as their left partners'; joints that are not given are at 0.
         """
         count = len(next(iter(degrees.values())))
         out = np.tile(rot.IDENTITY, (count, len(self.skeleton), 1))
@@ -161,9 +155,9 @@ class Anatomy:
         return out
 
     def degrees(self, rotations: Floats) -> Floats:
-        """Angles [..., J, 3] about x, y and z of local rotations [..., J, 4]: the inverse of `rotations`.
+        """Return angles [..., J, 3] in degrees about x, y and z of local rotations [..., J, 4].
 
-        The right side's are those of its mirror image.
+        The inverse of `rotations`; a right joint has the angles of its mirror image.
         """
         turned = rotations.copy()
         for index, frame in self._measured_elsewhere():
@@ -178,7 +172,7 @@ class Anatomy:
         return out
 
     def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
-        """Centre of mass [..., 3], metres, of postures with local rotations [..., J, 4] and root [..., 3]."""
+        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
         turned = self.skeleton.global_rotations(rotations)
         places = self.skeleton.positions(rotations, root)
         masses, centres = self._segments
@@ -186,7 +180,7 @@ class Anatomy:
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
-        """Shares of the body's mass [J] and centres in the joints' frames [J, 3]."""
+        """Each segment's share of the body's mass [J], and centre of mass in its joint's frame [J, 3], metres."""
         masses, centres = np.zeros(len(self.skeleton)), np.zeros((len(self.skeleton), 3))
         for index, name in enumerate(self.skeleton.names):
             _, anatomy = self.anatomy(name)
@@ -197,13 +191,13 @@ class Anatomy:
         return masses / max(masses.sum(), 1e-12), centres
 
     def _measured_elsewhere(self) -> list[tuple[int, int]]:
-        """Joints whose angles are measured against another frame than their parent's: (joint, that frame)."""
+        """Return (joint, frame) for the joints whose angles are measured in another frame than their parent's."""
         names = self.skeleton.names
         against = [(index, self.anatomy(name)[1].against) for index, name in enumerate(names)]
         return [(index, names.index(frame)) for index, frame in against if frame]
 
     def _between(self, rotations: Floats, frame: int, joint: int) -> Floats:
-        """The parent of `joint` seen from `frame`, one of its ancestors: [..., 4]."""
+        """Return the orientation [..., 4] of the parent of `joint` in `frame`, one of its ancestors."""
         out = np.broadcast_to(rot.IDENTITY, rotations[..., 0, :].shape)
         above = self.skeleton.parents[joint]
         while above != frame:
@@ -213,7 +207,7 @@ class Anatomy:
 
 
 def to_rotation(joint: Joint, degrees: Floats) -> Floats:
-    """The left joint's rotation [..., 4] in its frame of reference, from angles [..., 3] about x, y and z."""
+    """Return the left joint's rotation [..., 4] in its frame of reference, from degrees [..., 3] about x, y and z."""
     vector, axis = np.radians(degrees), "xyz".index(joint.long)
     swing = vector.copy()
     swing[..., axis] = 0.0
@@ -223,7 +217,7 @@ def to_rotation(joint: Joint, degrees: Floats) -> Floats:
 
 
 def to_degrees(joint: Joint, turned: Floats) -> Floats:
-    """Angles [..., 3] about x, y and z of the left joint's rotation [..., 4]: the inverse of `to_rotation`."""
+    """Return degrees [..., 3] about x, y and z of the left joint's rotation [..., 4]: the inverse of `to_rotation`."""
     axis = "xyz".index(joint.long)
     if joint.rest:
         turned = rot.mul(turned, rot.from_axis_angle([0.0, 0.0, 1.0], -np.radians(joint.rest)))

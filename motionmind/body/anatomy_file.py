@@ -1,4 +1,7 @@
-"""Files that describe bodies: which joints, which angles, how far, how heavy. TOML, as `bodies/human23.toml` shows."""
+"""Read files that describe bodies: their joints, the joints' angles and ranges, and masses.
+
+The files are TOML; `bodies/human23.toml` is a commented example.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from motionmind.errors import FormatError, did_you_mean
 from motionmind.files import FilePath, read_bytes
 
 FORMAT, VERSION = "motionmind-body", 1
-# What a score can say besides its layers.
+# The headings of a score besides its layers.
 HEADINGS = ("title", "body", "include", "tempo", "facings", "phrase", "clip", "posture")
 _BODIES = Path(__file__).parent / "bodies"
 
@@ -42,8 +45,17 @@ class _File(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 @cache
 def anatomy_named(name: str) -> Anatomy:
-    """A body that comes with MotionMind, such as "human23"; FormatError names those there are."""
+    """Return a body that comes with MotionMind, such as "human23".
+
+    Raises:
+        FormatError: there is no such body; the message names the bodies there are.
+    """
     return read_body(_bundled(name))
+
+
+def anatomy_of(skeleton: Skeleton) -> Anatomy | None:
+    """Return the anatomy of a body with the joints of human23 or human44, in any proportions; None for other bodies."""
+    return next((anatomy_named(name) for name, make in BODIES.items() if make().names == skeleton.names), None)
 
 
 def _bundled(name: object, path: FilePath | None = None) -> Path:
@@ -55,7 +67,14 @@ def _bundled(name: object, path: FilePath | None = None) -> Path:
 
 
 def read_body(path: FilePath) -> Anatomy:
-    """A body from a TOML file; FormatError says what is wrong there."""
+    """Read a body from a TOML file.
+
+    Args:
+        path: the file, as `bodies/human23.toml` shows.
+
+    Raises:
+        FormatError: the file is missing, malformed or contradicts itself; the message names the table or joint.
+    """
     try:
         read = msgspec.convert(_with_angles(_read_table(path)), _File)
     except (ValueError, RecursionError) as error:
@@ -78,20 +97,20 @@ def read_body(path: FilePath) -> Anatomy:
 
 
 def _read_table(path: FilePath) -> dict[str, Any]:
-    """What a file says, on top of the body that it `extends`, if it does."""
+    """Return the tables of a file, merged over those of the body that it `extends`, if any."""
     data = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
     extended = data.pop("extends", None)
     return data if extended is None else _on_top(data, _read_table(_bundled(extended, path)))
 
 
 def _on_top(upper: dict[str, Any], lower: dict[str, Any]) -> dict[str, Any]:
-    """Tables entry by entry: what the upper one does not say is as below."""
+    """Merge tables entry by entry; the upper table's entries override the lower's."""
     tables = [key for key in upper if isinstance(upper[key], dict) and isinstance(lower.get(key), dict)]
     return lower | upper | {key: _on_top(upper[key], lower[key]) for key in tables}
 
 
 def _shares(read: _File, group: str, path: FilePath) -> dict[str, dict[str, float]]:
-    """How much of each angle of a group its joints take: as much of all, or of each angle its own share."""
+    """Return each joint's share of each angle of a group; a single number in the file is its share of all angles."""
     out = {}
     for name, share in read.groups[group].items():
         if name not in read.joints:
@@ -104,7 +123,7 @@ def _shares(read: _File, group: str, path: FilePath) -> dict[str, dict[str, floa
 
 
 def _with_angles(data: dict[str, Any]) -> dict[str, Any]:
-    """A joint's angles are written beside its other keys: every table in it is one."""
+    """Gather each joint's angles, which a file writes beside its other keys: every subtable is one."""
     joints = data.get("joints")
     if not isinstance(joints, dict):
         return data
@@ -136,7 +155,7 @@ def _skeleton(read: _File, path: FilePath) -> Skeleton:
 
 
 def _check(body: Anatomy, path: FilePath) -> None:
-    """Names that mean something, every joint described, and in one layer of joints of its kind."""
+    """Check that all names are known, and that every joint is described and in one layer, pairs apart from singles."""
     for joint, anatomy in body.joints.items():
         _check_joint(body, joint, anatomy, path)
     missing = sorted(_stems(body.skeleton) - set(body.joints))
@@ -185,5 +204,5 @@ def _check_joint(body: Anatomy, joint: str, anatomy: Joint, path: FilePath) -> N
 
 
 def _stems(skeleton: Skeleton) -> set[str]:
-    """The joints' names, without their sides where they have one."""
+    """Return the joints' names without their sides."""
     return {name.partition("_")[2] if name.partition("_")[0] in SIDES else name for name in skeleton.names}

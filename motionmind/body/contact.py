@@ -1,72 +1,185 @@
-"""Whether feet stay where they stand."""
+"""One foot, one floor: how high a body's points are, where the floor is, and whether feet stay where they stand.
+
+Two sets of points are in use, and the argument `heels` chooses between them:
+
+- `heels=True`: joints, tips and heels. The engine places its movement by these, so that heels do not sink into the
+  floor. Only bodies with a known anatomy have heels; they are points of the ankle's segment, not joints.
+- `heels=False`: joints and tips alone. The published measures of skating and sliding, and the floor that they refer
+  to, are defined on the joints that a recording has.
+
+Movement is given as in `Motion`: local rotations [..., J, 4] and root positions [..., 3]; all lengths are metres.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Indices
+from motionmind.body.anatomy import SIDES, Anatomy
+from motionmind.body.anatomy_file import anatomy_of
+from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
-RATE = 30.0  # frames a second at which feet are looked at
+RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
-FAR = 0.025  # metres from one frame to the next by which it may move at most
-_SOFT = 0.025  # metres above the floor at which Zhang et al. count a slide no more
-_NEAR = 0.1  # of the body's height: how near to its lowest point, at rest, a limb must end to end in a foot
+FAR = 0.025  # metres that a standing foot may move from one frame to the next
+_SOFT = 0.025  # metres above the floor at which Zhang et al. stop counting a slide
+_NEAR = 0.1  # of the body's height: how near a leaf must end, at rest, to the lowest point to be a foot
+_FLOOR = 0.05  # share of the frames whose lowest point lies at or below the floor
+
+
+# --- heights ----------------------------------------------------------------------------------------------------------
+
+
+def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = True) -> Floats:
+    """Return the heights [...] of the lowest point of postures, metres.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+        heels: whether heels count besides joints and tips (see the module).
+    """
+    heights, _ = _point_heights(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
+    return np.asarray(heights.min(axis=-1))
+
+
+def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
+    """Return the height of each limb's lowest point, and last the trunk's [..., limbs + 1], metres, heels included.
+
+    Limbs are those of `limbs_of`; the trunk's height is infinite where every joint belongs to a limb.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+    """
+    heights, joints = _point_heights(skeleton, rotations, root, anatomy_of(skeleton))
+    limb = limb_of_points(skeleton)[joints]
+    count = len(limbs_of(skeleton)) + 1
+    out = np.full((*heights.shape[:-1], count), np.inf)
+    for number in range(count):
+        out[..., number] = heights[..., limb == number].min(axis=-1, initial=np.inf)
+    return out
+
+
+def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Floats, Indices]:
+    """Return the height [T] of the lowest point of an anatomy's own body, metres, and the joint [T] it belongs to.
+
+    Heels are included, and belong to the ankles.
+
+    Args:
+        anatomy: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres.
+    """
+    heights, joints = _point_heights(anatomy.skeleton, rotations, root, anatomy)
+    at = heights.argmin(axis=-1)
+    return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
+
+
+def _point_heights(
+    skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None
+) -> tuple[Floats, Indices]:
+    """Return heights [..., P] of all joints, all tips and, given an anatomy with legs, both heels; and the joint [P]
+    that each point belongs to."""
+    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
+    joints = np.tile(np.arange(len(skeleton)), 2)
+    if anatomy is None or anatomy.leg is None:
+        return heights, joints
+    heel = np.array(anatomy.leg.heel)
+    if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
+        heel = heel * skeleton.height / anatomy.skeleton.height
+    ankles = np.array([anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
+    turned = skeleton.global_rotations(rotations)[..., ankles, :]
+    heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
+    heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
+    return heights, np.concatenate([joints, ankles])
+
+
+# --- the floor --------------------------------------------------------------------------------------------------------
+
+
+def floor_height(lowest: Floats) -> float:
+    """Return the height of the floor under movement, metres, from the heights [T] of the body's lowest point.
+
+    A recording's own zero is often off: the floor is the 5 % quantile of the lowest point's height.
+    """
+    return float(np.quantile(lowest, _FLOOR))
+
+
+def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = False) -> float:
+    """Return the height of the floor under movement, metres: `floor_height` of its lowest points.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres.
+        heels: whether heels count; measures of skating leave them out (see the module).
+    """
+    return floor_height(lowest_height(skeleton, rotations, root, heels=heels))
+
+
+# --- feet -------------------------------------------------------------------------------------------------------------
 
 
 def find_feet(skeleton: Skeleton) -> list[int]:
-    """The joints that end in feet: leaves of the tree whose end is, at rest, within a tenth of the body's height of its
-    lowest point. In a person those are the toes, in an insect all legs."""
+    """Return the joints that end in feet: a person's toes, all legs of an insect.
+
+    A foot is a leaf of the tree whose end is, at rest, within a tenth of the body's height of the lowest point.
+    """
     at_rest = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))[:, 1]
     ends = np.minimum(at_rest[: len(skeleton)], at_rest[len(skeleton) :])
     low = ends.min() + _NEAR * np.ptp(at_rest)
     return [joint for joint in range(len(skeleton)) if not skeleton.children(joint) and ends[joint] <= low]
 
 
-def find_floor(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
-    """Height in metres of the floor under movement, whose own zero is often off: where the body's lowest point is in
-    the lowest twentieth of the frames [T, J, 4], [T, 3]."""
-    return float(np.quantile(skeleton.positions_and_tips(rotations, root)[..., 1].min(axis=-1), 0.05))
-
-
 def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
-    """Share of frames in which a foot skates: it is below 5 cm, and moves level by more than 2.5 cm to the next frame.
+    """Return the share of frames in which a foot skates: below 5 cm, and moving more than 2.5 cm to the next frame.
 
-    Karunratanakul, Preechakul, Suwajanakorn and Tang, "Guided motion diffusion for controllable human motion
-    synthesis", ICCV (2023), with these limits but two differences. Frames are at 30 a second, not 20, so that the limit
-    is 0.75 m/s, not 0.5. And a foot is both ends of its last bone: one that turns on its ball or on its tip stands. So
-    it skates where it has an end below 5 cm in both frames and every such end moves too far. A foot that swings past
-    near the floor, as in walking, counts too: judge by what the corpus's own movement has.
+    Source: Karunratanakul, Preechakul, Suwajanakorn and Tang, "Guided motion diffusion for controllable human motion
+    synthesis", ICCV (2023), with the same limits but two differences. Frames are at 30 a second, not 20, so the limit
+    is 0.75 m/s, not 0.5. And a foot is both ends of its last bone, so that one that turns on its ball or its tip
+    stands: it skates where it has an end below 5 cm in both frames and every such end moves too far, level. A foot
+    that swings past near the floor, as in walking, counts too: compare with the corpus's own movement. Heels do not
+    count.
 
     Args:
         skeleton: the body.
         rotations: local rotations [T, J, 4] at 30 frames a second.
         root: positions of the root joint [T, 3], metres.
-        floor: height of the floor, metres; `find_floor` tells that of a recording.
+        floor: height of the floor, metres; for a recording, from `find_floor`.
     """
-    moved, height = _ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, rotations, root, floor)
     down = height < LOW
     skates = np.any(down, axis=-1) & np.all(~down | (moved > FAR), axis=-1)
     return float(skates.any(axis=-1).mean()) if len(moved) else 0.0
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
-    """How far feet slide, cm a frame at 30 frames a second: the mean over frames and feet of v (2 - 2^(h / 2.5 cm)).
+    """Return how far feet slide, cm a frame at 30 frames a second: the mean over frames and feet of v (2 - 2^(h / H)).
 
+    Here v is how far a foot moves level, h its height and H = 2.5 cm: the factor falls from 1 on the floor to 0 at H
+    and above. Of a foot's two ends (see `skating`) below H, the one that slides least counts; heels do not. Source:
     Zhang, Starke, Komura and Saito, "Mode-adaptive neural networks for quadruped motion control", ACM TOG 37(4)
-    (2018): v is how far a foot moves level, h its height, the factor from 1 on the floor to 0 at 2.5 cm and
-    above. Of a foot's two ends, as in `skating`, the one that slides least of those that are that low counts.
+    (2018).
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4] at 30 frames a second.
+        root: positions of the root joint [T, 3], metres.
+        floor: height of the floor, metres; for a recording, from `find_floor`.
     """
-    moved, height = _ends(skeleton, rotations, root, floor)
+    moved, height = _foot_ends(skeleton, rotations, root, floor)
     share = np.clip(2.0 - 2.0 ** (height / _SOFT), 0.0, 1.0)
     least = np.where(share > 0.0, moved * share, np.inf).min(axis=-1)
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 
 
-def _ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float) -> tuple[Floats, Floats]:
-    """How far both ends of each foot's last bone move level to the next frame, and the greater of their heights in the
-    two frames [T - 1, feet, 2], metres."""
+def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float) -> tuple[Floats, Floats]:
+    """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
+    heights above the floor in the two frames: [T - 1, feet, 2] each, metres."""
     feet = np.array(find_feet(skeleton), dtype=np.intp)
     places = skeleton.positions_and_tips(rotations, root)[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
     moved = np.hypot(np.diff(places[..., 0], axis=0), np.diff(places[..., 2], axis=0))

@@ -1,4 +1,4 @@
-"""The human skeletons that go by their names."""
+"""The human skeletons that files refer to by name: human23 and human44."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from motionmind.body.skeleton import Skeleton
 
-# A body is rows: a joint, the joint that it hangs from, its place there in metres. Limbs are written for the left side;
-# what ends in "_tip" is a leaf's far end. At rest: a T-pose facing +Z, palms down, every joint's axes the world's.
+# A body is a list of rows: a joint, its parent, its place in the parent's frame in metres. Limbs are written for the
+# left side; a name that ends in "_tip" is a leaf's far end. At rest: a T-pose facing +Z, palms down, every joint's axes
+# the world's.
 _Row = tuple[str, str, tuple[float, float, float]]
 
 
@@ -79,17 +80,16 @@ _KNUCKLES: tuple[_Row, ...] = (
 
 @cache
 def human23() -> Skeleton:
-    """The default body: 23 joints, 1.70 m, at rest in a T-pose facing +Z with all joint axes the world's."""
+    """Return the default body: 23 joints, 1.70 m, at rest in a T-pose facing +Z with all joint axes the world's."""
     return _skeleton("human23", _human(_ARM))
 
 
 @cache
 def human44() -> Skeleton:
-    """The body whose hands close, toes curl and spine rolls: 44 joints, as tall as human23 and at rest like it.
+    """Return a body whose hands close, toes curl and spine rolls: 44 joints, as tall as human23, in the same rest pose.
 
-    That a body has 44 joints is from Bradley and Stuart's technical report CU-CS-844-97 (1997). Its list of them was
-    not at hand, so which they are is our reading: the joints of human23, and those that are lumped in its hands, feet
-    and spine, as many as the count allows.
+    The number 44 is from Bradley and Stuart's technical report CU-CS-844-97 (1997). Its list of joints was not at hand,
+    so the choice is ours: the joints of human23, with hands, feet and spine divided as far as the count allows.
 
     - Hands, 3 + 3 a side for 1: the thumb's three joints (`thumb` at its root, `thumb_middle`, `thumb_end`), and the
       three rows of the fingers' knuckles, the four fingers of a row lumped: `fingers` (as in human23, where they meet
@@ -104,8 +104,8 @@ def human44() -> Skeleton:
     With pelvis (1), hips, knees and ankles (6), clavicles, shoulders, elbows and wrists (8): 12 + 6 + 11 + 15 = 44.
     There are no single fingers or toes, and neither eyes nor jaw.
 
-    Joints of human23 have their names, places and axes here. What hangs from `lumbar`, `thorax` or `cervical` there
-    hangs from the end of that row here: `thorax` from `lumbar_upper`, clavicles and `cervical` from `thorax_upper`,
+    The joints of human23 keep their names, places and axes. Children of `lumbar`, `thorax` or `cervical` there hang
+    from the end of that row here: `thorax` from `lumbar_upper`, clavicles and `cervical` from `thorax_upper`,
     `atlantal` from `axial`.
     """
     rows = _human(_ARM + _THUMB)
@@ -114,7 +114,7 @@ def human44() -> Skeleton:
     return _skeleton("human44", rows)
 
 
-# The bodies that files name without describing them.
+# The bodies that files refer to by name.
 BODIES: Mapping[str, Callable[[], Skeleton]] = {"human23": human23, "human44": human44}
 
 
@@ -123,7 +123,7 @@ def _human(arm: tuple[_Row, ...]) -> list[_Row]:
 
 
 def _both_sides(rows: tuple[_Row, ...]) -> list[_Row]:
-    """The left side's rows, then the right side's."""
+    """Return the rows of the left side, then those of the right."""
     shared = {"pelvis", "thorax"}
     return [
         (f"{side}_{joint}", parent if parent in shared else f"{side}_{parent}", (sign * x, y, z))
@@ -133,7 +133,7 @@ def _both_sides(rows: tuple[_Row, ...]) -> list[_Row]:
 
 
 def _divided(rows: list[_Row], new: _Row) -> list[_Row]:
-    """The rows with a new joint between the one that it hangs from and all that hung there, which keeps its place."""
+    """Insert a new joint between its parent and the parent's former children, which keep their places in the world."""
     name, above, (x, y, z) = new
     out: list[_Row] = []
     for joint, parent, offset in rows:

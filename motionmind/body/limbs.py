@@ -1,4 +1,16 @@
-"""Limbs: which joints a leg, an arm or the trunk are made of, told from the skeleton's tree."""
+"""Partitions of a body's joints, each for a purpose of its own.
+
+- `limbs_of`: limbs by the skeleton's tree alone, from the last fork to each leaf. For everything physical: which limb
+  stands, which is a leg. Where an arm forks into thumb and fingers these are limbs, and the arm belongs to the trunk.
+- `limb_of_points`: the same, as a number for each joint and tip; what belongs to no limb is the trunk.
+- `parts_of`: the whole body, its lower and upper half, and trunk and limbs: overlapping parts in three sizes, over
+  which the mean of walks is taken (`motionmind.realise.mean_walk`). Its limbs are those of `limbs_of`.
+- `sided_parts`: limbs by side, from the names of joints: a whole arm from the clavicle with all its fingers is one
+  part. For what a viewer sees as one limb: shuffling limbs against each other, phrases of a limb.
+
+The first three follow from the tree and work on any body. The last needs the sides, and differs wherever a limb
+branches or joints of one side hang from a common stem; neither can stand in for the other.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +20,11 @@ from motionmind._typing import Ints
 from motionmind.body.mirror import MIDDLE, sides_of
 from motionmind.body.skeleton import Skeleton
 
+TRUNK = "trunk"
+
 
 def stem_of(skeleton: Skeleton) -> list[int]:
-    """The joints from the root to the first fork, where a rig's own root or two may lie above the pelvis."""
+    """Return the joints from the root to the first fork; a rig may have a root or two of its own above the pelvis."""
     out = [0]
     while len(children := skeleton.children(out[-1])) == 1:
         out += children
@@ -18,49 +32,52 @@ def stem_of(skeleton: Skeleton) -> list[int]:
 
 
 def limbs_of(skeleton: Skeleton) -> list[list[int]]:
-    """The joints of each limb, outward: a leaf and what leads to it from the last fork, as a leg, an arm, neck and
-    head."""
-    chains = []
-    for end in (joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)):
-        chain = [end]
-        while (above := skeleton.parents[chain[0]]) > 0 and len(skeleton.children(above)) == 1:
-            chain.insert(0, above)
-        chains.append(chain)
-    return chains
+    """Return the joints of each limb, outward: a leaf and the joints that lead to it from the last fork.
+
+    On a person these are the legs, the arms, and neck with head.
+    """
+    limbs = []
+    for leaf in (joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)):
+        limb = [leaf]
+        while (above := skeleton.parents[limb[0]]) > 0 and len(skeleton.children(above)) == 1:
+            limb.insert(0, above)
+        limbs.append(limb)
+    return limbs
 
 
 def limb_of_points(skeleton: Skeleton) -> Ints:
-    """To which of `limbs_of` each joint belongs, then each tip [2 J]; to one more, the trunk, what belongs to none."""
-    sided_parts = limbs_of(skeleton)
-    out = np.full(len(skeleton), len(sided_parts), dtype=np.int64)
-    for number, limb in enumerate(sided_parts):
+    """Return the number in `limbs_of` of the limb of each joint, then of each tip [2 J].
+
+    Points of no limb belong to the trunk, whose number is the number of limbs.
+    """
+    limbs = limbs_of(skeleton)
+    out = np.full(len(skeleton), len(limbs), dtype=np.int64)
+    for number, limb in enumerate(limbs):
         out[limb] = number
     return np.concatenate([out, out])
 
 
 def parts_of(skeleton: Skeleton) -> tuple[Ints, ...]:
-    """The joints of parts of a body, each joint in one of each size: the whole; what carries it, and what is carried
-    (if anything is); the trunk, which is what is left, and the limbs.
+    """Return the joints of parts of a body in three sizes; each joint is in one part of each size.
 
-    What carries the body is its root, down to the first fork, and the limbs that hang there: pelvis and legs.
+    In this order: the whole; the part that carries the body, and the part that is carried (if any); the trunk, which is
+    the joints of no limb, and the limbs. The carrying part is the root, down to the first fork, and the limbs that hang
+    there: pelvis and legs.
     """
-    chains, above = limbs_of(skeleton), stem_of(skeleton)
+    limbs, stem = limbs_of(skeleton), stem_of(skeleton)
     every = list(range(len(skeleton)))
-    carrying = [*above, *(joint for chain in chains if skeleton.parents[chain[0]] == above[-1] for joint in chain)]
+    carrying = [*stem, *(joint for limb in limbs if skeleton.parents[limb[0]] == stem[-1] for joint in limb)]
     carried = [joint for joint in every if joint not in carrying]
-    trunk = [joint for joint in every if not any(joint in chain for chain in chains)]
-    found = (every, carrying, carried, trunk, *chains)
-    return tuple(np.array(part, dtype=np.int64) for part in found if part)
-
-
-TRUNK = "trunk"
+    trunk = [joint for joint in every if not any(joint in limb for limb in limbs)]
+    parts = (every, carrying, carried, trunk, *limbs)
+    return tuple(np.array(part, dtype=np.int64) for part in parts if part)
 
 
 def sided_parts(skeleton: Skeleton) -> dict[str, Ints]:
-    """The body's parts: the joints of each limb, under the name of its first joint, and of the trunk.
+    """Return the joints of each sided limb, under the name of its first joint, and those of the trunk (`TRUNK`).
 
-    A limb is a branch of joints of the left or the right side, as it hangs from the middle: two arms and two legs on a
-    person, from the clavicles and the hips, six legs and two feelers on an insect.
+    A sided limb is a branch of joints of the left or the right side, from where it leaves the middle: two arms and two
+    legs on a person, from the clavicles and the hips; six legs and two feelers on an insect.
     """
     sides = sides_of(skeleton)
     parts: dict[str, list[int]] = {TRUNK: []}

@@ -1,4 +1,4 @@
-"""What no body does: joints beyond their limits are brought back to them."""
+"""Joint limits: find the joints that a corpus bends beyond them, and bring others back within them."""
 
 from __future__ import annotations
 
@@ -6,20 +6,24 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import Anatomy
-from motionmind.body.anatomy_file import anatomy_named
-from motionmind.body.human import BODIES
+from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 
-BEYOND = 5.0  # degrees
-RARE = 0.01
+BEYOND = 5.0  # degrees past a limit from which a posture breaks it
+RARE = 0.01  # share of postures that may break a limit
 
 
 def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools) -> Floats:
-    """The same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
+    """Return the same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
 
-    Limits are those of the anatomy of human23 or human44, widened to what the postures have that were given
-    [G, J, 4]; `loose` joints [J] have none. Angles are clipped one by one, as swing and twist; a body of another kind
-    is left as it is.
+    Limits are those of the anatomy of human23 or human44, widened to the angles of the given postures. Angles are
+    clipped one by one, as swing and twist. A body of another kind is returned unchanged.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        given: local rotations of postures that are right as they are [G, J, 4].
+        loose: joints without limits [J].
     """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
@@ -38,8 +42,10 @@ def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: B
 
 
 def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
-    """Joints [J] that a corpus's own postures [N, J, 4] have beyond their limits by more than BEYOND, in more than RARE
-    of them: what is brought onto a body from another rig need not bend as its anatomy does."""
+    """Return which joints [J] break their limits by more than BEYOND in more than RARE of the postures [N, J, 4].
+
+    Movement brought over from another rig need not bend as the body's anatomy does.
+    """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return np.zeros(len(skeleton), dtype=np.bool_)
@@ -49,13 +55,8 @@ def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
     return np.asarray(beyond.mean(axis=0) > RARE)
 
 
-def anatomy_of(skeleton: Skeleton) -> Anatomy | None:
-    """What is known of a body that has the joints of human23 or human44, whatever its proportions."""
-    return next((anatomy_named(name) for name, make in BODIES.items() if make().names == skeleton.names), None)
-
-
 def _limits(anatomy: Anatomy) -> tuple[Floats, Floats]:
-    """Least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite where none is said."""
+    """Return the least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite without a limit."""
     least = np.full((len(anatomy.skeleton), 3), -np.inf)
     most = -least
     for index, name in enumerate(anatomy.skeleton.names):

@@ -1,8 +1,8 @@
-"""Movement in a mirror: left and right exchanged, on any body whose rest pose is the same on both sides.
+"""Mirror movement: exchange left and right on any body whose rest pose is symmetric.
 
-A joint's axes are the world's when the body is at rest. Let M be the reflection along the lateral axis, and let the
-partner of each joint stand where M puts it. Then the mirror image of a posture has at each joint M q M, of the
-partner's local rotation q, and reflected it is what forward kinematics gives: M commutes with every step of it.
+A joint's axes are the world's when the body is at rest. Let M be the reflection along the lateral axis, and let each
+joint's partner stand, at rest, where M puts the joint. Then the mirror image of a posture has the rotation M q M at
+each joint, with q the partner's local rotation: M commutes with every step of forward kinematics.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 
-# Bodies are measured, and nobody is quite symmetric: in a dancer's recordings bones differ by up to 1.2 cm from left to
-# right, in other people's by 2.5 cm.
+# Measured bodies are not quite symmetric: bones differ from left to right by up to 1.2 cm in one dancer's recordings,
+# by 2.5 cm in other people's.
 LEFT, RIGHT, MIDDLE = "left", "right", "middle"
 TOLERANCE = 0.05  # of the distance from the root to the farthest joint
 _X, _Y, _Z = 0, 1, 2
@@ -27,10 +27,10 @@ _X, _Y, _Z = 0, 1, 2
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """What a mirror exchanges on a body.
+    """The joints and the axis that a mirror exchanges on a body.
 
     Attributes:
-        partners: index of each joint's mirror image [J]; of a joint in the middle, its own.
+        partners: index of each joint's mirror image [J]; a joint in the middle is its own.
         axis: the axis from right to left when the body is at rest: 0 for x, 1 for y, 2 for z.
     """
 
@@ -39,18 +39,21 @@ class Sides:
 
     @property
     def world(self) -> int:
-        """The world's axis along which the body is reflected: the lateral one, but never the vertical."""
+        """The world's axis along which the body is reflected: the lateral one, except that it is never the vertical."""
         return _X if self.axis == _Y else self.axis
 
 
 def mirrored(motion: Motion) -> Motion:
-    """The movement with left and right exchanged; twice is the movement itself.
+    """Return the movement with left and right exchanged; applied twice, the movement itself.
 
-    The body is mirrored too, so that every joint is where its partner is seen in the mirror, even on a body whose two
-    sides differ a little. The mirror stands at the world's origin.
+    The body is mirrored too, so each joint is exactly where its partner appears in the mirror, even if the two sides
+    differ a little. The mirror stands at the world's origin.
+
+    Args:
+        motion: movement on any body that `find_sides` accepts.
 
     Raises:
-        SkeletonError: the body has no two sides; the message names a joint without a partner.
+        SkeletonError: the body is not symmetric; the message names a joint without a partner.
     """
     sides = find_sides(motion.skeleton)
     rotations = rot.mirror(motion.rotations[:, sides.partners], sides.axis)
@@ -72,11 +75,14 @@ def mirrored(motion: Motion) -> Motion:
 
 
 def find_sides(skeleton: Skeleton) -> Sides:
-    """Which joint is which in a mirror: paired by their names along the tree, and checked by where they stand at rest.
+    """Pair the joints of a body by their names along the tree, and check the pairs by their places at rest.
 
-    Sides may be told by words or letters, in front, behind or between: left_hip, LeftHip, lhip, LHipJoint, thigh.L,
-    hand_l, "Bip01 L Thigh". Of the axes that the pairs agree on the lateral one is that along which they lie
-    furthest apart; a body without a pair is one if it has no breadth in x.
+    Names may mark sides by words or letters, before, after or within: left_hip, LeftHip, lhip, LHipJoint, thigh.L,
+    hand_l, "Bip01 L Thigh". Of the axes that fit all pairs the lateral axis is the one along which they lie furthest
+    apart; a body without pairs is accepted if it has no breadth in x.
+
+    Args:
+        skeleton: the body.
 
     Raises:
         SkeletonError: a joint has no partner, or two partners are no mirror images of each other.
@@ -86,7 +92,7 @@ def find_sides(skeleton: Skeleton) -> Sides:
     offsets = skeleton.offsets
     at_rest = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
     reach = float(np.linalg.norm(at_rest, axis=-1).max())
-    # How far each joint is from where its partner's image stands, for each axis [3, J].
+    # Distance of each joint from its partner's image, for each axis [3, J].
     off = np.stack([np.linalg.norm(offsets * _reflection(axis) - offsets[partners], axis=-1) for axis in range(3)])
     possible = [axis for axis in ((_X, _Z, _Y) if paired.any() else (_X,)) if off[axis].max() <= TOLERANCE * reach]
     if not possible:
@@ -96,7 +102,7 @@ def find_sides(skeleton: Skeleton) -> Sides:
 
 
 def _reflection(axis: int) -> Floats:
-    """Factors [3] of a vector's coordinates."""
+    """Return the factors [3] by which a reflection along `axis` multiplies coordinates."""
     sign = np.ones(3)
     sign[axis] = -1.0
     return sign
@@ -111,7 +117,7 @@ def _mirrored_body(skeleton: Skeleton, sides: Sides) -> Skeleton:
 
 
 def _pair(skeleton: Skeleton) -> Indices:
-    """Each joint's partner [J]: among the children of its parent's partner the one of the other side's name."""
+    """Return each joint's partner [J]: the child of its parent's partner whose name is that of the other side."""
     names = skeleton.names
     partners = np.zeros(len(skeleton), dtype=np.intp)
     for joint, name in enumerate(names):
@@ -122,24 +128,27 @@ def _pair(skeleton: Skeleton) -> Indices:
         others = other_side(name)
         found = [child for child in skeleton.children(across) if names[child] in others]
         if len(found) > 1:
-            raise _lonely(skeleton, name, f"both {names[found[0]]} and {names[found[1]]} could be it")
+            raise _without_partner(skeleton, name, f"both {names[found[0]]} and {names[found[1]]} could be it")
         if found:
             partners[joint] = found[0]
-        elif across == parent and not _said(name):
+        elif across == parent and not _side_in(name):
             partners[joint] = joint
         else:
             elsewhere = [other for other in names if other in others]
             where = f"{elsewhere[0]} does not hang from" if elsewhere else "nothing of that name hangs from"
-            raise _lonely(skeleton, name, f"on the other side {where} {names[across]}")
+            raise _without_partner(skeleton, name, f"on the other side {where} {names[across]}")
     once = np.flatnonzero(partners[partners] != np.arange(len(skeleton)))
     if len(once):
         name, other = names[once[0]], names[partners[once[0]]]
-        raise _lonely(skeleton, name, f"{other} is the partner of {names[partners[partners[once[0]]]]}")
+        raise _without_partner(skeleton, name, f"{other} is the partner of {names[partners[partners[once[0]]]]}")
     return partners
 
 
 def other_side(name: str) -> set[str]:
-    """What a joint of this name might be called on the other side; no name of a body that has none of them is sided."""
+    """Return the names that a joint of this name might have on the other side.
+
+    A joint is sided only if the body has a joint of one of these names.
+    """
     out = set()
     for sign in _SIGNS:
         found = list(sign.finditer(name))
@@ -150,10 +159,10 @@ def other_side(name: str) -> set[str]:
 
 
 def sides_of(skeleton: Skeleton) -> list[str]:
-    """LEFT, RIGHT or MIDDLE for each joint: told by its name if another joint has the other side's, or if a word of it
-    says so, else its parent's.
+    """Return LEFT, RIGHT or MIDDLE for each joint [J].
 
-    Names are paired as a mirror pairs them, so lfemur and thigh.L are known as well as left_hip.
+    A joint is sided if another joint has the name of its other side, or if "left" or "right" is a word of its name;
+    else it is on its parent's side. Names are read as `find_sides` reads them: lfemur and thigh.L as well as left_hip.
     """
     names, found = set(skeleton.names), list[str]()
     for name, parent in zip(skeleton.names, skeleton.parents, strict=True):
@@ -161,7 +170,7 @@ def sides_of(skeleton: Skeleton) -> list[str]:
         if others:  # "l" and "left" stand before "r" and "right"
             found.append(LEFT if name.lower() < min(others).lower() else RIGHT)
         else:
-            found.append(_said(name) or (found[parent] if parent >= 0 else MIDDLE))
+            found.append(_side_in(name) or (found[parent] if parent >= 0 else MIDDLE))
     return found
 
 
@@ -175,14 +184,14 @@ _OPPOSITE = {"left": "right", "right": "left", "l": "r", "r": "l"}
 
 
 def _exchanged(found: re.Match[str]) -> str:
-    """The other side, in the same case."""
+    """Return the word for the other side, in the same case."""
     word = found[0]
     other = _OPPOSITE[word.lower()]
     return other.upper() if word.isupper() else other.title() if word[0].isupper() else other
 
 
-def _said(name: str) -> str:
-    """LEFT or RIGHT where that is a word of the name by itself, so that the joint cannot be in the middle; else ""."""
+def _side_in(name: str) -> str:
+    """Return LEFT or RIGHT if that is a word of the name by itself, which rules out the middle; else ""."""
     words = (word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name))
     return next((LEFT if word in ("left", "l") else RIGHT for word in words if word in _OPPOSITE), "")
 
@@ -191,14 +200,14 @@ def _said(name: str) -> str:
 
 
 def _asymmetry(skeleton: Skeleton, partners: Indices, off: Floats) -> str:
-    """The joint that is furthest from being its partner's mirror image, along the axis that comes nearest."""
+    """Describe the joint that is furthest from its partner's mirror image, along the axis that fits best."""
     axis = int(off.max(axis=1).argmin())
     joint = int(off[axis].argmax())
     name, other = skeleton.names[joint], skeleton.names[partners[joint]]
     if partners[joint] == joint:
         aside = abs(float(skeleton.offsets[joint, axis]))
         why = f"it stands {aside:.3g} m off the middle, and by its name no joint is the other side's"
-        return str(_lonely(skeleton, name, why))
+        return str(_without_partner(skeleton, name, why))
     a, b = (", ".join(f"{x:.3g}" for x in skeleton.offsets[end]) for end in (joint, partners[joint]))
     return (
         f"{skeleton.name} cannot be mirrored: {name} and {other} are no mirror images of each other at rest: they "
@@ -206,5 +215,5 @@ def _asymmetry(skeleton: Skeleton, partners: Indices, off: Floats) -> str:
     )
 
 
-def _lonely(skeleton: Skeleton, name: str, why: str) -> SkeletonError:
+def _without_partner(skeleton: Skeleton, name: str, why: str) -> SkeletonError:
     return SkeletonError(f"{skeleton.name} cannot be mirrored: {name} has no partner: {why}")

@@ -1,6 +1,6 @@
 """Posture and Motion: arrays on a skeleton. A motion is a sequence of postures with their times.
 
-A motion knows which of its movement the engine made: that is an `Insertion` each.
+A motion records which of its stretches the engine made: each is an `Insertion`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-FASTEST = 10_000.0  # frames a second; more is a slip of the keyboard, not a camera
-_MOMENT = 1e-6  # seconds: times that are no further apart are one
+FASTEST = 10_000.0  # frames a second; more is a typing error, not a camera
+_MOMENT = 1e-6  # seconds: times no further apart count as equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Posture:
     root: Floats
 
     def __post_init__(self) -> None:
-        _settle(self, (len(self.skeleton), 4), (3,))
+        _freeze_checked(self, (len(self.skeleton), 4), (3,))
 
     def as_motion(self) -> Motion:
         """This posture as a motion of one frame at time 0."""
@@ -44,11 +44,11 @@ class Posture:
 
 @dataclass(frozen=True, eq=False)
 class Insertion:
-    """Movement that the engine put between two postures, A and B.
+    """A stretch of movement that the engine inserted between two postures, A and B.
 
     Attributes:
-        times: when the postures are that its M moves lead from and to [M + 1], seconds; the first is A, the last B.
-        bridged: joints' moves that no corpus attests: the joint's name, and the number of the move from 0.
+        times: times [M + 1] of the postures that its M moves join, seconds; the first is A's, the last B's.
+        bridged: moves of joints that no corpus attests: the joint's name, and the number of the move from 0.
     """
 
     times: Floats
@@ -65,7 +65,7 @@ class Insertion:
         object.__setattr__(self, "times", times)
 
     def renamed(self, joints: Mapping[str, str]) -> Insertion:
-        """The same on a body where `joints` are called something else; those that it does not name are left out."""
+        """Return the same insertion with joints renamed by `joints` (old -> new); joints not in it are left out."""
         return replace(self, bridged=tuple((joints[joint], move) for joint, move in self.bridged if joint in joints))
 
 
@@ -78,8 +78,8 @@ class Motion:
         rotations: unit quaternions x, y, z, w [T, J, 4], each local to the parent's frame.
         root: positions of the root joint [T, 3], metres.
         times: seconds, strictly increasing [T].
-        name: what the clip is called.
-        insertions: what of it the engine made, from the earliest to the latest; empty for movement that is all given.
+        name: the clip's name.
+        insertions: the stretches that the engine made, in order of time; empty for movement that is all recorded.
     """
 
     skeleton: Skeleton
@@ -95,10 +95,10 @@ class Motion:
             raise MotionMindError(f"{self.name or 'motion'}: no frames")
         if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError(f"{self.name or 'motion'}: times must be finite and increasing")
-        _settle(self, (len(times), len(self.skeleton), 4), (len(times), 3))
+        _freeze_checked(self, (len(times), len(self.skeleton), 4), (len(times), 3))
         times.setflags(write=False)
         object.__setattr__(self, "times", times)
-        # A file's name may hold bytes that are no text, and no format writes those.
+        # A file's name may hold bytes that are not text, which no format can write.
         object.__setattr__(self, "name", self.name.encode("utf-8", "replace").decode())
         for before, after in pairwise(self.insertions):
             if after.times[0] < before.times[-1] - _MOMENT:
@@ -111,14 +111,18 @@ class Motion:
         return len(self.times)
 
     def posture(self, frame: int) -> Posture:
-        """The posture at index `frame`, negative ones from the end; MotionMindError past either end."""
+        """Return the posture at index `frame`; negative indices count from the end.
+
+        Raises:
+            MotionMindError: there is no such frame; the message names those there are.
+        """
         if not -len(self) <= frame < len(self):
             name = self.name or "the motion"
             raise MotionMindError(f"{name} has frames 0 to {len(self) - 1}, no frame {frame}")
         return Posture(self.skeleton, self.rotations[frame], self.root[frame])
 
     def slice(self, start: int, stop: int) -> Motion:
-        """The frames from `start` up to, not including, `stop`; times are kept as they are."""
+        """Return the frames from `start` up to, not including, `stop`, at unchanged times."""
         part = replace(
             self,
             rotations=self.rotations[start:stop],
@@ -131,14 +135,14 @@ class Motion:
         return replace(part, insertions=tuple(kept))
 
     def inserted(self) -> Bools:
-        """Whether the engine made each frame [T]: those between the A and the B of an insertion."""
+        """Return which frames [T] the engine made: those between the A and the B of an insertion."""
         found = np.zeros(len(self), dtype=bool)
         for one in self.insertions:
             found |= (self.times > one.times[0] + _MOMENT) & (self.times < one.times[-1] - _MOMENT)
         return found
 
     def bridged(self) -> Bools:
-        """Whether each joint is, in each frame, amid a move that no corpus attests [T, J]."""
+        """Return, for each frame and joint [T, J], whether the joint is within a move that no corpus attests."""
         found = np.zeros((len(self), len(self.skeleton)), dtype=bool)
         for one in self.insertions:
             for joint, move in one.bridged:
@@ -152,10 +156,16 @@ class Motion:
         return 0.0 if len(self) < 2 else float(1.0 / np.median(np.diff(self.times)))
 
     def resample(self, rate: float) -> Motion:
-        """The motion at `rate` postures a second, from its first time on; rotations by slerp, root linear.
+        """Return the motion at `rate` postures a second, from its first time on; rotations by slerp, root linearly.
 
-        Frames that fall on a frame of the source are that frame. A motion shorter than one step keeps its
-        first posture. Jitter of the source's clock of up to a thousandth of a step does not lose the last one.
+        Frames that fall on a frame of the source are that frame. A motion shorter than one step keeps its first
+        posture. Jitter of the source's clock of up to a thousandth of a step does not lose the last posture.
+
+        Args:
+            rate: postures a second, at most FASTEST.
+
+        Raises:
+            MotionMindError: the rate is out of that range.
         """
         if not 0.0 < rate <= FASTEST:
             raise MotionMindError(
@@ -166,7 +176,7 @@ class Motion:
         return self.at(self.times[0] + np.arange(steps + 1) / rate)
 
     def at(self, times: Floats) -> Motion:
-        """The motion at increasing `times`, seconds: rotations by slerp, root linear; its ends stay beyond them."""
+        """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it."""
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
             return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times)
@@ -181,8 +191,8 @@ class Motion:
         )
 
 
-def _settle(thing: Posture | Motion, rotations: tuple[int, ...], root: tuple[int, ...]) -> None:
-    """Check shapes and values at the door, then freeze the arrays: what is built is right from then on."""
+def _freeze_checked(thing: Posture | Motion, rotations: tuple[int, ...], root: tuple[int, ...]) -> None:
+    """Check the shapes and values of a new object's arrays, then make them read-only."""
     name = getattr(thing, "name", "") or type(thing).__name__.lower()
     for what, shape in (("rotations", rotations), ("root", root)):
         array = np.array(getattr(thing, what), dtype=np.float64)

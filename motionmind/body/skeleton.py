@@ -1,4 +1,4 @@
-"""Skeletons: joints in topological order, each with its parent and its place in the parent's frame."""
+"""Skeletons: trees of joints in topological order, each with its parent and its place in the parent's frame."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Skeleton:
     """A tree of joints. Metres; Y up; a person at rest faces +Z, so that +X is to the person's left.
 
     Attributes:
-        name: what the skeleton is called, such as "human23".
-        names: the joints' names [J], each after its parent; the first is the root.
+        name: the skeleton's name, such as "human23".
+        names: the joints' names [J], each listed after its parent; the first is the root.
         parents: index of each joint's parent [J], -1 for the root.
         offsets: place of each joint in its parent's frame [J, 3], metres (the root's is 0).
         tips: place of each leaf's far end (fingertip, toe tip, crown) in the leaf's own frame [J, 3], metres;
-            0 where there is none.
+            0 for joints without one.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Skeleton:
         return len(self.names)
 
     def __eq__(self, other: object) -> bool:
-        """Same joints, same tree, same proportions."""
+        """Compare joints, tree and proportions."""
         return (
             isinstance(other, Skeleton)
             and self.difference(other) is None
@@ -73,17 +73,21 @@ class Skeleton:
     __hash__ = None  # type: ignore[assignment]
 
     def index(self, joint: str) -> int:
-        """Index of the joint called `joint`; SkeletonError names the joints there are."""
+        """Return the index of the joint called `joint`.
+
+        Raises:
+            SkeletonError: there is no such joint; the message names those there are.
+        """
         if joint not in self.names:
             raise SkeletonError(f"no joint {joint!r} in {self.name}; its joints are {', '.join(self.names)}")
         return self.names.index(joint)
 
     def children(self, joint: int) -> list[int]:
-        """Indices of the joints whose parent is `joint`."""
+        """Return the indices of the joints whose parent is `joint`."""
         return [child for child, parent in enumerate(self.parents) if parent == joint]
 
     def difference(self, other: Skeleton) -> str | None:
-        """How the tree of `other` differs from this one, in words; None where names and parents are the same.
+        """Describe how the tree of `other` differs from this one, in words; None if names and parents are the same.
 
         Proportions do not count: orientations mean the same on a taller body.
         """
@@ -112,27 +116,32 @@ class Skeleton:
         return float(np.ptp(heights))
 
     def global_rotations(self, rotations: Floats) -> Floats:
-        """Rotations [..., J, 4] of each joint's frame against the world, from local ones [..., J, 4]."""
+        """Return the orientation of each joint's frame in the world [..., J, 4], from local rotations [..., J, 4]."""
         out = np.array(rotations, dtype=np.float64)
         for joints, parents in self._generations:
             out[..., joints, :] = rot.mul(out[..., parents, :], out[..., joints, :])
         return out
 
     def local_rotations(self, turned: Floats) -> Floats:
-        """Local rotations [..., J, 4] from global ones; the inverse of `global_rotations`."""
+        """Return local rotations [..., J, 4] from global ones [..., J, 4]: the inverse of `global_rotations`."""
         parents = np.array(self.parents[1:], dtype=np.intp)
         local = rot.inv_mul(turned[..., parents, :], turned[..., 1:, :])
         return np.concatenate([turned[..., :1, :], local], axis=-2)
 
     def positions(self, rotations: Floats, root: Floats) -> Floats:
-        """Forward kinematics: joint positions [..., J, 3] in metres.
+        """Return the joints' positions [..., J, 3], metres, by forward kinematics.
 
-        `rotations` [..., J, 4] are local, `root` [..., 3] is the root's position.
+        Args:
+            rotations: local rotations [..., J, 4].
+            root: positions of the root [..., 3], metres.
         """
         return self._positions(self.global_rotations(rotations), root)
 
     def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
-        """Positions [..., J + J, 3] in metres of all joints, then of all tips (a joint without one twice)."""
+        """Return the positions [..., 2 J, 3], metres, of all joints, then of all tips.
+
+        A joint without a tip has its own position for one; arguments as for `positions`.
+        """
         turned = self.global_rotations(rotations)
         positions = self._positions(turned, root)
         return np.concatenate([positions, positions + rot.mul_vec(turned, self.tips)], axis=-2)
@@ -146,7 +155,7 @@ class Skeleton:
 
     @cached_property
     def _generations(self) -> list[tuple[Indices, Indices]]:
-        """Joints as far from the root as each other, and their parents: from its children outward."""
+        """Joints by their depth in the tree, and their parents: the root's children first."""
         depth = [0] * len(self)
         for joint, parent in enumerate(self.parents):
             depth[joint] = depth[parent] + 1 if parent >= 0 else 0
@@ -156,6 +165,3 @@ class Skeleton:
 
 def _some(names: list[str]) -> str:
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-
-
-# --- the bodies that go by their names -------------------------------------------------------------------------------

@@ -24,6 +24,11 @@ from motionmind.files import read_bytes
 FORMAT, VERSION = "motionmind-corpus", 1
 BUILT = "motionmind-built-corpus"
 MANIFEST = "manifest.json"
+# The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
+LEARNED_BY = (
+    *("_typing.py", "errors.py", "files.py", "jit.py"),
+    *("geometry", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
+)
 
 
 def home(folder: str | os.PathLike[str] | None = None) -> Path:
@@ -139,11 +144,23 @@ def load(folder: Path, manifest: dict[str, Any] | None = None) -> tuple[dict[str
     return manifest, arrays
 
 
-def fingerprint(files: Iterable[Path]) -> str:
-    """A name for what is learned from these files: a hash of them, and of code and bodies that it takes."""
+def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:
+    """Return a name [16 hexadecimal digits] for what is learned from these files, that changes whenever that may.
+
+    It is a hash of the files, and of the code and the bodies' descriptions that learning uses (`LEARNED_BY`): a change
+    to the search or to pictures leaves a corpus that was learned before valid.
+
+    Args:
+        files: all files that a corpus is learned from.
+        package: folder of the package's sources.
+
+    Raises:
+        FormatError: a file cannot be read.
+    """
     digest = hashlib.sha256()
-    package = Path(__file__).parents[1]
-    for path in [*sorted(package.rglob("*.py")), *sorted(package.glob("notation/bodies/*.toml")), *files]:
+    rooms = [package / name for name in LEARNED_BY]
+    code = [path for room in rooms for path in ([room] if room.suffix else sorted(room.rglob("*.py")))]
+    for path in [*code, *sorted(package.glob("body/bodies/*.toml")), *files]:
         data = read_bytes(path)
         digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:16]

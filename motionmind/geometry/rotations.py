@@ -1,8 +1,12 @@
 """Rotations as plain arrays of unit quaternions, shape [..., 4], in the order x, y, z, w.
 
 `q` and `-q` are the same rotation. `mul(a, b)` turns by `b` first, then by `a`, as matrices do, so a joint's
-global rotation is `mul(parent_global, local)`. Angles are in radians. Formulas are those of Shoemake,
-"Animating rotation with quaternion curves", SIGGRAPH 1985, unless a function names another source.
+global rotation is `mul(parent_global, local)`. Angles are in radians; leading dimensions broadcast. Formulas are those
+of Shoemake, "Animating rotation with quaternion curves", SIGGRAPH (1985), unless a function names another source.
+
+>>> quarter = from_axis_angle([0.0, 1.0, 0.0], np.pi / 2)  # about the vertical, from +Z to +X
+>>> mul_vec(quarter, np.array([0.0, 0.0, 1.0])).round(6).tolist()
+[1.0, 0.0, 0.0]
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ IDENTITY.setflags(write=False)
 
 
 def mul(a: Floats, b: Floats) -> Floats:
-    """Product [..., 4]: the rotation `b` followed by the rotation `a`."""
+    """Return the product [..., 4]: the rotation `b` followed by the rotation `a`."""
     ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 4))
@@ -31,30 +35,30 @@ def mul(a: Floats, b: Floats) -> Floats:
 
 
 def inv(q: Floats) -> Floats:
-    """Inverse rotation [..., 4] of a unit quaternion."""
+    """Return the inverse rotation [..., 4] of a unit quaternion [..., 4]."""
     return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
 def inv_mul(a: Floats, b: Floats) -> Floats:
-    """`inv(a) * b`: what turns `a` into `b`, seen from `a`."""
+    """Return `inv(a) * b` [..., 4]: the rotation from `a` to `b`, in the frame of `a`."""
     return mul(inv(a), b)
 
 
 def mul_inv(a: Floats, b: Floats) -> Floats:
-    """`a * inv(b)`: what turns `b` into `a`, seen from outside."""
+    """Return `a * inv(b)` [..., 4]: the rotation from `b` to `a`, in the outer frame."""
     return mul(a, inv(b))
 
 
 def mul_vec(q: Floats, v: Floats) -> Floats:
-    """The vectors `v` [..., 3] turned by `q` [..., 4]."""
-    # v + w t + u x t with t = 2 (u x v) and u the vector part: fewer products than two of quaternions.
+    """Return the vectors `v` [..., 3] turned by `q` [..., 4]."""
+    # v + w t + u x t with t = 2 (u x v) and u the vector part: cheaper than two products of quaternions.
     u, w = q[..., :3], q[..., 3:]
     t = 2.0 * _cross(u, v)
     return np.asarray(v + w * t + _cross(u, t))
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Vector product [..., 3]; np.cross takes several times as long on small arrays."""
+    """Return the vector product [..., 3]; np.cross takes several times as long on small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     out = np.empty((*np.broadcast_shapes(a.shape[:-1], b.shape[:-1]), 3))
@@ -65,7 +69,11 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def normalise(q: ArrayLike) -> Floats:
-    """Unit quaternions [..., 4] of the same direction; a zero quaternion is a ValueError."""
+    """Return unit quaternions [..., 4] of the same direction.
+
+    Raises:
+        ValueError: a quaternion is zero.
+    """
     q = np.asarray(q, dtype=np.float64)
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     if not np.all(length > 1e-12):
@@ -74,7 +82,7 @@ def normalise(q: ArrayLike) -> Floats:
 
 
 def canonical(q: Floats) -> Floats:
-    """The one of `q` and `-q` whose last nonzero coefficient of (x, y, z, w) is positive."""
+    """Return `q` or `-q` [..., 4], whichever has its last nonzero coefficient of (x, y, z, w) positive."""
     sign = np.sign(q[..., 3])
     for i in (2, 1, 0):
         sign = np.where(sign == 0.0, np.sign(q[..., i]), sign)
@@ -82,21 +90,25 @@ def canonical(q: Floats) -> Floats:
 
 
 def angle(a: Floats, b: Floats) -> Floats:
-    """Angle in [0, pi] between rotations [..., 4]; accurate near 0 and near pi."""
-    # atan2 of the relative rotation's vector and scalar parts; acos of the dot product loses half the digits.
+    """Return the angle [...] in [0, pi], radians, between rotations [..., 4]; accurate near 0 and near pi.
+
+    >>> round(float(angle(about_vertical(0.2), about_vertical(0.5))), 6)
+    0.3
+    """
+    # atan2 of the relative rotation's vector and scalar parts; acos of the dot product would lose half the digits.
     r = inv_mul(a, b)
     return np.asarray(2.0 * np.arctan2(np.linalg.norm(r[..., :3], axis=-1), np.abs(r[..., 3])))
 
 
 def exp(v: Floats) -> Floats:
-    """Quaternion [..., 4] of the rotation vector `v` [..., 3] (axis times angle in radians)."""
+    """Return the quaternion [..., 4] of the rotation vector `v` [..., 3]: axis times angle, radians."""
     theta = np.linalg.norm(v, axis=-1, keepdims=True)
     # sin(theta/2)/theta, by numpy's sin(pi x)/(pi x) with x = theta / 2 pi: exact at 0.
     return np.concatenate([v * 0.5 * np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)], axis=-1)
 
 
 def log(q: Floats) -> Floats:
-    """Rotation vector [..., 3] of `q` with angle in [0, pi]; the inverse of `exp` there."""
+    """Return the rotation vector [..., 3] of `q` [..., 4], radians, of length at most pi: the inverse of `exp`."""
     q = np.where(q[..., 3:] < 0.0, -q, q)
     s = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     theta = 2.0 * np.arctan2(s, q[..., 3:])
@@ -106,17 +118,24 @@ def log(q: Floats) -> Floats:
 
 
 def from_axis_angle(axis: ArrayLike, theta: ArrayLike) -> Floats:
-    """Rotation [..., 4] by `theta` radians [...] about the unit vectors `axis` [..., 3]."""
+    """Return the rotation [..., 4] by `theta` [...] radians about the unit vectors `axis` [..., 3]."""
     half = 0.5 * np.asarray(theta, dtype=np.float64)[..., None]
     vector = np.asarray(axis, dtype=np.float64) * np.sin(half)
     return np.asarray(np.concatenate([vector, np.broadcast_to(np.cos(half), (*vector.shape[:-1], 1))], axis=-1))
 
 
 def from_euler(order: str, angles: Floats) -> Floats:
-    """Rotation [..., 4] of intrinsic turns by `angles` [..., len(order)] radians about the axes in `order`.
+    """Return the rotation [..., 4] of intrinsic turns about the axes in `order`, one after another.
 
     "ZXY" turns about z, then about the new x, then about the newest y: the product Rz Rx Ry, BVH's meaning of
-    channels in that order. Any number of letters x, y, z, in either case.
+    channels in that order.
+
+    Args:
+        order: any number of letters x, y and z, in either case.
+        angles: of the turns [..., len(order)], radians.
+
+    >>> from_euler("ZY", np.array([0.0, np.pi])).round(6).tolist()
+    [0.0, 1.0, 0.0, 0.0]
     """
     axes = np.eye(3)
     turns = [from_axis_angle(axes["xyz".index(letter)], angles[..., i]) for i, letter in enumerate(order.lower())]
@@ -124,10 +143,13 @@ def from_euler(order: str, angles: Floats) -> Floats:
 
 
 def to_euler(order: str, q: Floats) -> Floats:
-    """Angles [..., 3] in radians with `from_euler(order, angles) == q`, for three different axes.
+    """Return angles [..., 3], radians, with `from_euler(order, angles)` the same rotations as `q` [..., 4].
 
     At gimbal lock (middle angle within 1e-9 of a right angle) the last angle is set to 0. Source: Shuster, "A survey
     of attitude representations", J. Astronaut. Sci. 41:4 (1993), the asymmetric sequences.
+
+    Raises:
+        ValueError: `order` does not name x, y and z once each.
     """
     i, j, k = ("xyz".index(letter) for letter in order.lower())
     if len({i, j, k}) != 3:
@@ -142,23 +164,23 @@ def to_euler(order: str, q: Floats) -> Floats:
         np.arctan2(sign * m[..., k, j], m[..., j, j]),
         np.arctan2(-sign * m[..., j, k], m[..., k, k]),
     )
-    # Of what is left when the first turn is undone: near the lock, where the first is ill-determined, the last
-    # makes up for it.
+    # Taken from the rest after undoing the first turn: near the lock, where the first is ill-determined, the last
+    # compensates for it.
     undone = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
     last = np.where(locked, 0.0, np.arctan2(sign * undone[..., i], undone[..., j]))
     return np.stack([first, middle, last], axis=-1)
 
 
 def to_matrix(q: Floats) -> Floats:
-    """Rotation matrices [..., 3, 3]; columns are where x, y and z go."""
+    """Return rotation matrices [..., 3, 3] of `q` [..., 4]; their columns are the images of x, y and z."""
     return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
 
 
 def from_matrix(m: Floats) -> Floats:
-    """Quaternions [..., 4] of rotation matrices [..., 3, 3].
+    """Return the quaternions [..., 4] of rotation matrices [..., 3, 3].
 
-    Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1:223 (1978): of the four
-    equivalent formulas the one with the largest divisor is used.
+    Of four equivalent formulas the one with the largest divisor is used. Source: Shepperd, "Quaternion from rotation
+    matrix", J. Guidance and Control 1:223 (1978).
     """
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
     # Four times the products q_i q_j, as a symmetric matrix [..., 4, 4]; its largest row is along q.
@@ -174,7 +196,7 @@ def from_matrix(m: Floats) -> Floats:
 
 
 def between(a: Floats, b: Floats) -> Floats:
-    """The smallest rotation [..., 4] that turns the direction `a` [..., 3] into `b` [..., 3].
+    """Return the smallest rotation [..., 4] from the direction `a` [..., 3] to the direction `b` [..., 3].
 
     For opposite directions the axis is ambiguous: one at right angles to `a` is taken.
     """
@@ -187,18 +209,22 @@ def between(a: Floats, b: Floats) -> Floats:
 
 
 def slerp(a: Floats, b: Floats, t: ArrayLike) -> Floats:
-    """The rotation a share `t` [...] of the way from `a` to `b` [..., 4], the short way round."""
+    """Return the rotation [..., 4] a share `t` [...] of the way from `a` to `b` [..., 4], the short way round.
+
+    >>> round(float(heading(slerp(about_vertical(0.2), about_vertical(0.6), 0.25))), 6)
+    0.3
+    """
     return mul(a, exp(np.asarray(t, dtype=np.float64)[..., None] * log(inv_mul(a, b))))
 
 
 def heading(q: Floats) -> Floats:
-    """Turn [...] in radians about the vertical (y) in `q`: the twist of the swing-twist decomposition.
+    """Return the turn [...] about the vertical (y) in `q` [..., 4], radians: the twist of swing and twist.
 
-    `q = mul(from_axis_angle(y, heading), swing)` with the swing's axis level. Where `q` turns y upside down the
-    twist is undefined and 0 is given. Source: Dobrowolski, "Swing-twist decomposition in Clifford algebra",
+    `q = mul(about_vertical(heading), swing)` with the swing's axis level. If `q` turns y upside down the twist is
+    undefined, and 0 is returned. Source: Dobrowolski, "Swing-twist decomposition in Clifford algebra",
     arXiv:1506.05481 (2015).
     """
-    # With twist * swing, the twist is the normalised projection of q on (y, w), whichever side it stands on.
+    # The twist is the normalised projection of q on (y, w), whether it is applied before or after the swing.
     y, w = q[..., 1], q[..., 3]
     turn = 2.0 * np.arctan2(y, w)
     turn = np.where(np.hypot(y, w) < 1e-9, 0.0, turn)
@@ -206,12 +232,12 @@ def heading(q: Floats) -> Floats:
 
 
 def about_vertical(theta: ArrayLike) -> Floats:
-    """Rotation [..., 4] by `theta` radians about the vertical (y)."""
+    """Return the rotation [..., 4] by `theta` [...] radians about the vertical (y)."""
     return from_axis_angle([0.0, 1.0, 0.0], theta)
 
 
 def mirror(q: Floats, axis: int = 0) -> Floats:
-    """The rotation [..., 4] seen in a mirror that exchanges + and - of an axis: left and right (x) by default."""
+    """Return `q` [..., 4] as seen in a mirror that reverses an axis: left and right (x, axis 0) by default."""
     sign = np.array([-1.0, -1.0, -1.0, 1.0])
     sign[axis] = 1.0
     return np.asarray(q * sign)

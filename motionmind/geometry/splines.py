@@ -1,4 +1,8 @@
-"""Natural cubic splines, for numbers and for rotations."""
+"""Natural cubic splines through numbers and through rotations.
+
+>>> natural_spline(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 0.0]), np.array([0.5, 1.0])).tolist()
+[0.6875, 1.0]
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,23 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.geometry import rotations as rot
 
-_LONG = 64  # knots; of more, pieces are splined with those on either side that bear on them
-_PIECE, _MARGIN = 32, 14  # a knot bears on a natural spline a quarter as much for each knot between: 1e-8 of it is lost
+_LONG = 64  # knots; a longer curve is computed in pieces, each with a margin of knots on either side
+_PIECE, _MARGIN = 32, 14  # a knot's influence falls to about a quarter with each further knot: 1e-8 of it is lost
 
 
 def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
-    """The natural cubic spline through `values` [K, ...] at `times` [K], evaluated at `at` [N]: [N, ...].
+    """Evaluate the natural cubic spline through values.
 
-    Twice continuously differentiable, its second derivative 0 at both ends. Two knots give a straight line.
+    It is twice continuously differentiable, its second derivative 0 at both ends. Two knots give a straight line, one a
+    constant.
+
+    Args:
+        times: of the knots, increasing [K].
+        values: at the knots [K, ...].
+        at: times to evaluate at [N].
+
+    Returns:
+        Values [N, ...].
     """
     if len(times) == 1:
         return np.broadcast_to(values[0], (len(at), *values.shape[1:])).copy()
@@ -27,13 +40,21 @@ def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
 
 
 def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
-    """A twice continuously differentiable curve of rotations through `keys` [K, ..., 4] at `times` [K]: [N, ..., 4].
+    """Evaluate a twice continuously differentiable curve of rotations through keys.
 
-    Around each key the natural spline of the rotation vectors that lead from it to all keys (the chart of SO(3) centred
-    there), unrolled so that neighbouring keys lie within half a turn of each other. From each key to the next the curve
-    passes from the one's spline to the other's, by a weight whose first two derivatives are 0 at both. It is exact at
-    the keys, and for keys that turn about one axis all charts agree: it is the spline of their angle. One chart for
-    all would not do, for it ends a whole turn from its centre, where vectors in all directions are one rotation.
+    Around each key, take the natural spline of the rotation vectors from it to all keys (the chart of SO(3) centred
+    there), unrolled so that neighbouring keys lie within half a turn of each other. Between two keys the curve blends
+    from the one's spline to the other's, by a weight whose first two derivatives are 0 at both. It is exact at the
+    keys; for keys that turn about one axis all charts agree, and it is the spline of their angle. A single chart would
+    not do: it ends a whole turn from its centre, where vectors in all directions are the same rotation.
+
+    Args:
+        times: of the keys, increasing [K].
+        keys: unit quaternions [K, ..., 4].
+        at: times to evaluate at [N].
+
+    Returns:
+        Unit quaternions [N, ..., 4].
     """
     if len(times) == 1:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
@@ -51,7 +72,7 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
 
 
 def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats, knots: Floats, at: Floats) -> Floats:
-    """What `spline` makes of many knots [K, ...], from those near each piece alone: [N, ...]."""
+    """Evaluate `spline` through many knots [K, ...] piece by piece, each from the knots near it alone: [N, ...]."""
     out = np.empty((len(at), *knots.shape[1:]))
     piece = _pieces(times, at) // _PIECE
     for number in range(piece.min(initial=0), piece.max(initial=-1) + 1):
@@ -62,10 +83,12 @@ def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats
 
 
 def _unroll(vectors: Floats) -> Floats:
-    """Rotation vectors [K, K, ..., 3] to each key from each centre, whole turns added so that each is nearest to that
-    of the neighbouring key towards the centre."""
+    """Add whole turns to rotation vectors [K, K, ..., 3], to each key from each centre, radians.
+
+    Each is then nearest to the vector of the neighbouring key towards the centre.
+    """
     if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max() < np.pi:
-        return vectors  # all neighbours are as near as that already
+        return vectors  # all neighbours are that near already
     out = vectors.copy()
     for distance in range(2, len(out)):
         for side in (1, -1):
@@ -73,7 +96,7 @@ def _unroll(vectors: Floats) -> Floats:
             centre = key - side * distance
             toward, own = out[key - side, centre], out[key, centre]
             angle = np.linalg.norm(own, axis=-1, keepdims=True)
-            # No rotation at all may be a turn about any axis; where its neighbour has none either, about none.
+            # A zero vector may be a whole turn about any axis: take its neighbour's, if that is not zero too.
             along = np.where(angle > 1e-9, own, toward)
             axis = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
             turns = np.round((np.sum(axis * toward, axis=-1, keepdims=True) - angle) / (2.0 * np.pi))
@@ -82,12 +105,12 @@ def _unroll(vectors: Floats) -> Floats:
 
 
 def _pieces(times: Floats, at: Floats) -> Ints:
-    """Index [N] of the knot at which the piece begins that each of `at` lies in."""
+    """Return the index [N] of the knot that begins the piece which each of `at` [N] lies in."""
     return np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
 
 
 def _bends(times: Floats, values: Floats) -> Floats:
-    """Second derivatives [K, ...] of the natural spline at its knots.
+    """Return the second derivatives [K, ...] of the natural spline at its knots.
 
     They solve the tridiagonal system h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (d[i] - d[i-1]), with
     steps h and slopes d; source: de Boor, "A Practical Guide to Splines" (1978), chapter IV.
@@ -105,11 +128,11 @@ def _bends(times: Floats, values: Floats) -> Floats:
 def _cubic(
     times: Floats, piece: Ints, at: Floats, left: Floats, right: Floats, left_bend: Floats, right_bend: Floats
 ) -> Floats:
-    """Values [N, ...] on pieces between knots with these values and second derivatives [N, ...]."""
+    """Return values [N, ...] on pieces whose end knots have these values and second derivatives [N, ...]."""
     column = (-1, *(1,) * (left.ndim - 1))
     after, before = (times[piece + 1] - at).reshape(column), (at - times[piece]).reshape(column)
     step = after + before
-    # On each piece: the straight line, plus what both bends add, which is 0 at its knots.
+    # On each piece: the straight line, plus the contribution of both bends, which is 0 at its knots.
     line = (left * after + right * before) / step
     bent = left_bend * (after**3 / step - step * after) + right_bend * (before**3 / step - step * before)
     return np.asarray(line + bent / 6.0)

@@ -1,1 +1,1 @@
-"""."""
+"""Learning from a corpus, and saving, loading and summarising the result."""

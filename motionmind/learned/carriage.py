@@ -1,4 +1,4 @@
-"""How a corpus's bodies hold themselves, travel and stand, moment by moment."""
+"""Carriage: how a corpus's bodies hold themselves, travel and stand, moment by moment."""
 
 from __future__ import annotations
 
@@ -7,38 +7,38 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.contact import floor_height, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
 from motionmind.body.limits import find_loose
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.distances import squared
+from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
-from motionmind.realise.root import lowest
 
-SLIDES = 0.3  # metres a second at which a limb that touches the floor stands no more than half
+SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
+ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
 
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
     """How a corpus's bodies hold themselves, travel and stand, in its postures and midway between them.
 
-    There are N moments: the postures, then the middle of each of the M moves. A step is half a move, two in each.
+    There are N moments: the postures, then the middle of each of the M moves. A step is half a move.
 
     Attributes:
-        orientations: of the chains [N, L, 4].
-        weights: what each moment counts [N].
-        begins: moments from which the steps lead [2 M].
-        ends: the moment that each leads to [2 M].
-        shares: of each step among those that leave the same moment [2 M].
-        kinds: of which kind each part of each moment is [N, P], as `motionmind.realise.walks` says.
+        orientations: orientations of the chains [N, L, 4].
+        weights: weight of each moment [N].
+        begins: moment that each step leads from [2 M].
+        ends: moment that it leads to [2 M].
+        shares: share of each step among those that leave the same moment [2 M].
+        clusters: number of the cluster that each part of the body is in at each moment [N, P] (see `clusters_of`).
         turn: turn about the vertical in each half of each move [M], radians.
-        travel: displacement of the root in it, metres, in the body's heading midway [M, 3].
-        clearance: height of the lowest point above the clip's floor [N], metres, at least 0. The floor is where the
-            lowest point is in the lowest twentieth of the clip: a recording's own zero is often off.
-        stands: how still the lowest point of each limb, and last of the trunk, is [N, limbs + 1]: 1 where it does not
-            move level, 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
-        loose: which joints do not keep to their limits in the corpus [J].
+        travel: displacement of the root in the same, metres, in the body's heading midway [M, 3].
+        clearance: height of the lowest point above the clip's floor (`floor_height`) [N], metres, at least 0.
+        stands: how firmly each limb, and last the trunk, stands [N, limbs + 1]: 1 where its lowest point does not move
+            level, near 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
+        loose: whether each joint breaks its limits in the corpus [J].
     """
 
     orientations: Floats
@@ -46,7 +46,7 @@ class Carriage:
     begins: Ints
     ends: Ints
     shares: Floats
-    kinds: Int32s
+    clusters: Int32s
     turn: Floats
     travel: Floats
     clearance: Floats
@@ -55,9 +55,9 @@ class Carriage:
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
-    """How the bodies of a corpus hold themselves, travel and stand."""
-    low = lowest(corpus.skeleton, corpus.rotations, corpus.root)
-    floor = [np.quantile(low[clip.start : clip.stop], 0.05) for clip in corpus.clips]
+    """Learn how the bodies of a corpus hold themselves, travel and stand."""
+    low = lowest_height(corpus.skeleton, corpus.rotations, corpus.root)
+    floor = [floor_height(low[clip.start : clip.stop]) for clip in corpus.clips]
     clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
     shares = weights / np.bincount(begins, weights, len(corpus))[begins]
@@ -77,14 +77,17 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         0.5 * turned,
         0.5 * moved,
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
-        _stands(corpus),
+        _standing(corpus),
         find_loose(corpus.skeleton, corpus.rotations),
     )
 
 
-def _stands(corpus: Corpus) -> Floats:
-    """How still limbs and trunk are, as in Carriage: 1 / (1 + (v / SLIDES)^2) of the level speed v of the point that is
-    lowest in a move; in a posture the mean of the moves there."""
+def _standing(corpus: Corpus) -> Floats:
+    """Return how firmly limbs and trunk stand [N, limbs + 1], as in Carriage.
+
+    In a move 1 / (1 + (v / SLIDES)^2), with v the level speed of the limb's lowest point; in a posture the mean of the
+    moves that begin and end there.
+    """
     begins, ends = corpus.moves.begins, corpus.moves.ends
     places = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
     limb = limb_of_points(corpus.skeleton)
@@ -93,7 +96,7 @@ def _stands(corpus: Corpus) -> Floats:
     for number in range(out.shape[1]):
         points = places[:, limb == number]
         if not points.shape[1]:
-            continue  # all joints are of limbs
+            continue  # every joint belongs to a limb
         lowest = np.argmin(points[begins, :, 1] + points[ends, :, 1], axis=1)
         moved = points[ends, lowest] - points[begins, lowest]
         speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds
@@ -104,14 +107,14 @@ def _stands(corpus: Corpus) -> Floats:
     return out
 
 
-ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are of one kind
-
-
 def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
-    """Which kind each part of a body is of in chains' orientations [N, L, 4]: [N, P], parts as in `parts_of`, kinds
-    from 0.
+    """Cluster the postures of each part of a body: [N, P], with parts as in `parts_of` and clusters numbered from 0.
 
-    In the order of the postures one founds a kind unless a founder lies within ALIKE; then each joins the nearest.
+    In order, a posture founds a cluster unless a founder lies within ALIKE; then each joins its nearest founder.
+
+    Args:
+        skeleton: the body.
+        orientations: orientations of the chains [N, L, 4].
     """
     parts = parts_of(skeleton)
     out = np.empty((len(orientations), len(parts)), dtype=np.int32)
@@ -122,17 +125,18 @@ def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
 
 @jit
 def _clusters(orientations: Floats, within: float) -> Ints:
+    """Return the clusters [N] of one part's orientations [N, m, 4]; founders are more than `within` apart, squared."""
     founders = np.empty(len(orientations), np.int64)
     out = np.empty(len(orientations), np.int64)
     count = 0
-    for late in (False, True):
+    for founded in (False, True):
         for i in range(len(orientations)):
             least = np.inf
             for k in range(count):
-                distance = squared(orientations[i], orientations[founders[k]])
+                distance = squared_distance(orientations[i], orientations[founders[k]])
                 if distance < least:
                     least, out[i] = distance, k
-            if not late and least > within:
+            if not founded and least > within:
                 founders[count] = i
                 count += 1
     return out

@@ -1,20 +1,182 @@
-"""What a corpus holds and how well it hangs together."""
+"""Summaries of a corpus: its contents, its origins, and how well it hangs together.
+
+The structs are what `corpus info` and `corpus check` write as JSON, field by field in this order.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Int32s
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.corpus import Clip, Corpus, Facing
 from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 
 
-def summarise(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
-    """What a corpus is and how large, as plain values for JSON; states and edges for each chain."""
+class ClipSummary(msgspec.Struct, frozen=True):
+    """A clip of a corpus.
+
+    Attributes:
+        name: the clip's label.
+        postures: number of its postures.
+        about: a line on its content.
+    """
+
+    name: str
+    postures: int
+    about: str
+
+
+class Origin(msgspec.Struct, frozen=True):
+    """The clips of a corpus that come from one corpus, in the same direction and with the same weight.
+
+    Attributes:
+        corpus: the corpus that they come from.
+        mirrored: whether left and right are exchanged.
+        reversed: whether they run backwards.
+        clips: number of clips.
+        postures: number of their postures.
+        moves: number of their moves.
+        weight: weight of each move.
+        share: weighted share of all moves of the corpus, from 0 to 1.
+    """
+
+    corpus: str
+    mirrored: bool
+    reversed: bool
+    clips: int
+    postures: int
+    moves: int
+    weight: float
+    share: float
+
+
+class FlipReport(msgspec.Struct, frozen=True):
+    """A joint that flips between two frames of a recording.
+
+    Attributes:
+        clip: name of the clip.
+        joint: name of the joint.
+        frame: the first frame after the flip.
+        degrees: angle of the flip, rounded to a tenth.
+    """
+
+    clip: str
+    joint: str
+    frame: int
+    degrees: float
+
+
+class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """What a corpus is, and how large.
+
+    Attributes:
+        name: of the corpus.
+        title: a line on what it is.
+        author: its author.
+        source: where it comes from.
+        licence: the licence of its use.
+        clips: its clips.
+        origins: the corpora that it was made of.
+        postures: number of postures.
+        moves: number of moves from posture to posture.
+        skeleton: name of the body.
+        joints: the joints' names.
+        facing: "stage" or "free", as in Corpus.
+        rate: postures a second; None for keyframes with times of their own.
+        states: number of states, by chain.
+        edges: number of attested moves from state to state, by chain.
+    """
+
+    name: str
+    title: str
+    author: str
+    source: str
+    licence: str
+    clips: list[ClipSummary]
+    origins: list[Origin]
+    postures: int
+    moves: int
+    skeleton: str
+    joints: list[str]
+    facing: Facing
+    rate: float | None
+    states: dict[str, int]
+    edges: dict[str, int]
+
+
+class CorpusCheck(CorpusSummary, frozen=True, kw_only=True):
+    """A summary, and how well the corpus hangs together.
+
+    Attributes:
+        joinable: share of random pairs of the corpus's postures such that in every chain attested moves, however many,
+            lead from one state to the other.
+        pairs: number of those pairs.
+        seed: of their random choice.
+        out_degree: mean number of states that a state leads to, by chain.
+        faults: flips of joints in the corpus's recordings.
+    """
+
+    joinable: float
+    pairs: int
+    seed: int
+    out_degree: dict[str, float]
+    faults: list[FlipReport]
+
+
+def summarise(corpus: Corpus, grammar: Grammar) -> CorpusSummary:
+    """Summarise a corpus and its grammar; states and edges are counted for each chain."""
+    return CorpusSummary(**_summary_values(corpus, grammar))
+
+
+def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, seed: int = 0) -> CorpusCheck:
+    """Summarise a corpus, and measure how well it hangs together.
+
+    Args:
+        corpus: the movement.
+        grammar: what was learned of its states.
+        states: states of its postures [N, L].
+        pairs: number of random pairs of postures to try to join.
+        seed: of their random choice, at least 0.
+
+    Raises:
+        MotionMindError: `pairs` or `seed` is out of its range.
+    """
+    if pairs < 1:
+        raise MotionMindError(f"the number of pairs must be at least 1, not {pairs}")
+    if seed < 0:
+        raise MotionMindError(f"a seed must be a whole number of at least 0, not {seed}")
+    graph = grammar.transitions
+    degree = np.diff(graph.indptr[graph.starts]) / graph.sizes()
+    return CorpusCheck(
+        **_summary_values(corpus, grammar),
+        joinable=joinable(grammar, states, pairs, seed),
+        pairs=pairs,
+        seed=seed,
+        out_degree=_by_chain(grammar, np.round(degree, 3)),
+        faults=[FlipReport(f.clip, f.joint, f.frame, round(f.degrees, 1)) for f in corpus.faults],
+    )
+
+
+def to_plain(summary: CorpusSummary) -> dict[str, Any]:
+    """Return a summary as plain values for JSON, in the order of its fields."""
+    plain: dict[str, Any] = msgspec.to_builtins(summary, enc_hook=_plain_number)
+    return plain
+
+
+def _plain_number(value: Any) -> Any:
+    """Return a number of numpy's, such as a weight that a caller gave, as Python's."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
+
+
+def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
+    """Return the values of a CorpusSummary by the names of its fields."""
     graph = grammar.transitions
     return {
         "name": corpus.name,
@@ -22,7 +184,7 @@ def summarise(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "author": corpus.author,
         "source": corpus.source,
         "licence": corpus.licence,
-        "clips": [{"name": clip.label, "postures": len(clip), "about": clip.about} for clip in corpus.clips],
+        "clips": [ClipSummary(clip.label, len(clip), clip.about) for clip in corpus.clips],
         "origins": origins(corpus),
         "postures": len(corpus),
         "moves": len(corpus.begins),
@@ -35,63 +197,37 @@ def summarise(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
     }
 
 
-def origins(corpus: Corpus) -> list[dict[str, Any]]:
-    """Where a corpus comes from, as plain values for JSON: for each corpus that it was made of, and for what of that is
-    mirrored, reversed or of another weight, the clips, postures and moves, what each move counts, and the share of all
-    moves that they make."""
-    found: dict[tuple[str, bool, bool, float], list[Clip]] = {}
+def origins(corpus: Corpus) -> list[Origin]:
+    """Return where a corpus's clips come from, grouped by corpus, mirroring, direction and weight."""
+    groups: dict[tuple[str, bool, bool, float], list[Clip]] = {}
     for backwards in (False, True):
         for clip in corpus.clips:
             if clip.reverse is not None or not backwards:
                 weight = clip.reverse_weight if backwards else clip.weight
-                found.setdefault((clip.corpus or corpus.name, clip.mirrored, backwards, weight), []).append(clip)
+                groups.setdefault((clip.corpus or corpus.name, clip.mirrored, backwards, weight), []).append(clip)
     total = float(corpus.moves.weights.sum())
-    return [
-        {
-            "corpus": name,
-            "mirrored": is_mirrored,
-            "reversed": backwards,
-            "clips": len(clips),
-            "postures": sum(map(len, clips)),
-            "moves": sum(len(clip) - 1 for clip in clips),
-            "weight": weight,
-            "share": weight * sum(len(clip) - 1 for clip in clips) / total,
-        }
-        for (name, is_mirrored, backwards, weight), clips in found.items()
-    ]
-
-
-def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
-    """`summarise`, and how well the corpus hangs together, as plain values for JSON.
-
-    `joinable` is the share of random pairs of the corpus's postures such that every chain has attested moves that lead
-    from one state to the other, however many; `out_degree` the mean number of states that a state leads to.
-    """
-    if pairs < 1:
-        raise MotionMindError(f"the number of pairs must be at least 1, not {pairs}")
-    if seed < 0:
-        raise MotionMindError(f"a seed must be a whole number of at least 0, not {seed}")
-    graph = grammar.transitions
-    degree = np.diff(graph.indptr[graph.starts]) / graph.sizes()
-    return {
-        **summarise(corpus, grammar),
-        "joinable": joinable(grammar, states, pairs, seed),
-        "pairs": pairs,
-        "seed": seed,
-        "out_degree": _by_chain(grammar, np.round(degree, 3)),
-        "faults": [
-            {"clip": f.clip, "joint": f.joint, "frame": f.frame, "degrees": round(f.degrees, 1)} for f in corpus.faults
-        ],
-    }
+    out = []
+    for (name, is_mirrored, backwards, weight), clips in groups.items():
+        moves = sum(len(clip) - 1 for clip in clips)
+        share = weight * moves / total
+        out.append(Origin(name, is_mirrored, backwards, len(clips), sum(map(len, clips)), moves, weight, share))
+    return out
 
 
 def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
-    """Share of `pairs` random pairs of postures that attested moves alone can join."""
+    """Return the share of random pairs of postures that attested moves alone can join.
+
+    Args:
+        grammar: what was learned of the states.
+        states: states of the corpus's postures [N, L].
+        pairs: number of pairs.
+        seed: of their random choice.
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import breadth_first_order
 
     graph = grammar.transitions
-    drawn = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
+    chosen = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
     joined = np.ones(pairs, dtype=bool)
     for chain, size in enumerate(graph.sizes()):
         first = graph.starts[chain]
@@ -100,7 +236,7 @@ def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
             (np.ones(rows.stop - rows.start), graph.targets[rows], graph.indptr[first : first + size + 1] - rows.start),
             shape=(size, size),
         )
-        a, b = states[drawn[:, 0], chain], states[drawn[:, 1], chain]
+        a, b = states[chosen[:, 0], chain], states[chosen[:, 1], chain]
         for state in np.unique(a):
             reached = np.zeros(size, dtype=bool)
             reached[breadth_first_order(chain_graph, state, return_predecessors=False)] = True

@@ -9,6 +9,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
+from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
@@ -227,7 +228,7 @@ def _lift(body: Anatomy, rows: list[Row], rotations: Floats, root: Floats, stand
 
     If a leg stands the height is right already, and nothing may be under the floor.
     """
-    lowest, joints = body.lowest(rotations, root)
+    lowest, joints = lowest_point(body, rotations, root)
     for t in np.flatnonzero(stands):
         row = rows[t]
         if row.up is not None:

@@ -1,1 +1,1 @@
-"""From a path of states to movement."""
+"""Realising a path of states as a motion: timeline, walks through the corpus, detail, root and feet."""

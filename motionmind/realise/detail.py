@@ -1,8 +1,8 @@
-"""The fine detail of movement: what postures a few times a second leave out, as it was in the corpus's recordings.
+"""Fine detail of movement: motion between postures, restored from the corpus's recordings.
 
-A movement that passes smoothly through its postures is smoother than any that was recorded: what happens between two
-postures is missing. It is taken from the corpus's moves that are likest to those of the movement, in long runs: the
-whole body's from one move, for what its joints do within a fifth of a second they do together.
+A movement that passes smoothly through a few postures a second is smoother than any that was recorded: the motion
+between two postures is missing. It is copied from the corpus's moves that are most like those of the movement, in long
+runs. All joints take it from the same move, for their motions within a fifth of a second belong together.
 """
 
 from __future__ import annotations
@@ -11,40 +11,49 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus, Moves
-from motionmind.geometry.distances import squared
+from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
-GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer a posture must be for a run to end before it
+GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another posture must be to leave a run for it
 
 
-def likest_moves(moves: Moves, shown: Floats, poses: Floats) -> Ints:
-    """The corpus's moves [T] that lead along `poses` [T + 1, J, 4], in long runs; its own postures are `shown`
-    [N, J, 4].
+def likest_moves(moves: Moves, orientations: Floats, poses: Floats) -> Ints:
+    """Return the corpus's moves [T] that lead along a movement's postures, in long runs.
 
-    They minimise the sum of d^2 over both ends of all moves, d being their distance from the movement's postures,
-    radians, root mean square over the joints, plus 2 GOES_OVER^2 for each move that does not go on from the one before
-    as its clip does. Found by dynamic programming.
+    They minimise the sum of d^2 over both ends of all moves, with d the distance from the movement's postures, radians,
+    root mean square over the joints, plus 2 GOES_OVER^2 for each move that does not continue the one before it in the
+    corpus's clip. Found by dynamic programming.
+
+    Args:
+        moves: the corpus's moves.
+        orientations: of the corpus's postures [N, J, 4].
+        poses: orientations of the movement's postures [T + 1, J, 4].
     """
-    far = _far(np.ascontiguousarray(shown), np.ascontiguousarray(poses)) / poses.shape[1]
-    cost = far[:-1, moves.begins] + far[1:, moves.ends]
-    before = _before(moves)
-    total, came = cost[0], []
+    distances = _squared_distances(np.ascontiguousarray(orientations), np.ascontiguousarray(poses)) / poses.shape[1]
+    cost = distances[:-1, moves.begins] + distances[1:, moves.ends]
+    before = _predecessors(moves)
+    total, came_from = cost[0], []
     for step in cost[1:]:
         least = int(total.argmin())
-        straight = np.where(before >= 0, total[before], np.inf)
+        straight_on = np.where(before >= 0, total[before], np.inf)
         over = total[least] + 2.0 * GOES_OVER**2
-        came.append(np.where(straight <= over, before, least))
-        total = np.minimum(straight, over) + step
+        came_from.append(np.where(straight_on <= over, before, least))
+        total = np.minimum(straight_on, over) + step
     out = [int(total.argmin())]
-    for previous in reversed(came):
+    for previous in reversed(came_from):
         out.append(int(previous[out[-1]]))
     return np.array(out[::-1], dtype=np.int64)
 
 
 def detail_of(corpus: Corpus, moves: Ints) -> Floats:
-    """The detail of some of the corpus's moves, one after another: rotation vectors [T (K + 1) + 1, J, 3], radians.
+    """Return the detail of some of the corpus's moves, one after another: rotation vectors [T (K + 1) + 1, J, 3].
 
-    They are 0 at the postures, so that it is without a gap wherever one move does not go on from the other.
+    They are in radians, and 0 at the postures: the detail is continuous even where a move does not continue the one
+    before it.
+
+    Args:
+        corpus: a corpus that keeps K frames of detail a move.
+        moves: numbers of its moves [T].
     """
     begins, ends = corpus.moves.begins[moves], corpus.moves.ends[moves]
     between = corpus.detail[np.minimum(begins, ends)].astype(np.float64)
@@ -56,23 +65,23 @@ def detail_of(corpus: Corpus, moves: Ints) -> Floats:
     return np.concatenate([out.reshape(-1, joints, 3), np.zeros((1, joints, 3))])
 
 
-def _before(moves: Moves) -> Ints:
-    """The move that comes before each in its clip [M], -1 where none does."""
+def _predecessors(moves: Moves) -> Ints:
+    """Return the move that precedes each in its clip [M], in the same direction of time; -1 for the first of a clip."""
     out = np.full(len(moves.begins), -1)
     count = max(int(moves.begins.max()), int(moves.ends.max())) + 1
     forward = moves.ends > moves.begins
-    for way in (np.flatnonzero(forward), np.flatnonzero(~forward)):
+    for direction in (np.flatnonzero(forward), np.flatnonzero(~forward)):
         arrives = np.full(count, -1)
-        arrives[moves.ends[way]] = way
-        out[way] = arrives[moves.begins[way]]
+        arrives[moves.ends[direction]] = direction
+        out[direction] = arrives[moves.begins[direction]]
     return out
 
 
 @jit
-def _far(shown: Floats, poses: Floats) -> Floats:
-    """Squared distance of each of `poses` [T, J, 4] from each posture that is `shown` [N, J, 4]: [T, N]."""
-    out = np.empty((len(poses), len(shown)))
+def _squared_distances(orientations: Floats, poses: Floats) -> Floats:
+    """Return the squared distance of each of `poses` [T, J, 4] from each of `orientations` [N, J, 4]: [T, N]."""
+    out = np.empty((len(poses), len(orientations)))
     for t in range(len(poses)):
-        for i in range(len(shown)):
-            out[t, i] = squared(shown[i], poses[t])
+        for i in range(len(orientations)):
+            out[t, i] = squared_distance(orientations[i], poses[t])
     return out

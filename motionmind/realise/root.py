@@ -1,40 +1,38 @@
-"""Where the body goes: carried by its feet where they stand, as the corpus's bodies travel where none does."""
+"""The root's trajectory: the feet that stand carry the body; where none stands it travels as the corpus's bodies do."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.anatomy import SIDES
-from motionmind.body.limbs import limb_of_points, limbs_of
-from motionmind.body.limits import anatomy_of
+from motionmind.body.contact import lowest_height
+from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
-SLIP = 0.15  # what the corpus's own travel weighs beside a foot that stands
-BEARS = 4  # power of how much limbs stand by which they bear the body: of two feet the one that stands the surer
+SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
+BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
 
 
 def root_trajectory(
     skeleton: Skeleton, rotations: Floats, clearance: Floats, stands: Floats, drift: Floats, a: Floats, b: Floats
 ) -> Floats:
-    """Positions [N, 3] of the root from `a` [3] to `b` [3], level; heights are as `stand` makes them.
+    """Return positions [N, 3] of the root, metres, from `a` to `b`; their heights are provisional, `stand` sets them.
 
-    From each frame to the next the points of the body that stand near the floor are to stay, and the root is to go by
-    `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p how point p moves seen
-    from the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to b - a.
-    So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one l for all: what is missing to `b` is made up
-    where the body stands least.
+    From each frame to the next, points of the body that stand near the floor should stay, and the root should move by
+    `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p the motion of point p
+    relative to the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to
+    b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one multiplier l for all: the distance
+    missing to `b` is made up where the body stands least.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
         clearance: height of the lowest point above the floor [N], metres.
-        stands: how much each limb, and last the trunk, stands from each frame to the next [N - 1, limbs + 1], 0 to 1.
-        drift: how far the corpus's bodies would travel from each frame to the next [N - 1, 3].
-        a: first position of the root.
-        b: last position.
+        stands: how firmly each limb, and last the trunk, stands between frames [N - 1, limbs + 1], from 0 to 1.
+        drift: displacement of the corpus's bodies from each frame to the next [N - 1, 3], metres.
+        a: first position of the root [3], metres.
+        b: last position of the root [3], metres.
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -47,33 +45,17 @@ def root_trajectory(
 
 
 def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats) -> Floats:
-    """Root positions [N, 3] that put each posture's lowest point `clearance` [N] metres above y = 0."""
-    lifted = root.copy()
-    lifted[:, 1] += clearance - lowest(skeleton, rotations, root)
-    return lifted
+    """Lift or lower each posture so that its lowest point is `clearance` above y = 0.
 
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        clearance: height of the lowest point [N], metres.
 
-def lowest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """Heights [...] of the lowest joint, tip or heel of postures with local rotations [..., J, 4] and root [..., 3]."""
-    return np.asarray(lows(skeleton, rotations, root).min(axis=-1))
-
-
-def lows(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """The same for each limb, and last for the trunk [..., limbs + 1]; infinite where all joints are of limbs.
-
-    Heels are known of bodies with an anatomy, whose proportions they are given in.
+    Returns:
+        Positions of the root [N, 3], metres.
     """
-    heights, limb = skeleton.positions_and_tips(rotations, root)[..., 1], limb_of_points(skeleton)
-    anatomy = anatomy_of(skeleton)
-    if anatomy is not None and anatomy.leg is not None:
-        heel = np.array(anatomy.leg.heel) * skeleton.height / anatomy.skeleton.height
-        ankles = [anatomy.named(anatomy.leg.ankle, side) for side in SIDES]
-        turned = skeleton.global_rotations(rotations)[..., ankles, :]
-        heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
-        heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
-        limb = np.concatenate([limb, limb[ankles]])
-    count = len(limbs_of(skeleton)) + 1
-    out = np.full((*heights.shape[:-1], count), np.inf)
-    for number in range(count):
-        out[..., number] = heights[..., limb == number].min(axis=-1, initial=np.inf)
-    return out
+    lifted = root.copy()
+    lifted[:, 1] += clearance - lowest_height(skeleton, rotations, root)
+    return lifted

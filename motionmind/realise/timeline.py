@@ -1,6 +1,8 @@
-"""How long the moves of a path take."""
+"""The time that moves take, and the frames of a motion."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,16 +10,34 @@ from motionmind._typing import Floats, Int32s
 from motionmind.grammar.transitions import Transitions
 
 
+class Timeline(NamedTuple):
+    """The clock of a motion of T moves and N frames.
+
+    Attributes:
+        moves: times at which the moves begin, and the end of the last [T + 1], seconds from 0.
+        frames: times of the frames [N], seconds, evenly spaced; the first is 0, the last the end of the last move.
+        usual_moves: number of moves that the corpus makes in that time.
+    """
+
+    moves: Floats
+    frames: Floats
+    usual_moves: int
+
+
 def usual(transitions: Transitions) -> float:
-    """Seconds that a move of the corpus takes: the median."""
+    """Return the usual duration of the corpus's moves, seconds: the median; 1 for a corpus without moves."""
     return float(np.median(transitions.seconds)) if len(transitions.seconds) else 1.0
 
 
 def durations(path: Int32s, transitions: Transitions) -> Floats:
-    """Seconds of each move [T] of a path of states [T + 1, L]: the median over chains of what the corpus took for it.
+    """Return the duration of each move [T] of a path, seconds: the median over chains of the corpus's durations.
 
-    Chains that hold or wait do not vote while others move, for a hold can last any time; bridges have no time of their
-    own. A move that nobody can time takes the median duration of all moves of the corpus.
+    Chains that hold or wait do not vote while others move, for a hold can last any time; bridges have no duration of
+    their own. A move without any vote takes the median duration of all moves of the corpus.
+
+    Args:
+        path: states of the chains [T + 1, L].
+        transitions: the corpus's moves from state to state.
     """
     out = np.full(len(path) - 1, usual(transitions))
     edges, moving = transitions.edges(path), path[1:] != path[:-1]
@@ -26,3 +46,22 @@ def durations(path: Int32s, transitions: Transitions) -> Floats:
         if timed.any():
             out[t] = np.median(transitions.seconds[edges[t, timed]])
     return out
+
+
+def timeline(path: Int32s, transitions: Transitions, fps: float, length: float | None = None) -> Timeline:
+    """Return the times of a path's moves and of its frames, at about `fps`; the last frame falls on the end exactly.
+
+    Args:
+        path: states of the chains [T + 1, L], with one move at least.
+        transitions: the corpus's moves from state to state.
+        fps: frames a second.
+        length: duration of the whole, seconds, to which frames are fitted; None for as long as the corpus takes,
+            stretched by less than a frame.
+    """
+    seconds = durations(path, transitions)
+    usually = float(seconds.sum())
+    frames = max(1, round((length or usually) * fps))
+    length = length or frames / fps
+    moves = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
+    moves[-1] = length
+    return Timeline(moves, np.linspace(0.0, length, frames + 1), max(1, round(len(seconds) * length / usually)))

@@ -195,12 +195,12 @@ class Engine(LearnedCorpus):
         return graphs.network(self)
 
     def info(self) -> dict[str, Any]:
-        """Return what the corpus is and how large, as plain values: see `learned.summary.summarise`."""
-        return summary.summarise(self.corpus, self.grammar)
+        """Summarise the corpus, as plain values: see `motionmind.learned.summary.CorpusSummary`."""
+        return summary.to_plain(summary.summarise(self.corpus, self.grammar))
 
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
-        """Return how well the corpus hangs together, as plain values: see `learned.summary.check_corpus`."""
-        return summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed)
+        """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
+        return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
 
 
 def _with_bridges(motion: Motion, bridges: tuple[Bridge, ...]) -> Motion:

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named, read_body
+from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
@@ -26,7 +27,6 @@ from motionmind.formats import read_motion, read_posture, write_motion, write_po
 from motionmind.formats.papers import read_papers, write_papers
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import compose
-from motionmind.realise.root import lowest
 from motionmind.retarget.retarget import own_skeleton, to_human23
 from motionmind.tween.engine import Engine
 
@@ -83,7 +83,7 @@ def clip(name: str, *keys: Turns) -> Motion:
         rows.append(posed(turns))
     rotations = np.stack(rows)
     root = np.zeros((len(rows), 3))
-    root[:, 1] = -lowest(BODY, rotations, root)
+    root[:, 1] = -lowest_height(BODY, rotations, root)
     return Motion(BODY, rotations, root, 0.4 * np.arange(len(rows)), name).resample(10.0)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import doctest
 from itertools import permutations
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
+from motionmind.geometry import splines
 
 ORDERS = ["".join(order) for order in permutations("xyz")]
 UP = np.array([0.0, 1.0, 0.0])
@@ -251,3 +254,10 @@ def test_functions_broadcast_over_leading_axes() -> None:
     assert rot.to_euler("zxy", q).shape == (2, 3, 4, 3)
     assert rot.heading(q).shape == (2, 3, 4)
     assert rot.slerp(q, q[:1], np.full((2, 3, 4), 0.5)).shape == q.shape
+
+
+@pytest.mark.parametrize("module", [rot, splines])
+def test_examples_in_docstrings_hold(module: ModuleType) -> None:
+    found = doctest.testmod(module)
+    assert found.attempted > 0
+    assert found.failed == 0

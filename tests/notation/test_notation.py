@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from motionmind._typing import Floats
 from motionmind.body.anatomy import Anatomy
 from motionmind.body.anatomy_file import anatomy_named, read_body
+from motionmind.body.contact import lowest_point
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion, Posture
 from motionmind.cli import main
@@ -1046,7 +1047,7 @@ def test_a_leap_carries_the_weight_so_far(folder: Path, left: int, ahead: int, f
 @settings(max_examples=20)
 def test_in_the_air_the_lowest_point_is_so_high(folder: Path, up: int, legs: str) -> None:
     motion = moved(folder, f"  start up {up} | {legs} | second\n  1 | {legs}\n")
-    lowest, _ = HUMAN.lowest(motion.rotations, motion.root)
+    lowest, _ = lowest_point(HUMAN, motion.rotations, motion.root)
     np.testing.assert_allclose(lowest, [up / 100.0, 0.0], atol=1.1e-5)
 
 

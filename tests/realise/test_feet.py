@@ -9,27 +9,16 @@ import pytest
 
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named
-from motionmind.body.contact import foot_slide, skating
+from motionmind.body.contact import foot_slide, lowest_height, skating
 from motionmind.body.human import human23, human44
 from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.realise.feet import (
-    BACK,
-    EVEN,
-    HOLDS,
-    SMOOTH,
-    STAY,
-    STEP,
-    _along,
-    _envelope,
-    _legs,
-    _reach,
-    _track,
-    plant_feet,
-)
-from motionmind.realise.root import lowest, stand
+from motionmind.realise.feet import STAY, _follow_legs, plant_feet
+from motionmind.realise.legs import find_legs, reach
+from motionmind.realise.root import stand
+from motionmind.realise.tracks import BACK, EVEN, HOLDS, SMOOTH, STEP, _envelope, _track
 
 LEGS = list(range(1, 9))
 TIGHT = np.zeros(23, dtype=np.bool_)  # no joint is loose
@@ -101,7 +90,7 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     )
     assert abs(went[18, 1] - went[0, 1]) < 0.1 * abs(root[18, 1] - root[0, 1])
     assert np.ptp(went[:, 1]) < 0.3 * np.ptp(root[:, 1])  # near the ends it begins to
-    np.testing.assert_allclose(lowest(skeleton, found, went), 0.0, atol=1e-9)
+    np.testing.assert_allclose(lowest_height(skeleton, found, went), 0.0, atol=1e-9)
 
 
 def test_feet_that_would_skate_step() -> None:
@@ -120,7 +109,7 @@ def test_the_floor_and_the_limits_hold_and_the_height_stays() -> None:
     for travel in (0.0, 0.5, 1.5):
         q, root = sway(size=0.3, travel=travel)
         found, went = planted(q, root)
-        np.testing.assert_allclose(lowest(human23(), found, went), 0.0, atol=1e-9)
+        np.testing.assert_allclose(lowest_height(human23(), found, went), 0.0, atol=1e-9)
         assert rot.angle(within_limits(human23(), found, found[[0, -1]], TIGHT), found).max() < 1e-9
 
 
@@ -200,7 +189,8 @@ def test_few_frames_leave_little_to_do(frames: int) -> None:
 def test_legs_are_found_by_their_long_bones() -> None:
     for skeleton in (human23(), human44()):
         legs = [
-            ([skeleton.names[joint] for joint in leg], skeleton.names[leg[knee]]) for leg, knee in _legs(skeleton)[1]
+            ([skeleton.names[joint] for joint in leg], skeleton.names[leg[knee]])
+            for leg, knee in find_legs(skeleton)[1]
         ]
         assert [knee for _, knee in legs] == ["left_knee", "right_knee"]
         assert [leg[0] for leg, _ in legs] == ["left_hip", "right_hip"]
@@ -216,10 +206,10 @@ def test_legs_hang_where_the_body_forks_first() -> None:
         np.concatenate([[[0.0] * 3], body.offsets]),
         np.concatenate([[[0.0] * 3], body.tips]),
     )
-    assert [[joint - 1 for joint in leg] for leg, _ in _legs(rig)[1]] == [leg for leg, _ in _legs(body)[1]]
+    assert [[joint - 1 for joint in leg] for leg, _ in find_legs(rig)[1]] == [leg for leg, _ in find_legs(body)[1]]
     assert parts_of(rig)[1].tolist() == [0, *(parts_of(body)[1] + 1)]
     chain = Skeleton("chain", ("a", "b", "c"), (-1, 0, 1), np.array([[0.0] * 3, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]))
-    assert _legs(chain)[1] == []
+    assert find_legs(chain)[1] == []
 
 
 def test_a_body_without_legs_stays_as_it_is() -> None:
@@ -268,7 +258,7 @@ def test_an_envelope_is_smooth_and_nowhere_less_than_is_needed() -> None:
 def test_the_root_goes_along_as_far_as_legs_would_be_stretched() -> None:
     rng = np.random.default_rng(1)
     legs, off = rng.normal(size=(5, 2, 3)), rng.normal(size=(5, 2, 3))
-    found = _along(legs, off)
+    found = _follow_legs(legs, off)
     unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
 
     def cost(r: Floats) -> Floats:
@@ -290,7 +280,7 @@ def test_a_leg_reaches_what_is_in_its_reach_and_bends_as_it_did() -> None:
     rng = np.random.default_rng(2)
     hip, leg = bent(rng.uniform(0.8, 1.6, 50), rng)
     target = leg[:, 2] + rng.uniform(-0.03, 0.03, (50, 3))
-    thigh, shank = _reach(hip, leg, target)
+    thigh, shank = reach(hip, leg, target)
     knee = rot.mul_vec(thigh, leg[:, 1])
     np.testing.assert_allclose(knee + rot.mul_vec(shank, leg[:, 2] - leg[:, 1]), target, atol=1e-9)
     # The shank turns against the thigh about the knee's own axis alone, and not beyond straight.
@@ -304,7 +294,7 @@ def test_a_leg_that_is_too_short_is_stretched_ever_less_and_never_straight() -> 
     hip, leg = bent(np.full(200, 0.6), np.random.default_rng(3))
     hip, leg = np.repeat(hip[:1], 200, axis=0), np.repeat(leg[:1], 200, axis=0)
     along = leg[:, 2] / np.linalg.norm(leg[:, 2], axis=-1, keepdims=True)
-    thigh, shank = _reach(hip, leg, leg[:, 2] + far[:, None] * along)
+    thigh, shank = reach(hip, leg, leg[:, 2] + far[:, None] * along)
     bend = rot.angle(shank, thigh)
     reached = np.linalg.norm(rot.mul_vec(thigh, leg[:, 1]) + rot.mul_vec(shank, leg[:, 2] - leg[:, 1]), axis=-1)
     assert np.all(np.diff(reached) >= -1e-12)
@@ -314,5 +304,5 @@ def test_a_leg_that_is_too_short_is_stretched_ever_less_and_never_straight() -> 
 
 def test_a_leg_that_is_where_it_should_be_stays_even_straight() -> None:
     hip, leg = bent(np.zeros(9), np.random.default_rng(4))
-    for turn in _reach(hip, leg, leg[:, 2]):
+    for turn in reach(hip, leg, leg[:, 2]):
         assert rot.angle(turn, np.broadcast_to(rot.IDENTITY, turn.shape)).max() < 1e-4

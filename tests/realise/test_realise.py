@@ -1,4 +1,4 @@
-"""From a path of states to movement: splines, durations, the root, ways, detail, and the whole."""
+"""From a path of states to movement: durations, the root, walks, detail, and the whole."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 from motionmind._typing import Floats, Int32s
-from motionmind.body.anatomy_file import anatomy_named
+from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.limbs import parts_of
-from motionmind.body.limits import find_loose, within_limits
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
@@ -23,117 +21,15 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
-from motionmind.realise.realise import _headings, realise
-from motionmind.realise.root import lowest, root_trajectory, stand
+from motionmind.realise.headings import turn_with_path
+from motionmind.realise.marginals import posterior_marginals
+from motionmind.realise.mean_walk import mean_rotations
+from motionmind.realise.realise import realise
+from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import durations
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, mean_rotations, posterior_marginals
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 Z = np.array([0.0, 0.0, 1.0])
-
-
-# --- splines ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("count", [2, 3, 4, 9])
-@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
-def test_a_natural_spline_is_scipys(count: int, shape: tuple[int, ...]) -> None:
-    rng = np.random.default_rng(count)
-    times = np.cumsum(rng.uniform(0.1, 2.0, count))
-    values = rng.normal(size=(count, *shape))
-    at = np.sort(np.concatenate([times, rng.uniform(times[0], times[-1], 50)]))
-    expected = CubicSpline(times, values, bc_type="natural")(at)
-    np.testing.assert_allclose(natural_spline(times, values, at), expected, atol=1e-12)
-
-
-def test_a_spline_through_one_knot_stays_there() -> None:
-    np.testing.assert_array_equal(natural_spline(np.zeros(1), np.ones((1, 3)), np.arange(4.0)), np.ones((4, 3)))
-    key = rot.about_vertical(0.3)[None]
-    np.testing.assert_array_equal(rotation_spline(np.zeros(1), key, np.arange(4.0)), np.tile(key, (4, 1)))
-
-
-def test_splines_of_many_knots_are_made_in_pieces_that_fit() -> None:
-    times, keys = wander(150, 40.0, seed=1)
-    at = np.linspace(0.0, times[-1], 800)
-    np.testing.assert_allclose(
-        natural_spline(times, times[:, None] ** 2 + keys[:, 0], at),
-        CubicSpline(times, times[:, None] ** 2 + keys[:, 0], bc_type="natural")(at),
-        atol=1e-5,
-    )
-    spans = rot.about_vertical(np.cumsum(np.radians(30.0 + 20.0 * keys[:, 0, 0])))
-    expected = CubicSpline(times, np.unwrap(rot.heading(spans)), bc_type="natural")(at)
-    assert rot.angle(rotation_spline(times, spans, at), rot.about_vertical(expected)).max() < 1e-6
-
-
-def wander(count: int, degrees: float, seed: int, chains: int = 5) -> tuple[Floats, Floats]:
-    """Times [K] and rotations [K, chains, 4] that turn by at most so many degrees from one to the next."""
-    rng = np.random.default_rng(seed)
-    keys = [rot.normalise(rng.normal(size=(chains, 4)))]
-    for _ in range(count - 1):
-        axis = rng.normal(size=(chains, 3))
-        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        keys.append(rot.mul(keys[-1], rot.from_axis_angle(axis, np.radians(degrees) * rng.uniform(0.2, 1.0, chains))))
-    return np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.3, count - 1))]), np.array(keys)
-
-
-@pytest.mark.parametrize(("count", "degrees"), [(3, 20.0), (6, 90.0), (12, 170.0), (30, 45.0)])
-def test_a_rotation_spline_meets_its_keys_whatever_their_signs(count: int, degrees: float) -> None:
-    times, keys = wander(count, degrees, seed=count)
-    assert rot.angle(rotation_spline(times, keys, times), keys).max() < 1e-12
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (*keys.shape[:2], 1))
-    at = np.linspace(0.0, times[-1], 100)
-    assert rot.angle(rotation_spline(times, signs * keys, at), rotation_spline(times, keys, at)).max() < 1e-9
-
-
-@pytest.mark.parametrize(("count", "degrees"), [(3, 60.0), (7, 40.0), (9, 100.0)])
-def test_a_rotation_spline_has_a_continuous_angular_velocity_and_acceleration(count: int, degrees: float) -> None:
-    times, keys = wander(count, degrees, seed=count + 1)
-    h = 1e-4
-    # Angular velocities at half steps h before and after each inner key, then their differences.
-    steps = np.arange(-3, 4) * h
-    at = (times[1:-1, None] + steps).ravel()
-    curve = rotation_spline(times, keys, at).reshape(count - 2, len(steps), -1, 4)
-    velocity = rot.log(rot.mul_inv(curve[:, 1:], curve[:, :-1])) / h
-    acceleration = np.diff(velocity, axis=1) / h
-    speed, bend = np.abs(velocity).max(), np.abs(acceleration).max()
-    assert np.abs(velocity[:, 3] - velocity[:, 2]).max() < 2.0 * bend * h + 1e-9 * speed
-    across = np.abs(acceleration[:, 3] - acceleration[:, 1]).max()  # one is before the key, one after it
-    assert across < 0.02 * bend
-
-
-def test_keys_about_one_axis_give_the_spline_of_their_angle_through_any_number_of_turns() -> None:
-    rng = np.random.default_rng(3)
-    axis = np.array([0.48, 0.6, 0.64])
-    at = np.linspace(0.0, 1.0, 200)
-    for count, most in ((3, 100.0), (8, 170.0), (20, 120.0), (30, 60.0)):
-        times = np.linspace(0.0, 1.0, count)
-        angles = np.cumsum(np.radians(rng.uniform(-0.2 * most, most, count)))
-        keys = rot.from_axis_angle(axis, angles)
-        expected = rot.from_axis_angle(axis, natural_spline(times, angles, at))
-        assert rot.angle(rotation_spline(times, keys, at), expected).max() < 1e-9
-    # Exactly a turn and two away from where it began.
-    turns = np.radians(120.0) * np.arange(7)
-    expected = rot.about_vertical(np.radians(720.0) * at)
-    found = rotation_spline(np.linspace(0.0, 1.0, 7), rot.about_vertical(turns), at)
-    assert rot.angle(found, expected).max() < 1e-9
-
-
-def test_two_keys_give_slerp() -> None:
-    times, keys = wander(2, 175.0, seed=5)
-    shares = np.linspace(0.0, 1.0, 30)
-    expected = rot.slerp(keys[:1], keys[1:], shares[:, None])
-    assert rot.angle(rotation_spline(times, keys, shares * times[-1]), expected).max() < 1e-12
-
-
-@pytest.mark.parametrize("tilt", [0.0, 5.0, 15.0, 30.0])
-@pytest.mark.parametrize("step", [40.0, 60.0, 90.0, 120.0])
-def test_a_body_that_spins_several_times_is_never_spun_back(tilt: float, step: float) -> None:
-    tilts = rot.exp(np.radians(tilt) * np.random.default_rng(1).uniform(-1.0, 1.0, (16, 3)))
-    keys = rot.mul(rot.about_vertical(np.radians(step) * np.arange(16)), tilts)
-    times = np.arange(16) * 0.2
-    at = np.linspace(0.0, times[-1], 15 * 60 + 1)
-    curve = rotation_spline(times, keys, at)
-    fastest_between_keys = rot.angle(keys[1:], keys[:-1]).max() / 0.2
-    assert rot.angle(curve[1:], curve[:-1]).max() / (at[1] - at[0]) < 1.5 * fastest_between_keys
 
 
 # --- durations and the root -------------------------------------------------------------------------------------------
@@ -160,12 +56,12 @@ def test_bodies_stand_as_high_as_they_are_told() -> None:
     q, root = rot.normalise(rng.normal(size=(20, 23, 4))), rng.normal(size=(20, 3))
     heights = rng.uniform(0.0, 0.5, 20)
     placed = stand(human23(), q, root, heights)
-    np.testing.assert_allclose(lowest(human23(), q, placed), heights, atol=1e-12)
+    np.testing.assert_allclose(lowest_height(human23(), q, placed), heights, atol=1e-12)
     np.testing.assert_array_equal(placed[:, [0, 2]], root[:, [0, 2]])
 
 
 def test_a_foot_that_stands_carries_the_body() -> None:
-    """A body that sways over its feet: from the postures alone the root's way is found again."""
+    """A body that sways over its feet: from the postures alone the root's trajectory is found again."""
     stander, rest = human23(), np.tile(rot.IDENTITY, (30, 23, 1))
     sway = rot.from_axis_angle([1.0, 0.0, 0.0], 0.2 * np.sin(np.arange(30) / 5.0))
     rest[:, [stander.index("left_hip"), stander.index("right_hip")]] = sway[:, None]
@@ -205,32 +101,20 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
 
 
-# --- ways -------------------------------------------------------------------------------------------------------------
-
-
-def test_each_joint_is_in_one_part_of_each_size() -> None:
-    names = human23().names
-    whole, carrying, carried, *limbs = ([names[j] for j in part] for part in parts_of(human23()))
-    for parts in ([whole], [carrying, carried], limbs):
-        assert sorted(name for part in parts for name in part) == sorted(names)
-    assert limbs[0] == ["pelvis", "lumbar", "thorax"]
-    assert ["left_hip", "left_knee", "left_ankle", "left_toes"] in limbs
-    assert carrying == ["pelvis", *limbs[1], *limbs[2]]
-    hand = Skeleton("hand", ("wrist", "thumb", "finger"), (-1, 0, 0), np.zeros((3, 3)))
-    assert [part.tolist() for part in parts_of(hand)] == [[0, 1, 2], [0, 1, 2], [0], [1], [2]]
+# --- walks -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
+def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count, steps = 4, 3
     begins, ends = np.array([0, 1, 2, 2]), np.array([1, 2, 3, 0])
     shares = np.array([1.0, 1.0, 0.3, 0.7])
-    kinds = np.array([0, 1, 0, 1], dtype=np.int32)
+    clusters = np.array([0, 1, 0, 1], dtype=np.int32)
     near = rng.uniform(0.1, 1.0, (steps + 1, count))
     go = np.zeros((count, count))
     go[begins, ends] = shares
-    alike = (kinds[:, None] == kinds) / 2.0
+    alike = (clusters[:, None] == clusters) / 2.0
     move = go @ (
         STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * np.full((count, count), 0.25)
     )
@@ -239,7 +123,7 @@ def test_how_likely_walks_are_is_the_sum_over_all_of_them(seed: int) -> None:
         weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
         expected[np.arange(steps + 1), walked] += weight
     expected /= expected.sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, kinds, near), expected, atol=1e-12)
+    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, near), expected, atol=1e-12)
 
 
 def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
@@ -248,33 +132,6 @@ def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
     q = rot.about_vertical(angles)[:, None] * rng.choice([-1.0, 1.0], (2, 1, 1))
     mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.tile(rot.IDENTITY, (2, 1, 1)))
     np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
-
-
-def test_joints_are_brought_to_their_limits_and_no_further() -> None:
-    anatomy = anatomy_named("human23")
-    q = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (3, 1, 1))
-    bent = anatomy.rotations({"left_knee": np.array([[170.0, 0.0, 0.0]]), "right_hip": np.array([[0.0, 100.0, 0.0]])})
-    q[1] = bent[0]
-    tight = np.zeros(23, dtype=np.bool_)
-    limited = anatomy.degrees(within_limits(human23(), q, q[[0, 2]], tight))[1]
-    assert limited[human23().index("left_knee"), 0] == pytest.approx(150.0)
-    assert limited[human23().index("right_hip"), 1] == pytest.approx(80.0)
-    np.testing.assert_array_equal(within_limits(human23(), q, q[[0, 2]], tight)[[0, 2]], q[[0, 2]])
-    loose = np.arange(23) == human23().index("left_knee")
-    spared = within_limits(human23(), q, q[[0, 2]], loose)
-    np.testing.assert_array_equal(spared[:, loose], q[:, loose])
-    assert anatomy.degrees(spared)[1, human23().index("right_hip"), 1] == pytest.approx(80.0)
-    q[2] = q[1]  # what is given is not changed, nor what goes no further
-    np.testing.assert_array_equal(within_limits(human23(), q, q[1:], tight), q)
-
-
-def test_joints_that_a_corpus_itself_has_beyond_their_limits_are_loose() -> None:
-    anatomy, knee = anatomy_named("human23"), human23().index("left_knee")
-    straight = np.tile(anatomy.rotations({"pelvis": np.zeros((1, 3))}), (200, 1, 1))
-    for degrees, count, loose in ((154.0, 200, False), (156.0, 2, False), (156.0, 3, True), (170.0, 200, True)):
-        q = straight.copy()
-        q[:count, knee] = anatomy.rotations({"left_knee": np.array([[degrees, 0.0, 0.0]])})[0, knee]
-        assert find_loose(human23(), q).tolist() == [joint == knee and loose for joint in range(23)]
 
 
 # --- detail -----------------------------------------------------------------------------------------------------------
@@ -425,7 +282,7 @@ def test_a_path_that_is_followed_is_in_its_states_at_each_move(walking: Learned)
 
 
 def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
-    """The mean way lies near what was done between the same postures, and much nearer than the straight way."""
+    """The mean walk lies near the recorded movement between the same postures, much nearer than the straight line."""
     motion = walk()
     rows = list(range(5, 17))
     found = realised(walking, rows, motion.posture(5), motion.posture(16), fps=5.0)
@@ -442,7 +299,7 @@ def test_no_frame_is_below_the_floor_where_a_and_b_stand_on_it(walking: Learned)
     motion = walk()
     for rows in ([3, 4], [2, 3, 4, 5, 6, 7, 8], [0, 9, 30, 31, 32]):
         found = realised(walking, rows, motion.posture(rows[0]), motion.posture(rows[-1]))
-        assert lowest(human23(), found.rotations, found.root).min() > -1e-3
+        assert lowest_height(human23(), found.rotations, found.root).min() > -1e-3
 
 
 def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
@@ -450,15 +307,15 @@ def test_a_body_that_stands_on_a_stage_stays_on_it(walking: Learned) -> None:
     motion, rows, up = walk(), [2, 3, 4, 5, 6, 7, 8], np.array([0.0, 0.3, 0.0])
     a, b = (replace(motion.posture(row), root=motion.root[row] + up) for row in (2, 8))
     found = realised(walking, rows, a, b)
-    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), 0.3, atol=0.01)
+    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), 0.3, atol=0.01)
 
 
 def test_a_body_whose_floor_is_below_zero_stays_on_it(walking: Learned) -> None:
     sunk = walk(sink=0.11)
     found = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), sunk.posture(7))
-    np.testing.assert_allclose(lowest(human23(), found.rotations, found.root), -0.11, atol=1e-9)
+    np.testing.assert_allclose(lowest_height(human23(), found.rotations, found.root), -0.11, atol=1e-9)
     up = realised(walking, [2, 3, 4, 5, 6, 7], sunk.posture(2), walk().posture(7))
-    heights = lowest(human23(), up.rotations, up.root)
+    heights = lowest_height(human23(), up.rotations, up.root)
     assert np.all(np.diff(heights) > -1e-9)
     assert np.diff(heights).max() < 0.01
 
@@ -470,7 +327,7 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     known = learned(replace(jumping, root=root))
     grounded, rows = walk(), list(range(5, 18))
     found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, np.full(23, 1e-6))
-    heights = lowest(human23(), found.rotations, found.root)
+    heights = lowest_height(human23(), found.rotations, found.root)
     assert heights.argmax() in (5, 6, 7)
     assert 0.1 < heights.max() <= 0.25 + 1e-9
     assert heights[[0, 1, 2, -3, -2, -1]].max() < 0.03
@@ -540,7 +397,7 @@ def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Floats) 
         turn = np.radians(356.0 + speed * keys)
         path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
         a, b = rot.about_vertical(turn[[0, -1]])
-        found = _headings(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
+        found = turn_with_path(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
         np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
 
 
@@ -549,7 +406,7 @@ def test_headings_stay_in_their_states() -> None:
     for _ in range(20):
         path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
         a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
-        found = _headings(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
+        found = turn_with_path(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
         off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
         assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
         assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9

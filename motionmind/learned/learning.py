@@ -1,0 +1,113 @@
+"""Learning from a corpus: its states, grammar and carriage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from motionmind._typing import Floats, States
+from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.discretize import Discretization, StateSpace
+from motionmind.errors import CorpusError
+from motionmind.geometry import rotations as rot
+from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.grammar import learn as learn_grammar
+from motionmind.learned.carriage import Carriage, learn_carriage
+
+MOST_STATES_LEARNED = 10_000  # of a joint: learning its pairs takes some 6 GB
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """The result of learning from a corpus of N postures, with L chains.
+
+    Attributes:
+        corpus: the movement that was learned from.
+        space: the states of each chain.
+        states: states of the corpus's postures [N, L].
+        grammar: joint graphs, bridges and coordination.
+        carriage: how the corpus's bodies hold themselves, travel and stand.
+    """
+
+    corpus: Corpus
+    space: StateSpace
+    states: States
+    grammar: Grammar
+    carriage: Carriage
+
+
+def learn(corpus: Corpus, discretization: Discretization) -> Learned:
+    """Learn from a corpus.
+
+    Args:
+        corpus: the movement.
+        discretization: how orientations become states; only states with a posture in them are kept.
+
+    Raises:
+        CorpusError: a joint has more than MOST_STATES_LEARNED states.
+    """
+    orientations = corpus.to_chains(corpus.rotations)
+    joints = corpus.skeleton.names
+    space = discretization.fit(joints, orientations[:, : len(joints)])
+    space, states = _keep_visited(space, space.assign(orientations[:, : len(joints)]))
+    _check_size(corpus, space)
+    if corpus.facing == "free":
+        space, facing = _with_facing(space, orientations[:, -1])
+        states = np.concatenate([states, facing[:, None]], axis=1)
+    moves = corpus.moves
+    grammar = learn_grammar(
+        corpus.chains,
+        corpus.chain_parents,
+        space.centres,
+        states,
+        space.sizes,
+        moves.begins,
+        moves.seconds,
+        ends=moves.ends,
+        weights=moves.weights,
+        posture_weights=corpus.weights,
+    )
+    return Learned(corpus, space, states, grammar, learn_carriage(corpus))
+
+
+def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:
+    """Return the state space without states that no posture is in, and the postures' states [N, J] in it.
+
+    Nothing is known of a state without postures.
+    """
+    kept = [np.unique(column) for column in states.T]
+    labels = [[named[s] for s in seen] if named else [] for named, seen in zip(space.labels, kept, strict=True)]
+    centres = [space.of(joint)[seen] for joint, seen in enumerate(kept)]
+    smaller = StateSpace.of_joints(space.names, centres, kind=space.kind, tolerances=space.tolerances, labels=labels)
+    renamed = [np.searchsorted(seen, column) for seen, column in zip(kept, states.T, strict=True)]
+    return smaller, np.stack(renamed, axis=1).astype(np.int32)
+
+
+def _check_size(corpus: Corpus, space: StateSpace) -> None:
+    """Raise a CorpusError if learning, which compares all pairs of a joint's states, would take too much memory."""
+    largest = int(np.argmax(space.sizes))
+    if space.sizes[largest] > MOST_STATES_LEARNED:
+        raise CorpusError(
+            f"corpus {corpus.name!r}: {space.names[largest]} has {space.sizes[largest]} states within "
+            f"{space.tolerances[largest]:g} degrees, and a joint can have {MOST_STATES_LEARNED}; "
+            "give it a coarser tolerance"
+        )
+
+
+def _with_facing(space: StateSpace, turns: Floats) -> tuple[StateSpace, States]:
+    """Return the state space with a chain for the facing, and the states [N] in it of the corpus's turns [N, 4].
+
+    The facing's states are equal steps of a circle, about as wide as the root's tolerance.
+    """
+    count = max(8, round(360.0 / float(space.tolerances[0])))
+    ring = rot.canonical(rot.about_vertical(np.arange(count) * 2.0 * np.pi / count))
+    wider = StateSpace.of_joints(
+        (*space.names, FACING),
+        [*(space.of(joint) for joint in range(len(space))), ring],
+        kind=space.kind,
+        tolerances=np.append(space.tolerances, 360.0 / count),
+        labels=(*space.labels, ()),
+    )
+    steps = np.round(rot.heading(turns) / (2.0 * np.pi / count)).astype(np.int32) % count
+    return wider, steps

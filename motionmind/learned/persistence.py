@@ -1,0 +1,201 @@
+"""Keeping on disk what was learned from a corpus, and finding it again.
+
+A built corpus is a folder of arrays with a manifest (`motionmind.corpus.store`). What is learned from a corpus that
+people wrote, a bundled one above all, is kept in a cache, under a name that is a fingerprint of all that it depends on.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus import store
+from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.gather import gather
+from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
+from motionmind.discretize import Discretization, StateSpace, from_spec
+from motionmind.discretize.library import library_path
+from motionmind.errors import FormatError, MotionMindError
+from motionmind.formats import read_motion
+from motionmind.grammar.bridges import Bridges
+from motionmind.grammar.coordination import Coordination
+from motionmind.grammar.grammar import Grammar
+from motionmind.grammar.transitions import Transitions
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.learning import Learned, learn
+from motionmind.notation.sources import sources
+from motionmind.retarget.retarget import own_skeleton
+
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
+
+_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
+_PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
+_ARRAYS = (
+    *("rotations", "root", "times", "detail", "states", "centres"),
+    *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
+)
+_RENAMED = {"carriage.kinds": "carriage.clusters"}  # arrays of corpora built by 0.1: old name -> new
+
+
+def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
+    """Write all that was learned to a folder, whole or not at all.
+
+    Args:
+        learned: what to write.
+        folder: where; a built corpus that is there is replaced.
+
+    Raises:
+        CorpusError: the folder cannot be written, or holds anything but a built corpus.
+    """
+    corpus, space = learned.corpus, learned.space
+    arrays: dict[str, NDArray[Any]] = {
+        "rotations": corpus.rotations,
+        "root": corpus.root,
+        "times": corpus.times,
+        "detail": corpus.detail,
+        "states": learned.states,
+        "centres": space.centres,
+    }
+    for name, kind in _PARTS.items():
+        part = learned.carriage if kind is Carriage else getattr(learned.grammar, name)
+        arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
+    skeleton = corpus.skeleton
+    manifest = {
+        **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
+        "skeleton": {
+            "name": skeleton.name,
+            "names": skeleton.names,
+            "parents": skeleton.parents,
+            "offsets": skeleton.offsets.tolist(),
+            "tips": skeleton.tips.tolist(),
+        },
+        "clips": [_clip_entry(clip) for clip in corpus.clips],
+        "faults": [asdict(fault) for fault in corpus.faults],
+        "space": {
+            "kind": space.kind,
+            "starts": space.starts.tolist(),
+            "tolerances": space.tolerances.tolist(),
+            "labels": space.labels,
+        },
+    }
+    store.save(Path(folder), manifest, arrays)
+
+
+def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
+    """Load what was learned from a corpus; a bundled corpus is learned on first use and kept in the cache.
+
+    Args:
+        name: of the corpus, or its folder.
+        home: where a user's corpora are.
+
+    Raises:
+        CorpusError: there is no such corpus; the message names those there are.
+        FormatError: it cannot be read.
+    """
+    folder = store.locate(name, home)
+    manifest = store.read_manifest(folder)
+    if manifest["format"] == store.BUILT:
+        return _open(folder, manifest)
+    source = parse_manifest(manifest, SourceManifest, folder / store.MANIFEST)
+    built = store.cache() / f"{folder.name}-{store.fingerprint(_learned_files(folder, source))}"
+    try:
+        return _open(built)
+    except MotionMindError:  # it is not there yet, or is damaged
+        learned = learn(*_read_source(folder, source))
+    with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
+        save(learned, built)
+    return learned
+
+
+def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
+    """Open a built corpus; `found` is its manifest, if that has been read."""
+    saved, stored = store.load(folder, found)
+    arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
+    path = folder / store.MANIFEST
+    manifest = parse_manifest(saved, BuiltManifest, path)
+    missing = [name for name in _ARRAYS if name not in arrays]
+    if missing:
+        raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
+    body, states = manifest.skeleton, manifest.space
+    corpus = Corpus(
+        skeleton=Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips)),
+        clips=manifest.clips,
+        rotations=arrays["rotations"],
+        root=arrays["root"],
+        times=arrays["times"],
+        detail=arrays["detail"],
+        faults=manifest.faults,
+        **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
+    )
+    space = StateSpace(
+        corpus.chains,
+        arrays["centres"],
+        np.array(states.starts),
+        states.kind,
+        np.array(states.tolerances),
+        states.labels,
+    )
+    grammar = Grammar(
+        corpus.chains,
+        arrays["centres"],
+        _part(Transitions, "transitions", arrays),
+        _part(Bridges, "bridges", arrays),
+        _part(Coordination, "coordination", arrays),
+    )
+    return Learned(corpus, space, arrays["states"], grammar, _part(Carriage, "carriage", arrays))
+
+
+def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
+    """Return a part of what was learned from its arrays, which are named after its fields."""
+    return kind(**{field.name: arrays[f"{name}.{field.name}"] for field in fields(kind)})
+
+
+def _clip_entry(clip: Clip) -> dict[str, Any]:
+    """Return a clip's entry in the manifest, without values at their defaults: there may be thousands of clips."""
+    values = {field.name: (getattr(clip, field.name), field.default) for field in fields(clip)}
+    return {name: value for name, (value, default) in values.items() if value != default}
+
+
+# --- corpora that people write ----------------------------------------------------------------------------------------
+
+
+def _learned_files(folder: Path, manifest: SourceManifest) -> list[Path]:
+    """Return all files that a corpus which people wrote is learned from."""
+    library = manifest.discretization.get("library")
+    return [
+        folder / store.MANIFEST,
+        *(folder / clip.file for clip in manifest.clips),
+        *(file for score in manifest.scores for file in sources(folder / score)),
+        *([library_path(library)] if isinstance(library, str) else []),
+    ]
+
+
+def _read_source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discretization]:
+    """Read a corpus that people wrote: its movement, and the discretization that its manifest names."""
+    # Imported here, for a corpus that is already built takes no scores.
+    from motionmind.notation.compose import motions
+    from motionmind.notation.read import read_score
+
+    try:
+        discretization = from_spec(manifest.discretization)
+    except FormatError as error:
+        raise FormatError(str(error), path=folder / store.MANIFEST) from error
+    scores = [read_score(folder / score) for score in manifest.scores]
+    clips = [own_skeleton(replace(read_motion(folder / clip.file), name=clip.name)) for clip in manifest.clips]
+    about = {clip.name: clip.about for clip in manifest.clips}
+    about |= {clip.name: clip.about for score in scores for clip in score.clips}
+    corpus = gather(
+        motions=[*clips, *(motion for score in scores for motion in motions(score))],
+        flips="keep",
+        about=about,
+        **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
+    )
+    return corpus, discretization

@@ -1,0 +1,81 @@
+"""Setting a movement on the floor: heights, the root's trajectory and planted feet together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry.splines import natural_spline
+from motionmind.realise.feet import plant_feet
+from motionmind.realise.root import root_trajectory, stand
+
+
+def set_on_floor(
+    skeleton: Skeleton,
+    rotations: Floats,
+    times: Floats,
+    half_steps: Floats,
+    clearance: Floats,
+    stands: Floats,
+    loose: Bools,
+    low: Mapping[int, float],
+    drift: Floats,
+    ends: tuple[Floats, Floats],
+    plant: bool,
+) -> tuple[Floats, Floats]:
+    """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        times: of the frames [N], seconds.
+        half_steps: times of the moves and midway between them [2 T + 1], seconds.
+        clearance: height of the lowest point above the floor at the half steps [2 T + 1], metres.
+        stands: how firmly each limb, and last the trunk, stands where it is low, at the half steps
+            [2 T + 1, limbs + 1], from 0 to 1.
+        loose: joints without limits [J].
+        low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
+            with the first and the last.
+        drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
+        ends: the first and the last position of the root [3], metres.
+        plant: whether the legs may move so that feet stay where they stand.
+    """
+    given = 2 * np.array(list(low))
+    floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
+    at_half_steps = clearance + floor
+    at_half_steps[given] = list(low.values())
+    heights = _eased(half_steps, at_half_steps, times)
+    clear = np.maximum(heights - np.interp(times, half_steps, floor), 0.0)
+    places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
+    middles = 0.5 * (times[1:] + times[:-1])
+    held = np.stack([np.interp(middles, half_steps, limb) for limb in stands.T], axis=1)
+    drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
+    root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends)
+    if plant:
+        fps = 1.0 / (times[1] - times[0])
+        frames = fps * half_steps[given]
+        rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, frames)
+    else:
+        root = stand(skeleton, rotations, root, heights)
+    root[0], root[-1] = ends
+    return rotations, root
+
+
+def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats) -> Floats:
+    """Return the floor's height at the half steps [2 T + 1], metres: 0, or as the `ends`' lowest points [2] show.
+
+    A recording's own zero is often off: where an end is below 0 so is its floor, and where it is higher than bodies
+    that stand so are in the corpus, its floor is higher.
+    """
+    above = np.maximum(np.minimum(ends, 0.0), ends - clearance[[0, -1]])
+    return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
+
+
+def _eased(times: Floats, values: Floats, at: Floats) -> Floats:
+    """Return values [N] that pass through keys without overshoot: a cubic ease in and out on each piece."""
+    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    s = (at - times[i]) / (times[i + 1] - times[i])
+    return np.asarray(values[i] + (values[i + 1] - values[i]) * s * s * (3.0 - 2.0 * s))

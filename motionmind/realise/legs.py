@@ -1,0 +1,90 @@
+"""Legs of two long bones: find them in a body, and bring their ends to a place by inverse kinematics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.limbs import limbs_of, stem_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
+
+SOFT = 0.02  # of a leg's length: this near to its full length a leg stretches less than it would have to
+HINGE = 0.1  # sine of a knee's bend below which its axis is mostly the one of other frames
+
+
+def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]]]:
+    """Find the legs of a body: limbs of two bones or more that hang from the root, or from the first fork below it.
+
+    Args:
+        skeleton: the body.
+
+    Returns:
+        The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
+        joint between its two longest neighbouring bones.
+    """
+    numbers, out, above = [], [], stem_of(skeleton)[-1]
+    for number, limb in enumerate(limbs_of(skeleton)):
+        bones = np.linalg.norm([*skeleton.offsets[limb[1:]], skeleton.tips[limb[-1]]], axis=-1)
+        pairs = np.minimum(bones[:-1], bones[1:])
+        if skeleton.parents[limb[0]] == above and len(limb) > 1 and pairs.max() > 0.0:
+            numbers.append(number)
+            out.append((limb, int(np.argmax(pairs)) + 1))
+    return numbers, out
+
+
+def reach(hip: Floats, leg: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Return rotations [N, 4] of thigh and shank, in the world, that bring the leg's end to its target.
+
+    The knee bends about its own axis until the end is as far from the hip as the target, by the law of cosines; the
+    leg then turns the shortest way towards it. A leg that is too short falls smoothly short of the target.
+
+    Args:
+        hip: orientations of the hip in the world [N, 4].
+        leg: positions of hip, knee and end [N, 3, 3], metres.
+        target: positions for the end [N, 3], metres.
+    """
+    thigh, shank = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 1]
+    axis = _hinge(hip, thigh, shank)
+    # Components along the axis do not change; across it, the bones and their angle form a triangle.
+    along = np.sum(thigh * axis, axis=-1), np.sum(shank * axis, axis=-1)
+    across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
+    least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
+    now, wanted = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=-1), np.linalg.norm(target - leg[:, 0], axis=-1)
+    far = now + _soft_stretch(wanted - now, np.sqrt(least + product) - now, SOFT * np.sqrt(least + product))
+    bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
+    bend = rot.from_axis_angle(axis, bends[1] - bends[0])
+    turn = rot.between(thigh + rot.mul_vec(bend, shank), target - leg[:, 0])
+    return turn, rot.mul(turn, bend)
+
+
+def _hinge(hip: Floats, thigh: Floats, shank: Floats) -> Floats:
+    """Return unit axes [N, 3] about which a knee bends, from its bones [N, 3], metres.
+
+    In frames where the leg is all but straight the axis is that of other frames, as seen from the hip [N, 4].
+    """
+    normal = np.cross(thigh, shank)
+    usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
+    if np.linalg.norm(usual) < 1e-9:
+        # Straight in all frames: the body axis most nearly at right angles to the thigh, made exactly so.
+        bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
+        across = np.eye(3)[np.argmin(np.abs(bone))]
+        usual = across - bone * (across @ bone) / (bone @ bone)
+    size = np.linalg.norm(thigh, axis=-1) * np.linalg.norm(shank, axis=-1)
+    normal += (HINGE * size)[:, None] * rot.mul_vec(hip, usual / np.linalg.norm(usual))
+    return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+
+def _soft_stretch(wanted: Floats, room: Floats, soft: Floats) -> Floats:
+    """Return how much longer a leg becomes [N], metres.
+
+    All that is wanted, up to `soft` from the end of the room; then exponentially less, so the end is never reached.
+
+    Args:
+        wanted: how much longer it should become [N], metres.
+        room: how much longer it could become [N], metres.
+        soft: distance from the end at which it begins to fall short [N], metres.
+    """
+    soft = np.maximum(np.minimum(soft, room), 1e-9)
+    over = np.maximum(wanted - (room - soft), 0.0)
+    return np.asarray(np.minimum(wanted, room - soft) + soft * -np.expm1(-over / soft))
