@@ -58,10 +58,10 @@ def measure(
     engine = Engine.load(corpus, home)
     path = None
     if report is not None:
-        told = read_report(report)
-        if tuple(told.joints) != engine.corpus.chains:
-            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints are others")
-        path = np.array(told.path, dtype=np.int32)
+        tween = read_report(report)
+        if tuple(tween.joints) != engine.corpus.chains:
+            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints differ")
+        path = np.array(tween.path, dtype=np.int32)
         if np.any(path < 0) or np.any(path >= engine.space.sizes):
             raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
     found = measure(motion, engine, path)

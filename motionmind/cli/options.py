@@ -34,7 +34,7 @@ class Section(StrEnum):
     STATES = "What counts as one state"
     CHECK = "How to check"
     DRAW = "How to draw"
-    ABOUT = "What to note about the corpus"
+    ABOUT = "About the corpus"
     ADVANCED = "Rarely needed"
     HELP = "Help"
 

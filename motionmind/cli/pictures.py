@@ -101,9 +101,11 @@ def sheet(
 ) -> None:
     """Draw the postures of clips side by side.
 
-    Each is drawn from the front and from the side, and its feet from above. Each posture has its time and its frame's
-    number, which posture --frame takes. SOURCE is a file of movement, a score, a corpus by its name or folder, or
-    CORPUS/CLIP. Scores and corpora hold several clips; --clip takes some.
+    SOURCE is a file of movement, a score, a corpus by its name or folder, or CORPUS/CLIP. Scores and corpora hold
+    several clips; --clip takes some.
+
+    Each posture is drawn from the front and from the side, and its feet from above, with its time and its frame's
+    number, which posture --frame takes.
     """
     from motionmind.formats import write_atomically
     from motionmind.render.sheet import check_frames, contact_sheet, png

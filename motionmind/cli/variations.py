@@ -172,10 +172,9 @@ def vary(
 ) -> None:
     """Vary a piece along a chaotic trajectory.
 
-    The trajectory gives the piece's postures a new order, and what is abrupt is smoothed. PIECE is a file of movement,
-    a score, a corpus of one clip, or CORPUS/CLIP. Its postures are laid out along a trajectory; a second trajectory,
-    begun nearby, visits at each of its points the nearest of them. Where it leaves the piece's order by a transition
-    that the corpus does not know, movement is inserted, as tween would find it.
+    PIECE is a file of movement, a score, a corpus of one clip, or CORPUS/CLIP. Its postures are laid out along a
+    trajectory; a second trajectory, begun nearby, gives their new order: at each point, the posture that is nearest.
+    Where the new order makes a transition that the corpus does not know, movement is inserted, as tween would find it.
 
     Ctrl-C ends the smoothing: what has been found by then is written, and the exit code is 130.
     """

@@ -300,7 +300,7 @@ def test_review_on_the_command_line_is_review_from_python(run: Run, file: Path, 
         (("--cut", "0..19", "--paste", 20), ["nothing changed"]),
         (
             ("--smooth", "karate"),
-            ["nothing is left to smooth: --discard what is to be made anew", "nothing changed"],
+            ["nothing is left to smooth: --discard what is to be found anew", "nothing changed"],
         ),
     ],
 )
@@ -318,15 +318,15 @@ def test_what_changes_nothing_is_said(run: Run, file: Path, arguments: tuple[obj
     ("arguments", "message"),
     [
         (("--approve", "999"), "no seam 999"),
-        (("--approve", "one"), "'one' is no number"),
+        (("--approve", "one"), "'one' is neither a number"),
         (("--cut", "1..2"), "--cut says what, and --paste where to"),
-        (("--cut", "1...2", "--paste", "3"), "'1...2' is no posture's number"),
+        (("--cut", "1...2", "--paste", "3"), "'1...2' is neither a posture's number"),
         (("--replace", "1"), "--replace says where, and --alternative what by"),
         (("--undo",), "there is no edit to undo"),
         (("--smooth", "nothing"), "no corpus 'nothing'"),
         (("--strict",), "--strict is for --smooth"),
         (("--alternatives", "2"), "--alternatives is for --smooth"),
-        (("-o", "out.json"), "-o is for what was edited"),
+        (("-o", "out.json"), "-o is for an edited variation"),
         (("--approve", "all", "-o", "out.bvh"), "the name must end in one of .json"),
     ],
 )
