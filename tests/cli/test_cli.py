@@ -1,4 +1,4 @@
-"""The command line as a user meets it: what it prints, writes and answers, and what it says to bad input."""
+"""The command line as a user meets it: output, files, exit codes, and answers to bad input."""
 
 from __future__ import annotations
 

@@ -36,8 +36,10 @@ EXAMPLES = [command.epilog.split("\n")[-1].strip() for command in COMMANDS.value
 
 
 def flags_in(page: str) -> list[str]:
-    """The flags that a page of help lists, each at the beginning of a line."""
-    return [flag for line in re.findall(r"^  (-[^ ].*)", page, re.M) for flag in re.findall(r"--[\w-]+", line[:38])]
+    """The flags that a page of help lists, each at the beginning of a line below the first heading."""
+    lines = re.split(r"^\S.*:$", page, maxsplit=1, flags=re.M)[-1].splitlines()
+    names = (line.strip().split("  ")[0] for line in lines if line.startswith("  -"))
+    return [flag for name in names for flag in re.findall(r"--[\w-]+", name)]
 
 
 def options_of(path: tuple[str, ...]) -> list[click.Option]:
