@@ -85,5 +85,5 @@ def _line(name: str, figure: Figure, width: int) -> str:
 
 
 def _number(value: Any) -> Any:
-    """What JSON can hold: null for what has no value."""
+    """Return a value that JSON can hold: None for a number that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value

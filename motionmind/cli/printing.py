@@ -37,7 +37,7 @@ class Notes(logging.Handler):
 
 
 def progress(message: str) -> None:
-    """Print what takes long, if standard error is a terminal."""
+    """Print a message about what takes long, on a terminal alone."""
     if sys.stderr.isatty():
         click.echo(message, err=True)
 
@@ -133,7 +133,7 @@ def _search_lines(result: Tween) -> list[tuple[str, str]]:
 
 
 def _distance_lines(result: Tween) -> list[tuple[str, str]]:
-    """Describe how far A, B, the postures passed and the motion are from states: headings, each with a line."""
+    """Describe how far from states A, B, the postures passed and the motion are: headings, each with a line."""
     stops = [("A", "", result.snap_degrees[0]), ("B", "", result.snap_degrees[1])]
     for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
         stops.insert(number, (f"via {number}", f"at move {move}, ", row))

@@ -133,9 +133,9 @@ def _check_pairs(
 ) -> None:
     """Check that options which need another come with it."""
     if (edits["cut"] is None) != (edits["paste"] is None):
-        raise click.UsageError("--cut says what, and --paste where to: give both", context)
+        raise click.UsageError("--cut and --paste go together: give both", context)
     if (edits["replace"] is None) != (edits["alternative"] is None):
-        raise click.UsageError("--replace says where, and --alternative what by: give both", context)
+        raise click.UsageError("--replace and --alternative go together: give both", context)
     unused = given_option(context, request.keys())
     if unused and not smooth:
         raise click.UsageError(f"{unused} is for --smooth, which is not given", context)
@@ -169,7 +169,7 @@ def _smooth(
         if any(seam.is_abrupt for seam in variation.seams):
             note("nothing new was found for the seams that are left to smooth")
         else:
-            note("nothing is left to smooth: --discard what is to be found anew")
+            note("nothing is left to smooth: --discard the seams to smooth again")
     return smoothed
 
 

@@ -53,7 +53,7 @@ class SearchOption:
         field: the argument's name.
         flags: the option's names on the command line.
         section: the heading that --help lists it under.
-        help: what it does.
+        help: its help text.
         type: the type of its value; bool for a switch.
         metavar: the word that stands for its value; None to show its type.
         advanced: whether --help-all alone lists it.

@@ -1,4 +1,4 @@
-"""The commands that vary a piece and draw what comes of it."""
+"""The commands that vary a piece and draw variations."""
 
 from __future__ import annotations
 
@@ -322,7 +322,7 @@ def _write(files: Sequence[Path], variation: Variation, fps: float) -> None:
 def _print_advice(variation: Variation, engine: Engine | None) -> None:
     """Note what to change if a variation does not leave the piece, is not smoothed, or stands still."""
     if not variation.seams:
-        note("it does not leave the piece's order: try a larger --nudge or --length")
+        note("the variation does not leave the piece's order: try a larger --nudge or --length")
     elif engine is None:
         note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
     counts = variation.report()["counts"]

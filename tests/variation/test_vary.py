@@ -568,7 +568,7 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     assert said in done.out.splitlines()
     done = run("vary", "clip.json", "--nudge", 0, "-o", "out.json")
     assert "steps stay" not in done.out + done.err
-    assert "note: it does not leave the piece's order" in done.err
+    assert "note: the variation does not leave the piece's order" in done.err
 
 
 def test_what_the_documents_show_runs(run: Run) -> None:
