@@ -1,184 +1,182 @@
-"""The commands on corpora: parse, call, print."""
+"""The commands that build corpora and look at them."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.commands import app, help_alone
 from motionmind.cli.files import clip_names, read, read_mapping
 from motionmind.cli.options import (
-    COUNT,
-    FILE,
     HOME,
     JSON,
-    RATE,
-    InOrder,
-    Number,
-    example,
-    mixture,
+    Section,
+    command,
+    group,
+    option,
     reading,
-    tolerances,
+    show_help_without_command,
 )
 from motionmind.cli.printing import note, print_check, print_origins, progress
+from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
+from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
-    from motionmind.corpus.corpus import Facing
-    from motionmind.corpus.gather import Flips
 
 
-@app.group("corpus", cls=InOrder, invoke_without_command=True, epilog=example("motionmind corpus check ballet"))
+@group("motionmind corpus check ballet", "corpus")
 @click.pass_context
 def corpora(context: click.Context) -> None:
     """Build corpora from movement, and look at them."""
-    help_alone(context)
+    show_help_without_command(context)
 
 
-@corpora.command(epilog=example("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1"))
+@command("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1")
 @click.argument("name")
 @click.argument("files", type=FILE, nargs=-1)
-@click.option("--rate", type=RATE, help="Postures a second  [default: every frame]")
-@click.option(
+@option("--rate", section=Section.LEARN, type=RATE, help="Take N postures per second  [default: every frame]")
+@option(
+    "--skip",
+    section=Section.LEARN,
+    type=NATURAL,
+    metavar="N",
+    default=0,
+    help="Drop N frames at each clip's start, such as a T-pose.",
+)
+@option(
+    "--mirror", section=Section.LEARN, is_flag=True, help="Learn from all clips with left and right exchanged, too."
+)
+@option(
+    "--reverse",
+    section=Section.LEARN,
+    type=Number(0, 100),
+    metavar="PRICE",
+    help="Learn from all clips backwards, too; a move then costs PRICE more nats.",
+)
+@option(
+    "--mix",
+    section=Section.LEARN,
+    multiple=True,
+    metavar="CORPUS[:WEIGHT]",
+    help="Learn from another corpus, too, and count each of its moves WEIGHT times  [default: 1]. Repeatable.",
+)
+@option(
+    "--flips",
+    section=Section.LEARN,
+    type=click.Choice(["split", "keep", "drop"]),
+    default="split",
+    help="Split a clip where a joint jumps, keep it as it is, or drop it.",
+)
+@option(
+    "--flip-angle",
+    section=Section.LEARN,
+    advanced=True,
+    type=Number(0, 180),
+    default=45.0,
+    help="Call N degrees in one frame a jump.",
+)
+@option(
     "--tolerance",
+    section=Section.STATES,
     multiple=True,
     metavar="DEGREES",
     default=("15",),
-    help="How far apart orientations of one state may lie; also JOINT=DEGREES, as often as you like.",
+    help="Let orientations of one state lie this far apart, or JOINT=DEGREES for one joint. Repeatable.",
 )
-@click.option(
+@option(
     "--discretize",
+    section=Section.STATES,
     metavar="KIND",
     default="codebook",
-    help="codebook, quaternion, euler, or a library by name or file.",
+    help="Find states by codebook, quaternion, euler, or a library by name or file.",
 )
-@click.option(
+@option(
     "--facing",
+    section=Section.STATES,
     type=click.Choice(["free", "stage"]),
     default="free",
-    help="Whether postures that differ in where they face are one (free), or two (stage).",
-)
-@click.option(
-    "--skip",
-    type=click.IntRange(min=0),
-    metavar="N",
-    default=0,
-    help="Frames to drop at each clip's start, as a T-pose.",
-)
-@click.option(
-    "--flips",
-    type=click.Choice(["split", "keep", "drop"]),
-    default="split",
-    help="Where a joint jumps: split the clip there, keep it, or drop it.",
-)
-@click.option("--flip-angle", type=Number(0, 180), default=45.0, help="Degrees in one frame that are a jump.")
-@click.option("--mirror", is_flag=True, help="Learn from all clips with left and right exchanged, too.")
-@click.option(
-    "--reverse",
-    type=Number(0, 100),
-    metavar="PRICE",
-    help="Learn from all clips backwards, too: there a move costs PRICE more nats.",
-)
-@click.option(
-    "--mix",
-    multiple=True,
-    metavar="CORPUS[:WEIGHT]",
-    help="Learn from another corpus, too, each move of which counts WEIGHT where those of FILES count 1  [default: 1]; "
-    "as often as you like.",
+    help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
-@click.option("--title", default="", show_default=False, help="A line on what it is.")
-@click.option("--author", default="", show_default=False, help="Who made the movement.")
-@click.option("--source", default="", show_default=False, help="Where it comes from.")
-@click.option("--licence", default="", show_default=False, help="Under which it may be used.")
+@option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
+@option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
+@option("--source", section=Section.ABOUT, default="", show_default=False, help="State where the movement comes from.")
+@option("--licence", section=Section.ABOUT, default="", show_default=False, help="State the licence of the movement.")
 @HOME
 def build(
     name: str,
     files: tuple[Path, ...],
-    rate: float | None,
+    home: Path | None,
     tolerance: tuple[str, ...],
     discretize: str,
-    facing: Facing,
-    skip: int,
-    flips: Flips,
     flip_angle: float,
-    mirror: bool,
-    reverse: float | None,
     mix: tuple[str, ...],
     joints: Path | None,
     unit: str | None,
     asf: Path | None,
     source_fps: float | None,
-    home: Path | None,
-    title: str,
-    author: str,
-    source: str,
-    licence: str,
+    **options: Any,
 ) -> None:
-    """Learn a corpus from movement files, from other corpora (--mix), or from both.
+    """Learn a corpus from movement.
 
-    They may be of any mix of formats, scores too, all on the same joints. A corpus of yours with the same name is
-    replaced.
+    It is learned from files, from other corpora (--mix), or from both. The files may be of any formats, scores
+    included, but must all be on the same joints. An earlier corpus of yours of the same name is replaced.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make_discretization
-    from motionmind.notation.compose import motions
-    from motionmind.notation.read import read_score
-    from motionmind.retarget.retarget import own_skeleton
     from motionmind.tween.engine import Engine
 
     place = place_for(name, home)
-    others = mixture(mix)
-    discretization = make_discretization(discretize, *tolerances(tolerance, 15.0))
-    mapping = read_mapping(joints)
-    names = clip_names(files)
-
-    def clips() -> Iterator[Motion]:
-        with click.progressbar(files, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-            for file in bar:
-                if file.suffix.lower() == ".score":
-                    yield from motions(read_score(file))
-                else:
-                    yield own_skeleton(replace(read(file, unit, asf, source_fps), name=names[file]), mapping)
-        progress("learning")
-
+    others = parse_mixture(mix)
+    discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
+    clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
     engine = Engine.fit(
-        clips(),
-        name=name,
-        rate=rate,
-        skip=skip,
-        facing=facing,
-        discretization=discretization,
-        flips=flips,
-        flip_degrees=flip_angle,
-        mirror=mirror,
-        reverse=reverse,
-        mix=others,
-        home=home,
-        title=title,
-        author=author,
-        source=source,
-        licence=licence,
+        clips, name=name, home=home, discretization=discretization, flip_degrees=flip_angle, mix=others, **options
     )
     engine.save(place)
     print_check(engine.check())
     click.echo(f"built {place}")
 
 
-@corpora.command("list", epilog=example("motionmind corpus list"))
+def _read_clips(
+    names: Mapping[Path, str],
+    mapping: Mapping[str, str] | None,
+    source: tuple[str | None, Path | None, float | None],
+) -> Iterator[Motion]:
+    """Read clips one by one, with a progress bar on a terminal.
+
+    Args:
+        names: the clip's name for each file; a score names its own.
+        mapping: the human23 joint of each joint, None to know them by name.
+        source: the unit, the .asf file and the frames per second of files that do not state them.
+    """
+    from motionmind.notation.compose import motions
+    from motionmind.notation.read import read_score
+    from motionmind.retarget.retarget import own_skeleton
+
+    with click.progressbar(names, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+        for file in bar:
+            if file.suffix.lower() == ".score":
+                yield from motions(read_score(file))
+            else:
+                yield own_skeleton(replace(read(file, *source), name=names[file]), mapping)
+    progress("learning")
+
+
+@command("motionmind corpus list", "list")
 @JSON
 @HOME
 def list_corpora(as_json: bool, home: Path | None) -> None:
-    """List the corpora that there are, bundled and your own."""
+    """List all corpora, bundled and your own."""
     from motionmind.corpus.store import known, read_manifest
 
     found = []
@@ -197,12 +195,12 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
         click.echo(f"{entry['name']:{width}}  {entry['title'] or '-'}  ({entry['folder']})")
 
 
-@corpora.command(epilog=example("motionmind corpus info ballet --json"))
+@command("motionmind corpus info ballet --json")
 @click.argument("name")
 @JSON
 @HOME
 def info(name: str, as_json: bool, home: Path | None) -> None:
-    """Say what a corpus is and how large."""
+    """Describe a corpus: where it comes from and how large it is."""
     from motionmind.tween.engine import Engine
 
     found = Engine.load(name, home).info()
@@ -218,14 +216,24 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         click.echo(f"  {clip['name']:{width}} {clip['postures']:5}  {clip['about']}".rstrip())
 
 
-@corpora.command(epilog=example("motionmind corpus check ballet --pairs 500 --seed 1"))
+@command("motionmind corpus check ballet --pairs 500 --seed 1")
 @click.argument("name")
 @JSON
-@click.option("--pairs", type=COUNT, metavar="N", default=2000, help="Random pairs of postures to try to join.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, help="Of the random pairs.")
+@option(
+    "--pairs",
+    section=Section.CHECK,
+    type=COUNT,
+    metavar="N",
+    default=2000,
+    help="Try to join N random pairs of postures.",
+)
+@option("--seed", section=Section.CHECK, type=NATURAL, metavar="N", default=0, help="Seed the random pairs.")
 @HOME
 def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) -> None:
-    """Say how well a corpus hangs together, and its recordings' faults."""
+    """Check how well a corpus hangs together.
+
+    Count states and transitions, try to join random pairs of postures, and list faults of the recordings.
+    """
     from motionmind.tween.engine import Engine
 
     found = Engine.load(name, home).check(pairs, seed)
@@ -233,3 +241,7 @@ def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) ->
         click.echo(json.dumps(found))
     else:
         print_check(found)
+
+
+for _command in (build, list_corpora, info, check):
+    corpora.add_command(_command)

@@ -1,15 +1,14 @@
-"""Files that the commands read and write."""
+"""Read, write and check the files that commands name."""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from motionmind.cli.options import avoided, passing, pins
 from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -21,59 +20,85 @@ MOVEMENT = (".json", ".bvh", ".glb", ".npz")
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
-    """Movement from a file, as the options of `reading` say."""
+    """Read movement from a file, given the values of the options that `options.reading` adds."""
     from motionmind.formats import read_motion
 
     return read_motion(path, unit=unit, asf=asf, fps=source_fps)
 
 
-def write(path: Path, thing: Motion | Posture) -> None:
-    """Movement into a file, as movement or as a picture, as its suffix says; what it has no place for is said."""
+def write(path: Path, movement: Motion | Posture) -> None:
+    """Write a motion or a posture as movement or as a picture, by the suffix of `path`, and note what it leaves out."""
     from motionmind.body.motion import Posture
     from motionmind.formats import lossy_fields, write_motion, write_posture
     from motionmind.render.pictures import write_picture
 
-    motion = thing.as_motion() if isinstance(thing, Posture) else thing
+    motion = movement.as_motion() if isinstance(movement, Posture) else movement
     if path.suffix.lower() in PICTURES:
         write_picture(path, motion)
         return
-    if isinstance(thing, Posture):
-        write_posture(path, thing)
+    if isinstance(movement, Posture):
+        write_posture(path, movement)
     else:
-        write_motion(path, thing)
-    if missing := lossy_fields(motion, path):
-        note(f"{path}: no place for {'; '.join(missing)}")
+        write_motion(path, movement)
+    note_lossy_fields(path, lossy_fields(motion, path))
+
+
+def note_lossy_fields(path: Path, fields: Sequence[str]) -> None:
+    """Note the fields of a motion that its file has no place for, if any."""
+    if fields:
+        note(f"{path}: no place for {'; '.join(fields)}")
 
 
 def read_mapping(path: Path | None) -> dict[str, str] | None:
-    """Which joint is which, from a file; None without one."""
+    """Read the human23 joint that each joint maps to; return None without a file."""
     from motionmind.retarget.retarget import read_joint_mapping
 
     return read_joint_mapping(path) if path else None
 
 
 def clip_names(files: Sequence[Path]) -> dict[Path, str]:
-    """What each file's clip is called: its stem, or as much more of its path as tells it from the others."""
+    """Name each file's clip: by its stem, or by as much more of its path as tells it from the others.
+
+    Raises:
+        MotionMindError: a file is given twice.
+    """
     if len(set(files)) < len(files):
-        twice = next(file for file, count in Counter(files).items() if count > 1)
-        raise MotionMindError(f"{twice}: given twice")
-    shorter = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
-    taken = [Counter(names.values()) for names in shorter]
-    unique = ([names[f] for names, count in zip(shorter, taken, strict=True) if count[names[f]] == 1] for f in files)
+        repeated = next(file for file, number in Counter(files).items() if number > 1)
+        raise MotionMindError(f"{repeated}: given twice")
+    schemes = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
+    uses = [Counter(names.values()) for names in schemes]
+    unique = ([names[f] for names, used in zip(schemes, uses, strict=True) if used[names[f]] == 1] for f in files)
     return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
 
 
-def check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence[Path]) -> list[Path]:
-    """The files to write, each with the suffixes that it may have; refused before anything is done, not after it."""
-    paths = [path for path, _ in wanted]
-    places, sources = [_place(path) for path in paths], [_place(path) for path in read]
-    for path, suffixes in wanted:
-        folder = _place(path).parent
+def numbered(path: Path, number: int, count: int | None) -> Path:
+    """Return the file of one of `count` tweens, as "out-1.json" of "out.json"; `path` itself if `count` is None."""
+    return path if count is None else path.with_stem(f"{path.stem}-{number}")
+
+
+def check_outputs(outputs: Sequence[tuple[Path, tuple[str, ...]]], sources: Sequence[Path]) -> list[Path]:
+    """Check, before any work is done, that files can be written.
+
+    Args:
+        outputs: files to write, each with the suffixes that it may have; none for any.
+        sources: files that are read.
+
+    Returns:
+        The paths of `outputs`.
+
+    Raises:
+        MotionMindError: a file has another suffix, stands twice among the outputs or among the sources too, or lies
+            where nothing may be written.
+    """
+    paths = [path for path, _ in outputs]
+    places, read_places = [_resolve(path) for path in paths], [_resolve(path) for path in sources]
+    for path, suffixes in outputs:
+        folder = _resolve(path).parent
         if suffixes and path.suffix.lower() not in suffixes:
             fault = f"the name must end in one of {', '.join(suffixes)}"
-        elif places.count(_place(path)) > 1:
-            fault = "it is to be written twice"
-        elif _place(path) in sources:
+        elif places.count(_resolve(path)) > 1:
+            fault = "it would be written twice"
+        elif _resolve(path) in read_places:
             fault = "it is read from"
         elif not folder.is_dir():
             fault = f"there is no folder {folder}"
@@ -85,8 +110,8 @@ def check_outputs(wanted: Sequence[tuple[Path, tuple[str, ...]]], read: Sequence
     return paths
 
 
-def _place(path: Path) -> Path:
-    """Where a path leads to; MotionMindError where that is nowhere, as with links in a circle."""
+def _resolve(path: Path) -> Path:
+    """Resolve a path; MotionMindError if it leads nowhere, as links in a circle do."""
     try:
         found = path.resolve()
         found.exists()
@@ -98,7 +123,7 @@ def _place(path: Path) -> Path:
 
 @contextmanager
 def all_or_none(files: Sequence[Path]) -> Iterator[None]:
-    """Of files that are written one after another, leave none that is new behind if one cannot be."""
+    """Remove the new ones among files that are written one after another if one cannot be written."""
     new = [file for file in files if not file.exists()]
     try:
         yield
@@ -106,22 +131,3 @@ def all_or_none(files: Sequence[Path]) -> Iterator[None]:
         for file in new:
             file.unlink(missing_ok=True)
         raise
-
-
-def asked(given: Mapping[str, Any]) -> dict[str, Any]:
-    """What the options of `searching` ask of `Engine.tween`; the postures to pass through are read from their files."""
-    from motionmind.formats import read_posture
-
-    if given["node_budget"] is not None and given["memory"] is not None:
-        raise MotionMindError("--memory says how many nodes there may be, and so does --node-budget: give one of them")
-    stops = [(read_posture(path), move) for path, move in passing(given["via"])]
-    found = {
-        **given,
-        "pin": pins(given["pin"]),
-        "avoid": avoided(given["avoid"]),
-        "hold": [joint for word in given["hold"] for joint in word.split(",")],
-        "via": [posture if move is None else (posture, move) for posture, move in stops],
-    }
-    if given["node_budget"] is None:
-        del found["node_budget"]
-    return found

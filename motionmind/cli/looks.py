@@ -1,4 +1,4 @@
-"""The commands that look into what was found and what was learned."""
+"""The commands that explain a tween and draw what was learned."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from pathlib import Path
 
 import click
 
-from motionmind.cli.commands import app
 from motionmind.cli.files import check_outputs
-from motionmind.cli.options import FILE, HOME, JSON, example
+from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option
+from motionmind.cli.types import FILE
 
 
-@app.command(epilog=example("motionmind explain report.json"))
+@command("motionmind explain report.json")
 @click.argument("report", type=FILE)
 @JSON
 def explain(report: Path, as_json: bool) -> None:
-    """Tell a tween move by move: which joints move, how likely that is, where it was seen.
+    """Explain a tween, move by move.
 
-    REPORT is what tween --report wrote.
+    For each move: which joints move, how likely that is, and where it was seen. REPORT is a file that tween --report
+    wrote.
     """
     from motionmind.tween.narrative import explain, lines, plain, read_report
 
@@ -30,19 +31,30 @@ def explain(report: Path, as_json: bool) -> None:
         click.echo(line)
 
 
-@app.command(epilog=example("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg"))
-@click.option("--corpus", required=True, metavar="NAME", help="Corpus, by name or folder.")
-@click.option("--joint", required=True, metavar="NAME", help="Whose graph; or facing, where that moves on its own.")
-@click.option(
-    "-o", "--output", type=FILE, required=True, help="Where it goes: a picture (.svg, .png), or .graphml, .gexf."
+@command("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg")
+@CORPUS
+@option(
+    "--joint",
+    section=Section.PART,
+    required=True,
+    metavar="NAME",
+    help="Draw the graph of this joint, or of facing, if that is a chain of its own.",
+)
+@option(
+    "-o",
+    "--output",
+    section=Section.OUTPUT,
+    type=FILE,
+    required=True,
+    help="Write the graph: a picture (.svg, .png), or data (.graphml, .gexf).",
 )
 @HOME
 def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
-    """Draw what a corpus teaches of a joint: its states, and which follows which how likely.
+    """Draw a joint's states and the transitions between them.
 
-    Circles are the larger the more often they are visited, arrows the darker the likelier. In .svg the pointer tells
-    more, such as which states of the joint's parent go with a state. States that no move leads to or from are left out
-    of pictures.
+    States and transitions are those of a corpus. The larger a circle, the more often its state is visited; the darker
+    an arrow, the likelier the transition. In .svg, point at a state to see more, such as the states of the joint's
+    parent that go with it. Pictures leave out states that no move leads to or from.
     """
     from motionmind.plots.joint_graph import GRAPHS, write_joint_graph
     from motionmind.tween.engine import Engine

@@ -1,4 +1,4 @@
-"""The command that measures movement beside a corpus."""
+"""The command that measures movement against a corpus."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.commands import app
 from motionmind.cli.files import read, read_mapping
-from motionmind.cli.options import FILE, HOME, JSON, example, reading
+from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, reading
 from motionmind.cli.printing import count
+from motionmind.cli.types import FILE
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.metrics.measure import Figure
 
 
-@app.command(epilog=example("motionmind measure tween.json --corpus ballet"))
+@command("motionmind measure tween.json --corpus ballet")
 @click.argument("file", type=FILE)
-@click.option("--corpus", required=True, metavar="NAME", help="Corpus that it is held against, by name or folder.")
-@click.option("--report", type=FILE, help="What tween --report wrote of FILE: its path of states, exactly.")
+@CORPUS
+@option(
+    "--report",
+    section=Section.INPUT,
+    type=FILE,
+    help="Take FILE's path of states from the report that tween --report wrote with it.",
+)
 @JSON
 @reading
 @HOME
@@ -35,11 +40,11 @@ def measure(
     home: Path | None,
     **source: Any,
 ) -> None:
-    """Measure movement, beside the range of a corpus's own.
+    """Measure movement, and compare it with a corpus.
 
-    FILE is any movement: a tween, a recording. How it moves is seen at 30 frames a second; what it says, in the
-    corpus's states. The range is from the 5th to the 95th percentile of the corpus's clips, in pieces as long, or of a
-    tenth of it; what is beyond it is marked.
+    FILE is any movement, such as a tween or a recording. Its dynamics are measured at 30 frames per second, its
+    vocabulary in the corpus's states. The range runs from the 5th to the 95th percentile of the corpus's clips, cut to
+    pieces as long as FILE, or to a tenth of the corpus; figures beyond it are marked < or >.
     """
     import msgspec
     import numpy as np
@@ -53,10 +58,10 @@ def measure(
     engine = Engine.load(corpus, home)
     path = None
     if report is not None:
-        told = read_report(report)
-        if tuple(told.joints) != engine.corpus.chains:
-            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints are others")
-        path = np.array(told.path, dtype=np.int32)
+        tween = read_report(report)
+        if tuple(tween.joints) != engine.corpus.chains:
+            raise MotionMindError(f"{report}: its tween is not of {corpus}, whose joints differ")
+        path = np.array(tween.path, dtype=np.int32)
         if np.any(path < 0) or np.any(path >= engine.space.sizes):
             raise MotionMindError(f"{report}: its tween is not of {corpus}, which has no such states")
     found = measure(motion, engine, path)

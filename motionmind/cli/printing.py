@@ -1,4 +1,4 @@
-"""What the command line prints."""
+"""Print results to standard output; notes and progress to standard error."""
 
 from __future__ import annotations
 
@@ -22,114 +22,146 @@ if TYPE_CHECKING:
 
 
 class Notes(logging.Handler):
-    """Notes on what was taken for granted, such as a file's unit: for the first file of which each is true."""
+    """Prints each assumption that was logged, such as a file's unit, for the first file that it is made for."""
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
-        self.said: set[object] = set()
+        self._printed: set[object] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print it, to standard error."""
-        what = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
-        if what not in self.said:
-            self.said.add(what)
+        """Print a record, unless one that differs in its first argument alone, the file, was printed before."""
+        key = (record.msg, record.args[1:] if isinstance(record.args, tuple) else record.args)
+        if key not in self._printed:
+            self._printed.add(key)
             note(record.getMessage())
 
 
 def progress(message: str) -> None:
-    """Say on a terminal what takes long."""
+    """Print a message about what takes long, on a terminal alone."""
     if sys.stderr.isatty():
         click.echo(message, err=True)
 
 
+def announce_compilation() -> None:
+    """Print on a terminal that the first search of all takes longer, if it is yet to come."""
+    from motionmind.jit import is_compiled
+
+    if not is_compiled("search"):
+        progress("compiling the search, which takes half a minute, once")
+
+
 def note(message: str) -> None:
-    """Say what is worth knowing, on a line of its own where a progress bar stands."""
+    """Print a note to standard error, in place of a progress bar if one stands there."""
     clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
     click.echo(f"{clear}note: {message}", err=True)
 
 
-def count(number: int, what: str) -> str:
-    """A number of things, in words: "1 move", "2 moves"."""
-    return f"{number} {what}{'s' * (number != 1)}"
+def count(number: int, noun: str) -> str:
+    """Format a number of things: "1 move", "2 moves"."""
+    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 class Interruption:
-    """While it is entered, Ctrl-C does not end the program but asks the search to end with what it has found.
+    """A context in which Ctrl-C, instead of ending the program, lets the search end with what it has found.
 
     Attributes:
-        asked: whether Ctrl-C was pressed.
+        is_requested: whether Ctrl-C was pressed.
     """
 
     def __init__(self) -> None:
-        self.asked = False
-        self._said = monotonic()
-        self._doing = ""
+        self.is_requested = False
+        self._printed_at = monotonic()
+        self._stage = ""
 
     def __enter__(self) -> Interruption:
-        self._before = signal.signal(signal.SIGINT, self._ask)
+        self._previous = signal.signal(signal.SIGINT, self._request)
         return self
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        signal.signal(signal.SIGINT, self._previous)
         if sys.stderr.isatty():
             click.echo("\r\x1b[2K", err=True, nl=False)
 
     def watch(self, so_far: Progress) -> bool:
-        """Say on a terminal, once a second, how far the search is; whether it is to end."""
-        if sys.stderr.isatty() and monotonic() > self._said + 1.0:
-            self._said = monotonic()
+        """Print the search's progress on a terminal, once a second; return whether the search is to end."""
+        if sys.stderr.isatty() and monotonic() > self._printed_at + 1.0:
+            self._printed_at = monotonic()
             best = f"best so far {so_far.cost:.3f}" if so_far.cost < math.inf else "no path yet"
-            line = f"{self._doing}{best}, proven {so_far.lower_bound:.3f} nats (Ctrl-C ends here)"
+            line = f"{self._stage}{best}, proven {so_far.lower_bound:.3f} nats (Ctrl-C ends here)"
             click.echo(f"\r\x1b[2K{line}", err=True, nl=False)
-        return self.asked
+        return self.is_requested
 
-    def told(self, done: int, of: int) -> None:
-        """Say on a terminal which of several searches begins, after so many are done."""
-        self._doing = f"transition {done + 1} of {of}: "
+    def on_progress(self, done: int, of: int) -> None:
+        """Print on a terminal that the search after the first `done` of several begins."""
+        self._stage = f"transition {done + 1} of {of}: "
         if sys.stderr.isatty():
-            click.echo(f"\r\x1b[2K{self._doing}", err=True, nl=False)
+            click.echo(f"\r\x1b[2K{self._stage}", err=True, nl=False)
 
-    def _ask(self, *_: object) -> None:
-        self.asked = True
+    def _request(self, *_: object) -> None:
+        self.is_requested = True
 
 
 def print_tween(result: Tween, files: Sequence[Path]) -> None:
-    """A tween in a few lines: moves, cost, what is proven, what it is made of, and the files written."""
+    """Print a tween in a few lines: moves, cost, proof, make-up, distances from the corpus, and the files written."""
+    lines = [*_search_lines(result), *_distance_lines(result)]
+    if result.detail:
+        lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+    for name, line in lines:
+        click.echo(f"{name:10}{line}")
+    print_written(files)
+
+
+def print_written(files: Sequence[Path]) -> None:
+    """Print the names of the files that were written, if any."""
+    if files:
+        click.echo(f"written   {', '.join(map(click.format_filename, files))}")
+
+
+def _search_lines(result: Tween) -> list[tuple[str, str]]:
+    """Describe a path and its certificate: headings, each with a line."""
     seconds = float(result.motion.times[-1])
     bridged = [f"{b.joint} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
     waited = Counter(wait.joint for wait in result.waits)
-    lines = [
+    return [
         ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
         ("cost", f"{result.cost:.3f} nats"),
         ("proven", f"{result.status}: no path costs less than {result.lower_bound:.3f}, gap {result.gap:.2%}"),
-        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus{_attesters(result)}"),
+        ("attested", f"{result.attested:.1%} of the joints' moves were seen in the corpus{_shares(result)}"),
         ("bridged", ", ".join(bridged) or "none"),
         ("waited", ", ".join(f"{joint} {count(times, 'move')}" for joint, times in waited.items()) or "none"),
     ]
+
+
+def _distance_lines(result: Tween) -> list[tuple[str, str]]:
+    """Describe how far from states A, B, the postures passed and the motion are: headings, each with a line."""
     stops = [("A", "", result.snap_degrees[0]), ("B", "", result.snap_degrees[1])]
     for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
         stops.insert(number, (f"via {number}", f"at move {move}, ", row))
+    lines = []
     for stop, where, row in stops:
         worst = int(row.argmax())
-        mean, most = f"{row.mean():.1f} degrees a joint", f"{row[worst]:.1f} ({result.joints[worst]})"
-        lines.append((stop, f"{where}{mean} off the corpus's states, at most {most}"))
+        mean, most = f"{row.mean():.1f} degrees per joint", f"{row[worst]:.1f} ({result.joints[worst]})"
+        lines.append((stop, f"{where}{mean} from the corpus's states, at most {most}"))
     if result.moves > 1:
-        kind = "keeps to the path" if result.asked["follow"] else "the mean of the corpus's ways"
+        kind = "follows the path" if result.asked["follow"] else "mean of the corpus's walks"
         off = result.path_degrees[1:-1]
-        lines.append(
-            ("motion", f"{kind}: {off.mean():.1f} degrees a joint off its states on the way, at most {off.max():.1f}")
-        )
-    if result.detail:
-        lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
-    if files:
-        lines.append(("written", ", ".join(map(click.format_filename, files))))
-    for name, line in lines:
-        click.echo(f"{name:10}{line}")
+        degrees = f"{off.mean():.1f} degrees per joint from the path's states, at most {off.max():.1f}"
+        lines.append(("motion", f"{kind}: {degrees}"))
+    return lines
+
+
+def _shares(result: Tween) -> str:
+    """Format the share of attested moves that each part of a corpus with several parts attests; "" for one part."""
+    seen = [source for row in result.sources for source in row if source is not None]
+    times = Counter(_format_origin(source.corpus, source.mirrored, source.reversed) for source in seen)
+    if len(times) < 2:
+        return ""
+    return ": " + ", ".join(f"{name} {number / len(seen):.0%}" for name, number in times.most_common())
 
 
 def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
-    """Tweens that differ, a line each: what each costs, the price of what it shares with those before included."""
-    click.echo("    moves  seconds      cost  proven      gap    attested  bridged  shared with those before")
+    """Print alternative tweens, a line each; costs include the price of moves shared with earlier ones."""
+    click.echo("    moves  seconds      cost  proven      gap    attested  bridged  shared with earlier ones")
     for number, result in enumerate(results, start=1):
         changes = int((result.path[1:] != result.path[:-1]).sum())
         click.echo(
@@ -137,17 +169,16 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
             f"{result.gap:6.2%} {result.attested:8.1%}  {len(result.bridges):7}  {result.shared} of "
             f"{count(changes * (number - 1), 'move')}"
         )
-    if files:
-        click.echo(f"written   {', '.join(map(click.format_filename, files))}")
+    print_written(files)
 
 
-def print_review(found: dict[str, Any]) -> None:
-    """A variation (`Variation.report`): what it was made by, then a line for each stretch of the piece and its seam."""
-    course, counts = found["course"], found["counts"]
+def print_review(report: dict[str, Any]) -> None:
+    """Print the report of a variation: how it was made, then a line for each stretch of the piece and its seam."""
+    course, counts = report["course"], report["counts"]
     values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
     nudge = ", ".join(f"{x:g}" for x in course["nudge"])
     click.echo(
-        f"{found['piece']['name'] or 'piece'}, {count(found['piece']['postures'], 'posture')}, by {course['flow']} "
+        f"{report['piece']['name'] or 'piece'}, {count(report['piece']['postures'], 'posture')}, by {course['flow']} "
         f"({values}), nudge {nudge}, skip {course['skip']}"
     )
     click.echo(
@@ -158,29 +189,29 @@ def print_review(found: dict[str, Any]) -> None:
         f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
     if counts["stays"]:
-        click.echo(stillness(counts))
+        click.echo(format_stillness(counts))
     click.echo("seam  postures   of the piece  decision   transition")
-    begins = [0, *(seam["at"] + 1 for seam in found["seams"])]
-    ends = [*(seam["at"] for seam in found["seams"]), counts["postures"] - 1]
-    for seam, first, last in zip([None, *found["seams"]], begins, ends, strict=True):
-        here, there = _stretch(first, last), _stretch(found["order"][first], found["order"][last])
+    begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
+    ends = [*(seam["at"] for seam in report["seams"]), counts["postures"] - 1]
+    for seam, first, last in zip([None, *report["seams"]], begins, ends, strict=True):
+        here, there = _format_stretch(first, last), _format_stretch(report["order"][first], report["order"][last])
         row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}"
         decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
-        click.echo(f"{row}  {decision:9}  {_transition(seam)}" if seam else row.rstrip())
+        click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
 
 
-def stillness(counts: dict[str, Any]) -> str:
-    """How many of a variation's steps stay in their posture, and for how long: "32 of 79 steps stay, 6.4 s"."""
+def format_stillness(counts: dict[str, Any]) -> str:
+    """Format how many of a variation's steps stay in their posture, and how long: "32 of 79 steps stay, 6.4 s"."""
     stays, steps = counts["stays"], count(counts["postures"] - 1, "step")
     return f"{stays} of {steps} stay{'s' * (stays == 1)}, {counts['seconds_still']:.1f} s"
 
 
-def _stretch(first: int, last: int) -> str:
+def _format_stretch(first: int, last: int) -> str:
     return str(first) if first == last else f"{first}..{last}"
 
 
-def _transition(seam: dict[str, Any]) -> str:
-    """What is known of a seam, in words."""
+def _format_transition(seam: dict[str, Any]) -> str:
+    """Describe a seam: attested, abrupt, or smoothed by an insertion, and why."""
     if seam["corpus"] is None:
         return "not judged"
     if not seam["breaks"]:
@@ -190,35 +221,28 @@ def _transition(seam: dict[str, Any]) -> str:
     faults = ["not attested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
     why = f"{worst['joint']} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
     if not seam["candidates"]:
-        left = "no way found" if seam["failure"] else "not smoothed"
-        return f"abrupt, {left}: {', '.join([why, *others])}"
+        state = "no path found" if seam["failure"] else "not smoothed"
+        return f"abrupt, {state}: {', '.join([why, *others])}"
     why += f", and {len(others)} more" * bool(others)
-    one = seam["candidates"][seam["chosen"] - 1]
-    made = f"{count(one['moves'], 'move')} in {one['seconds']:.2f} s, {one['status']}, {one['attested']:.0%} attested"
-    bridges = f", {count(len(one['bridges']), 'bridge')}" * bool(one["bridges"])
-    which = f"{made}{bridges}, {seam['chosen']} of {len(seam['candidates'])}"
-    return f"abrupt, was {which}: {why}" if seam["decision"] == "discarded" else f"{which}: {why}"
+    best = seam["candidates"][seam["chosen"] - 1]
+    tween = (
+        f"{count(best['moves'], 'move')} in {best['seconds']:.2f} s, {best['status']}, {best['attested']:.0%} attested"
+    )
+    bridges = f", {count(len(best['bridges']), 'bridge')}" * bool(best["bridges"])
+    insertion = f"{tween}{bridges}, {seam['chosen']} of {len(seam['candidates'])}"
+    return f"abrupt, was {insertion}: {why}" if seam["decision"] == "discarded" else f"{insertion}: {why}"
 
 
-def _attesters(result: Tween) -> str:
-    """What part of the corpus attests how much, where it has several."""
-    seen = [source for row in result.sources for source in row if source is not None]
-    times = Counter(origin(source.corpus, source.mirrored, source.reversed) for source in seen)
-    if len(times) < 2:
-        return ""
-    return ": " + ", ".join(f"{name} {number / len(seen):.0%}" for name, number in times.most_common())
-
-
-def origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:
-    """Where movement comes from: "ballet", "ballet (mirrored, reversed)"."""
+def _format_origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:
+    """Format where movement comes from: "ballet", "ballet (mirrored, reversed)"."""
     changes = ", ".join(["mirrored"] * is_mirrored + ["reversed"] * is_reversed)
     return f"{corpus} ({changes})" if changes else corpus
 
 
-def print_origins(found: dict[str, Any]) -> None:
-    """What a corpus was made of, where that is not only its own recordings as they are."""
-    rows = [(origin(row["corpus"], row["mirrored"], row["reversed"]), row) for row in found["origins"]]
-    if len(rows) < 2 and not any(name != found["name"] for name, _ in rows):
+def print_origins(summary: dict[str, Any]) -> None:
+    """Print where a corpus's movement comes from, unless that is only its own recordings as they are."""
+    rows = [(_format_origin(row["corpus"], row["mirrored"], row["reversed"]), row) for row in summary["origins"]]
+    if len(rows) < 2 and not any(name != summary["name"] for name, _ in rows):
         return
     width = max(len(name) for name, _ in rows)
     click.echo(f"{'learned from':{width}}  clips  postures  moves  each counts  of all moves")
@@ -229,33 +253,40 @@ def print_origins(found: dict[str, Any]) -> None:
         )
 
 
-def print_check(found: dict[str, Any]) -> None:
-    """What `survey.check` found: states, edges and out-degree of each joint, what can be joined, faults."""
-    rate = f"{found['rate']:g} a second" if found["rate"] else "keyframes"
+def print_check(check: dict[str, Any]) -> None:
+    """Print what `Engine.check` found: states, edges and out-degree of each joint, share of pairs joined, faults."""
+    rate = f"{check['rate']:g} a second" if check["rate"] else "keyframes"
     click.echo(
-        f"{found['name']}: {count(len(found['clips']), 'clip')}, {found['postures']} postures ({rate}), "
-        f"{found['skeleton']}"
+        f"{check['name']}: {count(len(check['clips']), 'clip')}, {check['postures']} postures ({rate}), "
+        f"{check['skeleton']}"
     )
-    print_origins(found)
-    width = max(len(joint) for joint in found["states"])
+    print_origins(check)
+    width = max(len(joint) for joint in check["states"])
     click.echo(f"{'joint':{width}}  states  edges  out-degree")
-    for joint, states in found["states"].items():
-        click.echo(f"{joint:{width}}  {states:6}  {found['edges'][joint]:5}  {found['out_degree'][joint]:10.2f}")
-    click.echo(f"{found['joinable']:.1%} of {found['pairs']} random pairs of postures can be joined without a bridge")
-    faults: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for fault in found["faults"]:
-        faults.setdefault((fault["clip"], fault["joint"]), []).append(fault)
+    for joint, states in check["states"].items():
+        click.echo(f"{joint:{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}")
+    click.echo(f"{check['joinable']:.1%} of {check['pairs']} random pairs of postures can be joined without a bridge")
+    _print_faults(check["faults"])
+
+
+def _print_faults(faults: Sequence[dict[str, Any]]) -> None:
+    """Print where joints jump in the recordings, by clip and joint."""
+    by_joint: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for fault in faults:
+        by_joint.setdefault((fault["clip"], fault["joint"]), []).append(fault)
     if faults:
-        total = count(len(found["faults"]), "fault")
-        click.echo(f"{total} of the recordings, where a joint turns too far in one frame (all with --json):")
-    for (clip, joint), jumps in faults.items():
+        click.echo(
+            f"{count(len(faults), 'fault')} of the recordings, where a joint turns too far in one frame "
+            "(all with --json):"
+        )
+    for (clip, joint), jumps in by_joint.items():
         frames = ", ".join(str(jump["frame"]) for jump in jumps[:3])
         more = f" and {len(jumps) - 3} more" if len(jumps) > 3 else ""
         most = max(jump["degrees"] for jump in jumps)
         click.echo(f"  {clip}: {joint} by up to {most:.0f} degrees, at frame {frames}{more}")
 
 
-def say(
+def show_warning(
     message: Warning | str,
     category: type[Warning],
     filename: str,
@@ -263,6 +294,6 @@ def say(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Warnings of our own are notes to the user; others are for developers and stay away from the command line."""
+    """Print our own warnings as notes, and drop others, which are for developers: a `warnings.showwarning`."""
     if issubclass(category, MotionMindWarning):
         note(str(message))

@@ -1,4 +1,4 @@
-"""The command that turns scores into movement."""
+"""The commands that turn scores into movement, and into libraries of joint states."""
 
 from __future__ import annotations
 
@@ -6,33 +6,38 @@ from pathlib import Path
 
 import click
 
-from motionmind.cli.commands import app
 from motionmind.cli.files import MOVEMENT, check_outputs, write
-from motionmind.cli.options import FILE, OUTPUTS, RATE, example, tolerances
+from motionmind.cli.options import OUTPUTS, Section, command, option
 from motionmind.cli.printing import count
+from motionmind.cli.types import FILE, RATE
+from motionmind.cli.words import parse_tolerances
 from motionmind.render import PICTURES
 
-_TOLERANCE = 12.0  # degrees for joints of which --tolerance does not speak
+_TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
 
 
-@app.command(epilog=example("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh"))
+@command("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help=f"Where it goes: {OUTPUTS}.")
-@click.option("--clip", metavar="NAME", help="Which of its clips  [default: its only one]")
-@click.option("--posture", metavar="NAME", help="A posture that it names, instead of a clip.")
-@click.option("--fps", type=RATE, help="Frames a second  [default: a frame a posture]")
+@option("-o", "--output", section=Section.OUTPUT, type=FILE, required=True, help=f"Write {OUTPUTS}.")
+@option(
+    "--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: a frame a posture]"
+)
+@option("--clip", section=Section.PART, metavar="NAME", help="Take this clip of the score  [default: its only one]")
+@option(
+    "--posture", section=Section.PART, metavar="NAME", help="Take a posture that the score names, instead of a clip."
+)
 def compose(score: Path, output: Path, clip: str | None, posture: str | None, fps: float | None) -> None:
     """Turn a score, movement written as text, into a motion.
 
-    docs/notation.md explains how scores are written.
+    docs/notation.md explains the language of scores.
     """
     from motionmind.notation import compose as notation
     from motionmind.notation.read import read_score
 
     if clip and posture:
-        raise click.UsageError("--clip or --posture, not both")
+        raise click.UsageError("give --clip or --posture, not both")
     if fps and posture:
-        raise click.UsageError("--fps is for clips; a posture has no frames a second")
+        raise click.UsageError("--fps is for clips, not for a posture")
     check_outputs([(output, MOVEMENT + PICTURES)], [score])
     if posture:
         found = notation.posture(read_score(score), posture)
@@ -46,24 +51,33 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
     click.echo(f"{output}: {motion.name}, {count(len(motion), 'frame')} in {seconds:.1f} s, {motion.skeleton.name}")
 
 
-@app.command(epilog=example("motionmind library corpora/karate/*.score -o mine.toml --tolerance 12 --tolerance hip=8"))
+@command("motionmind library corpora/karate/*.score -o mine.toml --tolerance 12 --tolerance hip=8")
 @click.argument("scores", type=FILE, nargs=-1, required=True)
-@click.option("-o", "--output", type=FILE, required=True, help="Where the library goes: .toml.")
-@click.option(
+@option("-o", "--output", section=Section.OUTPUT, type=FILE, required=True, help="Write the library: .toml.")
+@option(
     "--tolerance",
+    section=Section.STATES,
     multiple=True,
     metavar="DEGREES",
-    help="How far apart orientations of one state may lie; also JOINT=DEGREES, as often as you like.  [default: 12]",
+    help="Let orientations of one state lie this far apart, or JOINT=DEGREES for one joint  [default: 12]. Repeatable.",
 )
-@click.option("--stage", is_flag=True, help="The pelvis' states tell where the body faces, as on a stage.")
+@option(
+    "--stage",
+    section=Section.STATES,
+    is_flag=True,
+    help="Let the pelvis's states tell where the body faces, as on a stage.",
+)
 def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], stage: bool) -> None:
-    """Name joint states after what scores call them: a library to edit, for corpus build --discretize."""
+    """Write a library of joint states from scores.
+
+    States are named as the scores name them. Edit the library, and use it with corpus build --discretize.
+    """
     from motionmind.discretize.library import write_library
     from motionmind.discretize.naming import name_states
     from motionmind.notation.read import read_score
 
     check_outputs([(output, (".toml",))], scores)
-    degrees, per_joint = tolerances(tolerance, _TOLERANCE)
+    degrees, per_joint = parse_tolerances(tolerance, _TOLERANCE)
     found = name_states([read_score(score) for score in scores], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(f"{output}: {sum(map(len, found.tables.values()))} states of {count(len(found.tables), 'joint')}")

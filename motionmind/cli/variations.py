@@ -1,101 +1,161 @@
-"""The commands that vary a piece and review what comes of it: parse, call, print."""
+"""The commands that vary a piece and draw variations."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
-from motionmind.cli.commands import INTERRUPTED, app
-from motionmind.cli.files import MOVEMENT, all_or_none, asked, check_outputs, write
-from motionmind.cli.options import (
-    ANY,
-    COUNT,
-    FILE,
-    HOME,
-    JSON,
-    OUTPUTS,
-    RATE,
-    Number,
-    Numbers,
-    Point,
-    Span,
-    example,
-    passing,
-    reading,
-    searching,
-    settings,
+from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, write
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, reading
+from motionmind.cli.printing import (
+    Interruption,
+    announce_compilation,
+    format_stillness,
+    note,
+    print_review,
+    print_written,
 )
-from motionmind.cli.printing import Interruption, note, print_review, progress, stillness
-from motionmind.cli.sources import frames_of, holds_clips, in_corpus, movements
-from motionmind.errors import MotionMindError
+from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
+from motionmind.cli.sources import is_collection, read_movement, select_frames, split_clip
+from motionmind.cli.tweens import INTERRUPTED
+from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point
+from motionmind.cli.words import parse_parameters
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
-    from motionmind.body.motion import Motion
     from motionmind.corpus.corpus import Facing
     from motionmind.tween.engine import Engine
+    from motionmind.variation.piece import Piece
     from motionmind.variation.variation import Variation
 
-_STILL = 0.25  # of the steps: where more of them stay, the variation stands still to the eye
+_STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
 _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
-@app.command(epilog=example("motionmind vary macarena --attractor rossler -o variation.json"))
-@click.argument("source", metavar="PIECE", type=ANY)
-@click.option("-o", "--output", type=FILE, required=True, help=f"Where it goes: {OUTPUTS}; review takes .json.")
-@click.option("--report", type=FILE, help="Where the report goes, as JSON; - prints it, alone.")
-@click.option("--json", "as_json", is_flag=True, help="Print the report, as --report - does.")
-@click.option("--clip", metavar="NAME", help="Which clip of a score or a corpus  [default: its only one]")
-@click.option("--from", "begin", type=int, metavar="N", default=0, help="First frame; negative from the end.")
-@click.option("--to", "end", type=int, metavar="N", default=-1, help="Last frame; negative from the end.")
-@click.option(
-    "--attractor",
-    metavar="NAME",
-    default="lorenz",
-    help="The flow: lorenz, rossler, chua, duffing, halvorsen or thomas.",
+@command("motionmind vary macarena --attractor rossler -o variation.json")
+@click.argument("source", metavar="PIECE", type=FILE_OR_FOLDER)
+@option(
+    "-o",
+    "--output",
+    section=Section.OUTPUT,
+    type=FILE,
+    required=True,
+    help=f"Write {OUTPUTS}; review takes .json.",
 )
-@click.option("--parameter", multiple=True, metavar="NAME=VALUE", help="Of the flow, as rho=28; as often as you like.")
-@click.option(
-    "--nudge",
-    type=Point(),
-    metavar="X[,Y,Z]",
-    default="0.1",
-    help="How far from the piece's trajectory the variation's begins. 0 gives the piece back.",
-)
-@click.option(
-    "--start", type=Point(), metavar="X,Y,Z", help="Where the piece's begins  [default: the flow's own start]"
-)
-@click.option(
-    "--skip",
-    type=click.IntRange(min=0),
-    metavar="M",
-    default=10,
-    help="Points of the trajectories to leave out between two postures.",
-)
-@click.option("--step", type=Number(min=0, min_open=True), help="Of the integration  [default: the flow's own]")
-@click.option(
-    "--transient", type=click.IntRange(min=0), metavar="N", help="Steps to drop at first  [default: the flow's own]"
-)
-@click.option(
-    "--length", type=COUNT, metavar="N", help="Postures of the variation  [default: as many as the piece has]"
-)
-@click.option("--rate", type=RATE, help="Postures a second of a recording  [default: the corpus's, else every frame]")
-@click.option(
+@option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
+@option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
+@option(
     "--corpus",
     "--smooth",
     "corpus",
+    section=Section.CORPORA,
     metavar="NAME",
-    help="Corpus that says what is abrupt, and smooths it  [default: the piece's own, where it comes from one]",
+    help="Judge what is abrupt, and smooth it, by this corpus  [default: the corpus that the piece comes from, if any]",
 )
-@click.option("--alternatives", type=COUNT, metavar="K", default=3, help="Movements to find for each insertion.")
+@HOME
+@option(
+    "--clip",
+    section=Section.PART,
+    metavar="NAME",
+    help="Take this clip of a score or a corpus  [default: its only one]",
+)
+@option(
+    "--from",
+    "begin",
+    section=Section.PART,
+    type=int,
+    metavar="N",
+    default=0,
+    help="Begin at frame N, counted from the end if negative.",
+)
+@option(
+    "--to",
+    "end",
+    section=Section.PART,
+    type=int,
+    metavar="N",
+    default=-1,
+    help="End at frame N, counted from the end if negative.",
+)
+@option(
+    "--rate",
+    section=Section.PART,
+    type=RATE,
+    help="Take N postures per second of a recording  [default: the corpus's rate, else every frame]",
+)
+@option(
+    "--attractor",
+    section=Section.TRAJECTORY,
+    metavar="NAME",
+    default="lorenz",
+    help="Follow this flow: lorenz, rossler, chua, duffing, halvorsen or thomas.",
+)
+@option(
+    "--parameter",
+    section=Section.TRAJECTORY,
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set a parameter of the flow, such as rho=28. Repeatable.",
+)
+@option(
+    "--nudge",
+    section=Section.TRAJECTORY,
+    type=Point(),
+    metavar="X[,Y,Z]",
+    default="0.1",
+    help="Begin the variation's trajectory this far from the piece's; 0 gives the piece back.",
+)
+@option(
+    "--skip",
+    section=Section.TRAJECTORY,
+    type=NATURAL,
+    metavar="M",
+    default=10,
+    help="Leave out M points of the trajectories between two postures.",
+)
+@option(
+    "--length",
+    section=Section.TRAJECTORY,
+    type=COUNT,
+    metavar="N",
+    help="Make N postures  [default: as many as the piece has]",
+)
+@option(
+    "--start",
+    section=Section.TRAJECTORY,
+    type=Point(),
+    metavar="X,Y,Z",
+    help="Begin the piece's trajectory here  [default: the flow's own start]",
+)
+@option(
+    "--step",
+    section=Section.TRAJECTORY,
+    advanced=True,
+    type=POSITIVE,
+    help="Integrate by this step  [default: the flow's own]",
+)
+@option(
+    "--transient",
+    section=Section.TRAJECTORY,
+    advanced=True,
+    type=NATURAL,
+    metavar="N",
+    help="Drop the first N steps  [default: the flow's own number]",
+)
+@option(
+    "--alternatives",
+    section=Section.SEARCH,
+    type=COUNT,
+    metavar="K",
+    default=3,
+    help="Find K movements for each insertion.",
+)
 @searching
 @reading
-@HOME
 @click.pass_context
 def vary(
     context: click.Context,
@@ -104,204 +164,71 @@ def vary(
     output: Path,
     report: Path | None,
     as_json: bool,
-    clip: str | None,
-    begin: int,
-    end: int,
     attractor: str,
     parameter: tuple[str, ...],
-    nudge: tuple[float, ...],
-    start: tuple[float, ...] | None,
-    skip: int,
-    step: float | None,
-    transient: int | None,
-    length: int | None,
-    rate: float | None,
     corpus: str | None,
-    alternatives: int,
     home: Path | None,
-    joints: Path | None,
-    unit: str | None,
-    asf: Path | None,
-    source_fps: float | None,
     **options: Any,
 ) -> None:
-    """Vary a piece: its postures in the order of a chaotic trajectory, and what is abrupt smoothed.
+    """Vary a piece along a chaotic trajectory.
 
-    PIECE is a file of movement, a score, a corpus of one clip, or CORPUS/CLIP. Its postures are dealt out along a
-    trajectory; another one, begun nearby, is read by which of them is nearest. Where that leaves the piece's order for
-    a transition that the corpus does not know, movement is inserted, as by tween from the one posture to the other.
+    PIECE is a file of movement, a score, a corpus of one clip, or CORPUS/CLIP. Its postures are laid out along a
+    trajectory; a second trajectory, begun nearby, gives their new order: at each point, the posture that is nearest.
+    Where the new order makes a transition that the corpus does not know, movement is inserted, as tween would find it.
 
-    Ctrl-C ends the smoothing: what it has found by then is written, and the exit code is 130.
+    Ctrl-C ends the smoothing: what has been found by then is written, and the exit code is 130.
     """
     from motionmind.chaos.flows import flow_of
-    from motionmind.formats import write_atomically
-    from motionmind.variation.piece import Piece
-    from motionmind.variation.variation import vary as varied
+    from motionmind.variation.variation import vary as make_variation
 
     if report == Path("-"):
         report, as_json = None, True
-    vias = [path for path, _ in passing(options["via"])]
-    wanted = [(output, MOVEMENT + PICTURES), *([(report, ())] if report else [])]
-    check_outputs(wanted, [source, *vias])
-    flow = flow_of(attractor, **settings(parameter))
-    wishes = asked(options)
-    motion, own = _piece(source, clip, home, joints=joints, unit=unit, asf=asf, source_fps=source_fps)
-    judge = corpus or own
-    wish = _given(context, ["alternatives", *options.keys() - {"fps"}])
-    if wish and not judge:
-        raise click.UsageError(f"{wish} is for --corpus, which is not given", context)
-    engine = _engine(judge, home) if judge else None
-    if rate is None and engine and not holds_clips(source, home):
-        rate = engine.corpus.rate
-    frames = frames_of(source, len(motion), begin, end)
-    facing = _facing(own, home) if own else engine.corpus.facing if engine else "free"
-    piece = Piece.of(motion.slice(frames.start, frames.stop), rate, facing)
+    files = [output, *([report] if report else [])]
+    suffixes: tuple[tuple[str, ...], ...] = (MOVEMENT + PICTURES, ())
+    check_outputs(list(zip(files, suffixes, strict=False)), [source, *via_files(options)])
+    flow = flow_of(attractor, **parse_parameters(parameter))
+    request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS})
+    trajectory = {key: options.pop(key) for key in ("start", "skip", "step", "transient", "length", "alternatives")}
+    nudge = options.pop("nudge")
+    piece, engine = _read_piece(context, source, corpus, home, **options)
     with Interruption() as interruption:
-        result = varied(
+        variation = make_variation(
             piece,
             engine,
             flow=flow,
             nudge=nudge if len(nudge) > 1 else nudge[0],
-            start=start,
-            skip=skip,
-            step=step,
-            transient=transient,
-            length=length,
-            alternatives=alternatives,
-            on_progress=interruption.told,
+            on_progress=interruption.on_progress,
             watch=interruption.watch,
-            **wishes,
+            **trajectory,
+            **request,
         )
-    files = [path for path, _ in wanted]
-    with all_or_none(files):
-        _write(output, result, options["fps"])
-        if report:
-            write_atomically(report, f"{json.dumps(result.report())}\n".encode())
-    _tell(result, as_json)
-    if not result.seams:
-        note("it does not leave the piece's order: a larger --nudge or --length lets it")
-    elif engine is None:
-        note("no corpus says which transitions are abrupt, and none is smoothed: --corpus names one")
-    counts = result.report()["counts"]
-    if counts["stays"] > _STILL * (counts["postures"] - 1):
-        note(f"{stillness(counts)}: another --start, a larger --skip or --step moves it")
+    _write(files, variation, request["fps"])
+    print_variation(variation, as_json)
+    _print_advice(variation, engine)
     if not as_json:
-        click.echo(f"written   {', '.join(map(click.format_filename, files))}")
-    if interruption.asked:
+        print_written(files)
+    if interruption.is_requested:
         context.exit(INTERRUPTED)
 
 
-@app.command(epilog=example("motionmind review variation.json --approve 6,7 --discard 8 --list"))
-@click.argument("file", type=FILE)
-@click.option("-o", "--output", type=FILE, help="Where the variation goes: .json  [default: FILE itself]")
-@click.option("--undo", count=True, help="Take back the last edit, as often as it is given.")
-@click.option(
-    "--cut", type=Span(), metavar="A..B", help="Postures to take out, as --list numbers them, and to --paste."
+@command("motionmind attractor --of variation.json -o attractor.png")
+@option(
+    "--of", "variation", section=Section.INPUT, type=FILE, required=True, help="Draw this variation, which vary wrote."
 )
-@click.option("--paste", type=click.IntRange(min=0), metavar="N", help="The posture before which they go.")
-@click.option(
-    "--smooth", metavar="CORPUS", help="Judge and smooth, by this corpus, the seams that are not yet or are discarded."
-)
-@click.option("--replace", type=COUNT, metavar="SEAM", help="Seam at which --alternative is to stand.")
-@click.option("--alternative", type=COUNT, metavar="K", help="Which of the movements found for it.")
-@click.option("--approve", type=Numbers(), metavar="SEAMS", help="Seams that are good, as 1,3; or all.")
-@click.option("--discard", type=Numbers(), metavar="SEAMS", help="Seams whose insertion is left out, as 2; or all.")
-@click.option("--list", "listing", is_flag=True, help="Show the seams, after the edits.")
-@JSON
-@click.option("--alternatives", type=COUNT, metavar="K", default=3, help="Movements that --smooth finds for a seam.")
-@searching
-@HOME
-@click.pass_context
-def review(
-    context: click.Context,
-    /,
-    file: Path,
-    output: Path | None,
-    undo: int,
-    cut: tuple[int, int] | None,
-    paste: int | None,
-    smooth: str | None,
-    replace: int | None,
-    alternative: int | None,
-    approve: tuple[int, ...] | str | None,
-    discard: tuple[int, ...] | str | None,
-    listing: bool,
-    as_json: bool,
-    alternatives: int,
-    home: Path | None,
-    **options: Any,
-) -> None:
-    """Look through a variation that vary wrote, and edit it.
-
-    Edits are made in the order in which they stand below. None of them loses anything: FILE keeps the piece, the
-    variation, all that was found and all that was decided, and --undo takes back one edit after the other. Its movement
-    is that with all insertions but those discarded, which render, sheet and convert take.
-
-    Seams keep their numbers; postures are numbered from 0. The options from --alternatives on are for --smooth.
-    """
-    if (cut is None) != (paste is None):
-        raise click.UsageError("--cut says what, and --paste where to: give both", context)
-    if (replace is None) != (alternative is None):
-        raise click.UsageError("--replace says where, and --alternative what by: give both", context)
-    wish = _given(context, ["alternatives", *options])
-    if wish and not smooth:
-        raise click.UsageError(f"{wish} is for --smooth, which is not given", context)
-    from motionmind.variation.variation_json import read_variation, write_variation
-
-    edits = undo or cut or smooth or replace or approve or discard
-    if output and not edits:
-        raise click.UsageError("-o is for what was edited, and nothing is", context)
-    check_outputs([(output, (".json",))] if output else [], [])
-    found = before = read_variation(file)
-    for _ in range(undo):
-        found = found.undo()
-    if cut and paste is not None:
-        found = found.cut(*cut, paste)
-    interruption = Interruption()
-    if smooth:
-        wishes, engine = asked(options), _engine(smooth, home)
-        with interruption:
-            smoothed = found.smooth(
-                engine, alternatives=alternatives, on_progress=interruption.told, watch=interruption.watch, **wishes
-            )
-        if smoothed is found and not interruption.asked:
-            is_left = any(seam.is_abrupt for seam in found.seams)
-            note(
-                "nothing new was found for what is left to smooth"
-                if is_left
-                else "nothing is left to smooth: --discard what is to be made anew"
-            )
-        found = smoothed
-    if replace and alternative:
-        found = found.replace(replace, alternative)
-    if approve:
-        found = found.approve(*_meant(found, approve))
-    if discard:
-        found = found.discard(*_meant(found, discard))
-    is_written = found.edits != before.edits or output is not None
-    if is_written:
-        write_variation(output or file, found)
-    if listing or as_json or not edits:
-        _tell(found, as_json)
-    if edits and found.edits == before.edits:
-        note("nothing changed")
-    if is_written and not as_json:
-        click.echo(f"written   {click.format_filename(output or file)}")
-    if interruption.asked:
-        context.exit(INTERRUPTED)
-
-
-@app.command(epilog=example("motionmind attractor --of variation.json -o attractor.png"))
-@click.option("--of", "variation", type=FILE, required=True, help="A variation that vary wrote.")
-@click.option(
-    "-o", "--output", type=FILE, required=True, help="Where it goes: a picture (.png, .svg), or a page (.html)."
+@option(
+    "-o",
+    "--output",
+    section=Section.OUTPUT,
+    type=FILE,
+    required=True,
+    help="Write a picture (.png, .svg) or a page (.html).",
 )
 def attractor(variation: Path, output: Path) -> None:
-    """Draw a variation on its attractor: where the piece's postures live, and the way through them.
+    """Draw a variation on its attractor.
 
-    Both trajectories, the cell of each posture, some of the postures, and both itineraries: where the variation parts
-    from the piece, and where it jumps. In .svg the pointer tells more. The page turns in three dimensions, and a body
-    dances the variation beside it.
+    The picture shows both trajectories, the cell of each posture, some of the postures, and both itineraries: where the
+    variation parts from the piece, and where it jumps. In .svg, point at a part to see more. The page turns in three
+    dimensions, and a body dances the variation beside it.
     """
     from motionmind.plots.attractor import ATTRACTORS, write_attractor
     from motionmind.variation.variation_json import read_variation
@@ -312,62 +239,92 @@ def attractor(variation: Path, output: Path) -> None:
     click.echo(f"{output}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
 
 
-def _given(context: click.Context, names: Collection[str]) -> str | None:
-    """The first of some options that stands on the command line, as it is written there; None where none does."""
-    for option in context.command.params:
-        if option.name in names and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
-            return option.opts[0]
-    return None
+def load_engine(corpus: str, home: Path | None) -> Engine:
+    """Load what was learned from a corpus; print on a terminal that the first search of all takes longer."""
+    from motionmind.tween.engine import Engine
+
+    announce_compilation()
+    return Engine.load(corpus, home)
 
 
-def _piece(source: Path, clip: str | None, home: Path | None, **given: Any) -> tuple[Motion, str | None]:
-    """The movement to vary, and the corpus that it is a clip of, if any."""
-    found = movements(source, (clip,) if clip else (), home, **given)
-    if len(found) != 1:
-        raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
-    return found[0], in_corpus(source, home)[0] if holds_clips(
-        source, home
-    ) and source.suffix.lower() != ".score" else None
+def print_variation(variation: Variation, as_json: bool) -> None:
+    """Print a variation's report, as a table or as JSON."""
+    report = variation.report()
+    if as_json:
+        click.echo(json.dumps(report))
+    else:
+        print_review(report)
 
 
-def _facing(corpus: str, home: Path | None) -> Facing:
-    """Whether what a corpus holds may face anywhere."""
+def _read_piece(
+    context: click.Context,
+    source: Path,
+    corpus: str | None,
+    home: Path | None,
+    *,
+    clip: str | None,
+    begin: int,
+    end: int,
+    rate: float | None,
+    **reading_options: Any,
+) -> tuple[Piece, Engine | None]:
+    """Read the piece to vary, and what was learned from the corpus that judges it, if there is one."""
+    from motionmind.variation.piece import Piece
+
+    motion = read_movement(source, clip, home, **reading_options)
+    own = _corpus_of(source, home)
+    judge = corpus or own
+    unused = given_option(context, ["alternatives", *(row.field for row in SEARCH_OPTIONS if row.field != "fps")])
+    if unused and not judge:
+        raise click.UsageError(f"{unused} is for --corpus, which is not given", context)
+    engine = load_engine(judge, home) if judge else None
+    if rate is None and engine and not is_collection(source, home):
+        rate = engine.corpus.rate
+    frames = select_frames(source, len(motion), begin, end)
+    facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
+    return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine
+
+
+def _corpus_of(source: Path, home: Path | None) -> str | None:
+    """Return the name or folder of the corpus that a source is, or is a clip of; None for scores and other files."""
+    is_in_corpus = is_collection(source, home) and source.suffix.lower() != ".score"
+    return split_clip(source, home)[0] if is_in_corpus else None
+
+
+def _read_facing(corpus: str, home: Path | None) -> Facing:
+    """Read whether the postures of a corpus may face anywhere ("free") or not ("stage")."""
     from motionmind.corpus.store import locate, read_manifest
 
     facing: Facing = read_manifest(locate(corpus, home)).get("facing", "free")
     return facing
 
 
-def _engine(corpus: str, home: Path | None) -> Engine:
-    """What was learned from a corpus; on a terminal it says what the first search of all takes."""
-    from motionmind.jit import is_compiled
-    from motionmind.tween.engine import Engine
+def _write(files: Sequence[Path], variation: Variation, fps: float) -> None:
+    """Write a variation, and its report if there is a second file, or nothing if one of them fails.
 
-    if not is_compiled("search"):
-        progress("compiling the search, which takes half a minute, once")
-    return Engine.load(corpus, home)
-
-
-def _meant(variation: Variation, seams: tuple[int, ...] | str) -> tuple[int, ...]:
-    """The seams of these numbers; of "all" those where an insertion stands."""
-    return tuple(one.number for one in variation.seams if one.insertion) if isinstance(seams, str) else seams
-
-
-def _write(path: Path, variation: Variation, fps: float) -> None:
-    """A variation, whole as JSON; as any other file its movement, even in time where that has to be."""
+    JSON holds the whole variation, other files its movement, resampled if their frames must be even in time.
+    """
+    from motionmind.formats import write_atomically
     from motionmind.variation.variation_json import write_variation
 
-    suffix = path.suffix.lower()
-    if suffix == ".json":
-        write_variation(path, variation)
-    else:
-        motion = variation.motion()
-        write(path, motion.resample(fps) if suffix in _EVEN else motion)
+    output, *reports = files
+    suffix = output.suffix.lower()
+    with all_or_none(files):
+        if suffix == ".json":
+            write_variation(output, variation)
+        else:
+            motion = variation.motion()
+            write(output, motion.resample(fps) if suffix in _EVEN else motion)
+        for report in reports:
+            write_atomically(report, f"{json.dumps(variation.report())}\n".encode())
 
 
-def _tell(variation: Variation, as_json: bool) -> None:
-    found = variation.report()
-    if as_json:
-        click.echo(json.dumps(found))
-    else:
-        print_review(found)
+def _print_advice(variation: Variation, engine: Engine | None) -> None:
+    """Note what to change if a variation does not leave the piece, is not smoothed, or stands still."""
+    if not variation.seams:
+        note("the variation does not leave the piece's order: try a larger --nudge or --length")
+    elif engine is None:
+        note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
+    counts = variation.report()["counts"]
+    if counts["stays"] > _STILL * (counts["postures"] - 1):
+        note(f"{format_stillness(counts)}: try another --start, or a larger --skip or --step")

@@ -632,10 +632,10 @@ def test_alternatives_go_to_files_of_their_own(run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
-        ("--moves 6..", "'6..' is no number of moves such as 8, and no range such as 6..10"),
+        ("--moves 6..", "'6..' is neither a number of moves such as 8 nor a range such as 6..10"),
         ("--moves 6..4", "'6..4' ends before it begins"),
-        ("--moves 0", "'0' is no number of moves"),
-        ("--memory lots", "'lots' is no size such as 200MB"),
+        ("--moves 0", "'0' is neither a number of moves"),
+        ("--memory lots", "'lots' is not a size such as 200MB"),
         ("--memory 1MB --node-budget 5", "give one of them"),
         ("--pin left_hip=C", "--pin left_hip=C: give JOINT or JOINT=A"),
         ("--pin left_hip --pin left_hip=B", "left_hip is pinned to A and to B"),

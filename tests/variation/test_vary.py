@@ -591,11 +591,11 @@ def test_vary_says_what_there_is_to_know(run: Run) -> None:
     counts = run("review", "out.json", "--json").json["counts"]
     assert 4 * counts["stays"] > 79
     said = f"{counts['stays']} of 79 steps stay, {counts['seconds_still']:.1f} s"
-    assert f"note: {said}: another --start, a larger --skip or --step moves it" in done.err
+    assert f"note: {said}: try another --start, or a larger --skip or --step" in done.err
     assert said in done.out.splitlines()
     done = run("vary", "clip.json", "--nudge", 0, "-o", "out.json")
     assert "steps stay" not in done.out + done.err
-    assert "note: it does not leave the piece's order" in done.err
+    assert "note: the variation does not leave the piece's order" in done.err
 
 
 def test_what_the_documents_show_runs(run: Run) -> None:
@@ -627,7 +627,7 @@ def test_what_the_documents_show_runs(run: Run) -> None:
         (("macarena", "--attractor", "moon"), "no flow 'moon'"),
         (("macarena", "--parameter", "rho"), "--parameter rho: give NAME=VALUE"),
         (("macarena", "--parameter", "rho=1"), "lorenz (sigma 16, rho 1, beta 4)"),
-        (("macarena", "--nudge", "far"), "'far' is no number"),
+        (("macarena", "--nudge", "far"), "'far' is neither a number"),
         (("clip.json", "--strict", "--hold", "left_ankle"), "--hold is for --corpus, which is not given"),
         (("clip.json", "--alternatives", "3"), "--alternatives is for --corpus, which is not given"),
         (("clip.json", "--lambda", "2"), "--lambda is for --corpus, which is not given"),

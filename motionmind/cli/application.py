@@ -1,0 +1,88 @@
+"""The program: its commands, and its exit codes."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import sys
+import warnings
+from collections.abc import Sequence
+
+import click
+
+from motionmind.cli.conversion import convert, posture
+from motionmind.cli.corpora import corpora
+from motionmind.cli.looks import explain, graph
+from motionmind.cli.measures import measure
+from motionmind.cli.options import group, show_help_without_command
+from motionmind.cli.pictures import render, sheet
+from motionmind.cli.printing import Notes, show_warning
+from motionmind.cli.reviews import review
+from motionmind.cli.scores import compose, library
+from motionmind.cli.tweens import INTERRUPTED, tween
+from motionmind.cli.variations import attractor, vary
+from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
+
+BAD_INPUT = 2  # exit code for everything that the user can put right
+NO_PATH = 3  # exit code when nothing joins A and B
+
+
+@group(
+    "motionmind tween A.json B.json --corpus ballet -o tween.bvh",
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
+@click.version_option(package_name="motionmind", message="%(prog)s %(version)s")
+@click.pass_context
+def app(context: click.Context) -> None:
+    """Move between two postures in the style of a corpus, with a proof of how close to the best the movement is."""
+    show_help_without_command(context)
+
+
+for _command in (
+    *(tween, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
+    *(vary, review, attractor),
+):
+    app.add_command(_command)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit.
+
+    The exit code is 2 for bad input, told in one line; 3 if there is no path, told by the diagnosis; and 130 if Ctrl-C
+    ended the command.
+
+    Args:
+        arguments: the words after the program's name; those of `sys.argv` by default.
+    """
+    log, notes = logging.getLogger("motionmind"), Notes(logging.INFO)
+    log.addHandler(notes)
+    log.setLevel(logging.INFO)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", MotionMindWarning)
+            warnings.showwarning = show_warning
+            sys.exit(_run(arguments))
+    finally:
+        log.removeHandler(notes)
+        gc.enable()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run a command, print its error if any, and return the exit code."""
+    code = BAD_INPUT
+    try:
+        return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
+    except click.Abort:  # Ctrl-C
+        return INTERRUPTED
+    except click.UsageError as error:
+        message = error.format_message() + (f" ({error.ctx.command_path} --help shows how)" if error.ctx else "")
+    except NoPathError as error:
+        message, code = str(error), NO_PATH
+    except MotionMindError as error:
+        message = str(error)
+    except OSError as error:  # of standard output: those who write files catch theirs
+        message = f"cannot write: {error.strerror or error}"
+    except MemoryError:
+        message = "not enough memory for this"
+    click.echo(f"error: {message}", err=True)
+    return code

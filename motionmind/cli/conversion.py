@@ -1,0 +1,114 @@
+"""The commands that take postures out of clips and convert movement between formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read, read_mapping, write
+from motionmind.cli.options import OUTPUTS, Section, command, option, reading
+from motionmind.cli.printing import count
+from motionmind.cli.types import FILE, RATE
+from motionmind.errors import MotionMindError
+from motionmind.render import PICTURES
+
+if TYPE_CHECKING:
+    from motionmind.formats.papers import Form
+
+
+@command("motionmind posture clip.bvh --frame 240 -o A.json")
+@click.argument("clip", type=FILE)
+@option(
+    "-o",
+    "--output",
+    section=Section.OUTPUT,
+    type=FILE,
+    required=True,
+    help=f"Write {OUTPUTS}; or .txt.",
+)
+@option(
+    "--frame",
+    section=Section.PART,
+    type=int,
+    metavar="N",
+    required=True,
+    help="Take frame N, counted from 0, or from the end if negative.",
+)
+@reading
+def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
+    """Take one posture out of a clip.
+
+    The posture is on human23 if the clip's joints map to it, by known names or by --joints; otherwise on the clip's own
+    skeleton, such as human44.
+    """
+    from motionmind.retarget.retarget import own_skeleton
+
+    check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], [clip])
+    motion = own_skeleton(read(clip, **source), read_mapping(joints))
+    write(output, motion.posture(frame))
+    click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
+
+
+@command("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30")
+@click.argument("file", type=FILE, metavar="IN")
+@click.argument("output", type=FILE, metavar="OUT")
+@option(
+    "--skeleton",
+    section=Section.OUTPUT,
+    type=click.Choice(["own", "human23"]),
+    default="own",
+    help="Keep IN's own joints, or retarget to human23.",
+)
+@option("--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: keep IN's]")
+@option(
+    "--out-unit",
+    section=Section.OUTPUT,
+    metavar="UNIT",
+    help="Set the unit of length of a .bvh OUT, as --unit does for IN  [default: cm]",
+)
+@option(
+    "--form",
+    section=Section.OUTPUT,
+    type=click.Choice(["braces", "lines"]),
+    default="braces",
+    help="Choose between the two notations of the papers for .txt.",
+)
+@reading
+def convert(
+    file: Path,
+    output: Path,
+    skeleton: str,
+    fps: float | None,
+    out_unit: str | None,
+    form: Form,
+    joints: Path | None,
+    **source: Any,
+) -> None:
+    """Convert movement from one format to another.
+
+    IN may be .bvh, .amc with its .asf, .json, .npz as in AMASS, or .txt in the notation of the papers. OUT may be .bvh,
+    .json, .glb (a skinned body, for Blender and the like), .npz (on SMPL's joints), or .txt, which is on human23 (or
+    human44, if IN is) and holds orientations only. A note lists whatever OUT has no place for.
+    """
+    from motionmind.formats import lossy_fields, write_motion
+    from motionmind.formats.papers import write_papers
+    from motionmind.retarget.joint_mapping import is_human44
+    from motionmind.retarget.retarget import to_human23
+
+    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz"))], [file])
+    suffix = output.suffix.lower()
+    if out_unit and suffix != ".bvh":
+        raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
+    motion = read(file, **source)
+    if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
+        motion = to_human23(motion, read_mapping(joints))
+    if fps is not None:
+        motion = motion.resample(fps)
+    if suffix == ".txt":
+        write_papers(output, motion, form=form)
+    else:
+        write_motion(output, motion, unit=out_unit or "cm")
+    note_lossy_fields(output, lossy_fields(motion, output, source=file))
+    click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")

@@ -1,0 +1,266 @@
+"""The options of commands that search for movement: one for each argument of `Engine.tween`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import click
+
+from motionmind.cli.options import Section, given_option, option
+from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
+from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
+from motionmind.errors import MotionMindError
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+DEFAULTS: Mapping[str, Any] = MappingProxyType(
+    {
+        "moves": None,
+        "max_moves": 60,
+        "duration": None,
+        "pin": (),
+        "hold": (),
+        "avoid": (),
+        "via": (),
+        "diversity": 2.0,
+        "sample": False,
+        "seed": 0,
+        "strict": False,
+        "posturewise": False,
+        "node_budget": 200_000,
+        "memory": None,
+        "weights": "conditional",
+        "novelty": 0.0,
+        "coordination": "posture",
+        "lambda_": 1.0,
+        "beta": 1.0,
+        "tau": 1.0,
+        "bridge_price": 1.0,
+        "fps": 30.0,
+        "follow": None,
+    }
+)
+
+
+@dataclass(frozen=True)
+class SearchOption:
+    """An option for one argument of `Engine.tween`.
+
+    Attributes:
+        field: the argument's name.
+        flags: the option's names on the command line.
+        section: the heading that --help lists it under.
+        help: its help text.
+        type: the type of its value; bool for a switch.
+        metavar: the word that stands for its value; None to show its type.
+        advanced: whether --help-all alone lists it.
+        multiple: whether it may be repeated.
+    """
+
+    field: str
+    flags: str
+    section: Section
+    help: str
+    type: click.ParamType[Any] | type[str] | type[bool]
+    metavar: str | None = None
+    advanced: bool = False
+    multiple: bool = False
+
+
+_THROUGH, _SEARCH, _WEIGH, _MOTION = Section.THROUGH, Section.SEARCH, Section.WEIGH, Section.MOTION
+SEARCH_OPTIONS = (
+    SearchOption(
+        "via",
+        "--via",
+        _THROUGH,
+        "Pass through the posture in FILE at move N, or at any move; repeat for several, in order.",
+        str,
+        "FILE[@N]",
+        multiple=True,
+    ),
+    SearchOption(
+        "pin",
+        "--pin",
+        _THROUGH,
+        "Keep JOINT in A's state until the last move; =B: in B's state from the first move on. Repeatable.",
+        str,
+        "JOINT[=B]",
+        multiple=True,
+    ),
+    SearchOption(
+        "hold",
+        "--hold",
+        _THROUGH,
+        "Keep these joints, separated by commas, in their state throughout; A and B must agree there. Repeatable.",
+        str,
+        "JOINTS",
+        multiple=True,
+    ),
+    SearchOption(
+        "avoid",
+        "--avoid",
+        _THROUGH,
+        "Keep JOINT out of a state, given by number or name, between A and B. Repeatable.",
+        str,
+        "JOINT=STATE",
+        multiple=True,
+    ),
+    SearchOption(
+        "moves",
+        "--moves",
+        _SEARCH,
+        "Make N moves, or as many as a range such as 6..10 allows  [default: the best number]",
+        Moves(),
+        "N",
+    ),
+    SearchOption(
+        "duration",
+        "--duration",
+        _SEARCH,
+        "Make the motion last this long; the number of moves follows, unless --moves is given.",
+        POSITIVE,
+        "SECONDS",
+    ),
+    SearchOption("strict", "--strict", _SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
+    SearchOption(
+        "posturewise",
+        "--posturewise",
+        _SEARCH,
+        "Use only whole postures in the order of the corpus, as the search of 1998 did.",
+        bool,
+    ),
+    SearchOption("sample", "--sample", _SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool),
+    SearchOption("seed", "--seed", _SEARCH, "Seed the random numbers of --sample.", NATURAL, "N"),
+    SearchOption(
+        "max_moves", "--max-moves", _SEARCH, "Try at most N moves, unless --moves is given.", COUNT, "N", advanced=True
+    ),
+    SearchOption(
+        "diversity",
+        "--diversity",
+        _SEARCH,
+        "Charge an alternative N nats for each joint's move that it shares with an earlier one.",
+        NATS,
+        "N",
+        advanced=True,
+    ),
+    SearchOption(
+        "node_budget", "--node-budget", _SEARCH, "Hold at most N search nodes at once.", COUNT, "N", advanced=True
+    ),
+    SearchOption(
+        "memory",
+        "--memory",
+        _SEARCH,
+        "Hold as many search nodes as fit in SIZE, such as 200MB; replaces --node-budget.",
+        Size(),
+        "SIZE",
+        advanced=True,
+    ),
+    SearchOption(
+        "novelty",
+        "--novelty",
+        _WEIGH,
+        "Flatten the cost of attested moves: 0 favours frequent ones, 1 treats all alike.",
+        Number(min=0, max=1),
+    ),
+    SearchOption(
+        "coordination",
+        "--coordination",
+        _WEIGH,
+        "Coordinate joints by their postures, by their progressions from posture to posture, or not at all.",
+        click.Choice(["posture", "progression", "none"]),
+    ),
+    SearchOption(
+        "weights",
+        "--weights",
+        _WEIGH,
+        "Weigh transitions by their conditional probability, or by the formula as printed in the papers.",
+        click.Choice(["conditional", "printed"]),
+        advanced=True,
+    ),
+    SearchOption(
+        "lambda_", "--lambda", _WEIGH, "Multiply the cost of coordination by this factor.", NATS, advanced=True
+    ),
+    SearchOption(
+        "beta", "--beta", _WEIGH, "Charge N nats for each move that a joint waits at its goal.", NATS, "N", True
+    ),
+    SearchOption("tau", "--tau", _WEIGH, "Charge N nats for each move.", NATS, "N", advanced=True),
+    SearchOption(
+        "bridge_price",
+        "--bridge-price",
+        _WEIGH,
+        "Charge N nats for each degree of an unattested move.",
+        NATS,
+        "N",
+        advanced=True,
+    ),
+    SearchOption(
+        "follow",
+        "--follow/--mean",
+        _MOTION,
+        "Follow the states of the path, or take the mean of the corpus's walks  [default: --mean if only a length is "
+        "asked for, else --follow]",
+        bool,
+    ),
+    SearchOption("fps", "--fps", _MOTION, "Set the motion's frames per second.", RATE, advanced=True),
+)
+
+
+def search_options(defaults: Mapping[str, Any]) -> Callable[[_Function], _Function]:
+    """Add all options of the search to a command.
+
+    Args:
+        defaults: the default of each field in `SEARCH_OPTIONS`.
+    """
+
+    def decorate(function: _Function) -> _Function:
+        for row in reversed(SEARCH_OPTIONS):
+            attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
+            function = option(
+                row.flags,
+                row.field,
+                section=row.section,
+                advanced=row.advanced,
+                default=defaults[row.field],
+                metavar=row.metavar,
+                multiple=row.multiple,
+                help=row.help,
+                **attributes,
+            )(function)
+        return function
+
+    return decorate
+
+
+searching = search_options(DEFAULTS)
+
+
+def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn the values of the search options into arguments of `Engine.tween`, reading the postures to pass through.
+
+    Args:
+        options: a value for each field in `SEARCH_OPTIONS`, as the running command got them.
+
+    Raises:
+        MotionMindError: a value cannot be used, or a posture cannot be read.
+    """
+    from motionmind.formats import read_posture
+
+    context = click.get_current_context()
+    if given_option(context, ["memory"]) and given_option(context, ["node_budget"]):
+        raise MotionMindError("--memory and --node-budget both limit the number of nodes; give one of them")
+    stops = [(read_posture(path), move) for path, move in parse_vias(options["via"])]
+    return {
+        **options,
+        "pin": parse_pins(options["pin"]),
+        "avoid": parse_avoided(options["avoid"]),
+        "hold": [joint for word in options["hold"] for joint in word.split(",")],
+        "via": [posture if move is None else (posture, move) for posture, move in stops],
+    }
+
+
+def via_files(options: Mapping[str, Any]) -> list[Any]:
+    """Return the paths of the postures to pass through."""
+    return [path for path, _ in parse_vias(options["via"])]

@@ -1,0 +1,203 @@
+"""The command that finds a movement between two postures."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, numbered, write
+from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, option
+from motionmind.cli.printing import Interruption, announce_compilation, print_alternatives, print_tween
+from motionmind.cli.search_options import request_options, searching, via_files
+from motionmind.cli.types import COUNT, FILE
+from motionmind.errors import NoPathError
+from motionmind.render import PICTURES
+
+if TYPE_CHECKING:
+    from motionmind.body.motion import Posture
+    from motionmind.tween.engine import Engine
+    from motionmind.tween.result import Tween
+
+INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
+
+
+@command(
+    "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
+    "--corpus ballet -o tween.bvh"
+)
+@click.argument("a", type=FILE)
+@click.argument("b", type=FILE)
+@CORPUS
+@option("-o", "--output", section=Section.OUTPUT, type=FILE, help=f"Write {OUTPUTS}.")
+@option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
+@option("--problem", section=Section.OUTPUT, type=FILE, help="Write the problem that was solved: .cfn, for toulbar2.")
+@option(
+    "--alternatives",
+    section=Section.SEARCH,
+    type=COUNT,
+    metavar="K",
+    help="Find K tweens that differ; write out-1.json, out-2.json, ...",
+)
+@searching
+@HOME
+def tween(
+    a: Path,
+    b: Path,
+    corpus: str,
+    output: Path | None,
+    report: Path | None,
+    problem: Path | None,
+    home: Path | None,
+    alternatives: int | None,
+    **options: Any,
+) -> None:
+    """Find the best movement from A to B, and prove how good it is.
+
+    Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
+    130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.
+    """
+    if problem and options["posturewise"]:
+        raise click.UsageError("--problem writes a search of joints that move on their own; leave out --posturewise")
+    gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
+    _load_numba()
+    from motionmind.formats import read_posture
+    from motionmind.tween.engine import Engine
+
+    outputs = _Outputs(output, report, problem, alternatives)
+    outputs.check([a, b, *via_files(options)])
+    request = request_options(options)
+    if alternatives and request["follow"] is None:
+        request["follow"] = True  # means of walks would all be alike
+    engine = Engine.load(corpus, home)
+    ends = read_posture(a), read_posture(b)
+    announce_compilation()
+    with _diagnosing(outputs), Interruption() as interruption:
+        results = _find_tweens(engine, ends, request, outputs.count, interruption)
+    files = outputs.write(results)
+    if outputs.is_report_printed:
+        reports = [result.report() for result in results]
+        click.echo(json.dumps(reports[0] if alternatives is None else reports))
+    elif alternatives is None:
+        print_tween(results[0], files)
+    else:
+        print_alternatives(results, files)
+    if interruption.is_requested:
+        click.get_current_context().exit(INTERRUPTED)
+
+
+def _find_tweens(
+    engine: Engine, ends: tuple[Posture, Posture], request: dict[str, Any], count: int, interruption: Interruption
+) -> list[Tween]:
+    """Find `count` tweens, each unlike those before; fewer if Ctrl-C ends the search."""
+    found: list[Tween] = []
+    for _ in range(count):
+        found.append(engine.tween(*ends, **request, unlike=found, watch=interruption.watch))
+        if interruption.is_requested:
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class _Outputs:
+    """The files that the command writes: for each alternative a motion, a report and a problem.
+
+    Attributes:
+        motion: the file of the motion.
+        report: the file of the report; - to print it.
+        problem: the file of the problem.
+        alternatives: how many tweens are asked for; None for one, whose files are not numbered.
+    """
+
+    motion: Path | None
+    report: Path | None
+    problem: Path | None
+    alternatives: int | None
+
+    @property
+    def count(self) -> int:
+        """The number of tweens."""
+        return self.alternatives or 1
+
+    @property
+    def is_report_printed(self) -> bool:
+        """Whether the report goes to standard output, with nothing else there."""
+        return self.report == Path("-")
+
+    def check(self, sources: Sequence[Path]) -> None:
+        """Check that all files can be written, and are not among `sources`."""
+        suffixes: tuple[tuple[str, ...], ...] = (MOVEMENT + PICTURES, (), (".cfn",))
+        check_outputs(
+            [
+                (path, allowed)
+                for number in range(1, self.count + 1)
+                for path, allowed in zip(self._files_of(number), suffixes, strict=True)
+                if path
+            ],
+            sources,
+        )
+
+    def write(self, results: Sequence[Tween]) -> list[Path]:
+        """Write all that was asked for, or nothing if one file fails; return the files."""
+        from motionmind.formats import write_atomically
+
+        files = [path for number in range(1, len(results) + 1) for path in self._files_of(number) if path]
+        with all_or_none(files):
+            for number, result in enumerate(results, start=1):
+                motion, report, problem = self._files_of(number)
+                if motion:
+                    write(motion, result.motion)
+                if problem:
+                    write_atomically(problem, result.problem().encode())
+                if report:
+                    write_atomically(report, f"{json.dumps(result.report())}\n".encode())
+        return files
+
+    def write_diagnosis(self, error: NoPathError) -> None:
+        """Write, or print, why there is no path in place of the first report, if there was to be one."""
+        from motionmind.formats import write_atomically
+
+        text = json.dumps({"status": "no path", "message": str(error), "diagnosis": error.diagnosis})
+        _, report, _ = self._files_of(1)
+        if self.is_report_printed:
+            click.echo(text)
+        elif report:
+            write_atomically(report, f"{text}\n".encode())
+
+    def _files_of(self, number: int) -> list[Path | None]:
+        """Return the motion's, the report's and the problem's file of one tween, None for those not to be written."""
+        paths = (self.motion, None if self.is_report_printed else self.report, self.problem)
+        return [path and numbered(path, number, self.alternatives) for path in paths]
+
+
+@contextmanager
+def _diagnosing(outputs: _Outputs) -> Iterator[None]:
+    """Write the diagnosis in place of the report if there is no path."""
+    try:
+        yield
+    except NoPathError as error:
+        outputs.write_diagnosis(error)
+        raise
+
+
+def _load_numba() -> None:
+    """Import numba without two modules that it looks for, at a quarter of a second, and that nothing here needs.
+
+    They are SciPy's linear algebra, and YAML unless a file configures numba. They are hidden only while numba looks, so
+    that a later import finds them.
+    """
+    hidden = {"scipy.linalg"} | ({"yaml"} if not Path(".numba_config.yaml").exists() else set())
+    hidden -= sys.modules.keys()
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
+    try:
+        import numba.np.arraymath  # noqa: F401
+    finally:
+        for name in hidden:
+            del sys.modules[name]

@@ -1,0 +1,108 @@
+"""Types of the values that options take."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any, ClassVar
+
+import click
+
+
+class Number(click.FloatRange):
+    """A finite number in a range."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; fail with a usage error if it is none."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+class Moves(click.ParamType["int | tuple[int, int]"]):
+    """A number of moves, "8", or a range of numbers, "6..10"."""
+
+    name = "moves"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | tuple[int, int]:
+        """Return the number, or the least and the greatest."""
+        words = str(value).split("..")
+        if len(words) > 2 or not all(word.isdecimal() and int(word) > 0 for word in words):
+            self.fail(f"{value!r} is neither a number of moves such as 8 nor a range such as 6..10.", param, ctx)
+        least, most = int(words[0]), int(words[-1])
+        if least > most:
+            self.fail(f"{value!r} ends before it begins.", param, ctx)
+        return least if len(words) == 1 else (least, most)
+
+
+class Point(click.ParamType["tuple[float, ...]"]):
+    """Coordinates, "0.01" or "1,1,20"."""
+
+    name = "point"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Return the coordinates."""
+        try:
+            point = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            point = ()
+        if not (point and all(map(math.isfinite, point))):
+            self.fail(f"{value!r} is neither a number such as 0.01 nor a point such as 1,1,20.", param, ctx)
+        return point
+
+
+class Span(click.ParamType["tuple[int, int]"]):
+    """The number of a posture, "10", or the first and the last of several, "10..14"."""
+
+    name = "span"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Return the first and the last."""
+        words = str(value).split("..")
+        if len(words) > 2 or not all(word.isdecimal() for word in words):
+            self.fail(f"{value!r} is neither a posture's number such as 10 nor a range such as 10..14.", param, ctx)
+        return int(words[0]), int(words[-1])
+
+
+class Numbers(click.ParamType["tuple[int, ...] | str"]):
+    """Numbers, "2" or "1,3", or "all"."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...] | str:
+        """Return the numbers, or "all"."""
+        words = str(value).split(",")
+        if words == ["all"]:
+            return "all"
+        if not all(word.isdecimal() for word in words):
+            self.fail(f"{value!r} is neither a number such as 2, nor a list such as 1,3, nor all.", param, ctx)
+        return tuple(map(int, words))
+
+
+class Size(click.ParamType[int]):
+    """Bytes, as 200MB; units are powers of 1000."""
+
+    name = "size"
+    units: ClassVar[dict[str, int]] = {"": 1, "KB": 1000, "MB": 1000**2, "GB": 1000**3}
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number of bytes."""
+        parts = re.fullmatch(r"(\d+(?:\.\d+)?) ?([KMG]B)?", str(value).strip(), re.IGNORECASE | re.ASCII)
+        if not parts:
+            self.fail(f"{value!r} is not a size such as 200MB.", param, ctx)
+        return round(float(parts[1]) * self.units[(parts[2] or "").upper()])
+
+
+FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
+FILE_OR_FOLDER = click.Path(readable=False, path_type=Path)
+EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+COUNT = click.IntRange(min=1)
+NATURAL = click.IntRange(min=0)
+NATS = Number(min=0)
+POSITIVE = Number(min=0, min_open=True)
+RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.motion.FASTEST`
