@@ -40,9 +40,7 @@ napoleon_use_ivar = True
 _SPAN = re.compile(r"(`[^`]*`)")
 
 
-def _quote_markup(
-    app: object, what: str, name: str, thing: object, options: object, lines: list[str]
-) -> None:
+def _quote_markup(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Escape what reStructuredText would take for markup: docstrings are prose with `code` in backticks."""
     for number, line in enumerate(lines):
         parts = _SPAN.split(line)

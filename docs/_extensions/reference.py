@@ -1,8 +1,8 @@
 """Directives that write the reference from the code: public names, commands and their options, file formats.
 
-    ```{public-names}      the names of `motionmind.__all__`, grouped by subject
-    ```{command-line}      every command with its arguments and its options, in groups where a command has groups
-    ```{json-schema} dotted.name
+```{public-names}      the names of `motionmind.__all__`, grouped by subject
+```{command-line}      every command with its arguments and its options, in groups where a command has groups
+```{json-schema} dotted.name
 """
 
 from __future__ import annotations
@@ -58,9 +58,26 @@ def find(names: tuple[str, ...]) -> Any:
     return None
 
 
-def _plain(schema: Any) -> Any:
-    """What of a type `msgspec.json.schema` cannot describe, as JSON holds it."""
-    return {}
+def _without_raw(schema: Any) -> Any:
+    """Return a struct whose fields of undecoded JSON, which no schema can have as a default, are optional objects."""
+    if not issubclass(schema, msgspec.Struct):
+        return schema
+    fields = msgspec.structs.fields(schema)
+    if all(field.type is not msgspec.Raw for field in fields):
+        return schema
+    described = []
+    for field in fields:
+        if field.type is msgspec.Raw:
+            described.append((field.name, dict[str, Any] | msgspec.UnsetType, msgspec.UNSET))
+        elif field.required:
+            described.append((field.name, field.type))
+        else:
+            described.append(
+                (field.name, field.type, msgspec.field(default=field.default, default_factory=field.default_factory))
+            )
+    plain = msgspec.defstruct(schema.__name__, described, kw_only=True, forbid_unknown_fields=True)
+    plain.__doc__ = schema.__doc__
+    return plain
 
 
 def schema_text(kind: str) -> str | None:
@@ -68,7 +85,7 @@ def schema_text(kind: str) -> str | None:
     found = find(SCHEMAS[kind])
     if found is None:
         return None
-    return json.dumps(msgspec.json.schema(found, schema_hook=_plain), indent=2, ensure_ascii=False)
+    return json.dumps(msgspec.json.schema(_without_raw(found)), indent=2, ensure_ascii=False)
 
 
 def commands(group: click.Group, path: str) -> Iterator[tuple[str, click.Command]]:
