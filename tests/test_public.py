@@ -27,9 +27,7 @@ def test_every_public_name_exists_and_is_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", motionmind.__all__)
-def test_every_public_name_has_an_example_that_runs(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_public_name_has_an_example_that_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     thing = getattr(motionmind, name)
     found = doctest.DocTestFinder(recurse=False).find(thing, name, globs={})

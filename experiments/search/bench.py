@@ -95,7 +95,10 @@ def warm_up(model: Model, states: Int32s) -> None:
         assert answer is not None
         moves = len(answer.path) - 1
         trellis = pose(model, (start, goal), moves)
-        tables, path = pair_chains.build(trellis, trws.no_messages(trellis)), np.zeros(len(trellis.dom_ptr) - 1, np.int64)
+        tables, path = (
+            pair_chains.build(trellis, trws.no_messages(trellis)),
+            np.zeros(len(trellis.dom_ptr) - 1, np.int64),
+        )
         through = np.zeros(len(trellis.dom))
         pair_chains.sweep(trellis, tables, through)
         pair_chains.descend(trellis, tables, path)

@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Engine(LearnedCorpus):
-    """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus).
-    """
+    """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus)."""
 
     def tween(
         self,

@@ -95,8 +95,7 @@ class Explanation(msgspec.Struct, frozen=True):
 
 
 def explain(tween: Tween | TweenReport) -> Explanation:
-    """Explain a tween, or its report, move by move.
-    """
+    """Explain a tween, or its report, move by move."""
     report = tween if isinstance(tween, TweenReport) else report_of(tween)
     costs = report.costs
     moves = []

@@ -1,0 +1,199 @@
+"""Directives that write the reference from the code: public names, commands and their options, file formats.
+
+```{public-names}      the names of `motionmind.__all__`, grouped by subject
+```{command-line}      every command with its arguments and its options, in groups where a command has groups
+```{json-schema} dotted.name
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any, ClassVar
+
+import click
+import msgspec
+from docutils import nodes
+from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
+
+_log = logging.getLogger(__name__)
+
+SUBJECTS = {
+    "Tweens": ("Engine", "Tween", "Bridge", "Wait", "Source"),
+    "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
+    "Files": ("read_motion", "read_posture", "write_motion", "write_posture", "compose"),
+    "Skeletons of your own": ("own_skeleton", "to_human23"),
+    "States": ("make_discretization",),
+    "Variations": ("vary", "Variation", "Piece", "Seam", "Flow", "flow_of", "read_variation", "write_variation"),
+    "Pictures": ("write_picture", "contact_sheet"),
+    "Errors": ("MotionMindError", "FormatError", "SkeletonError", "CorpusError", "NoPathError", "MotionMindWarning"),
+}
+
+# The types of files and reports, by every name that they may have; the first that exists is documented.
+SCHEMAS = {
+    "posture": ("motionmind.formats.posture_json.PostureSchema",),
+    "motion": ("motionmind.formats.motion_json.MotionSchema",),
+    "variation": ("motionmind.variation.variation_json.VariationSchema",),
+    "tween-report": ("motionmind.tween.report.TweenReport", "motionmind.tween.narrative.Report"),
+    "source-manifest": ("motionmind.corpus.manifest.SourceManifest",),
+    "built-manifest": ("motionmind.corpus.manifest.BuiltManifest",),
+    "corpus-summary": ("motionmind.learned.summary.CorpusSummary",),
+    "measure-report": ("motionmind.metrics.measure.MeasureReport",),
+    "variation-report": ("motionmind.variation.variation.VariationReport",),
+}
+MAY_BE_MISSING = {"corpus-summary", "measure-report", "variation-report"}
+
+
+def find(names: tuple[str, ...]) -> Any:
+    """Return the first of some dotted names that exists, or None."""
+    for name in names:
+        module, _, attribute = name.rpartition(".")
+        try:
+            return getattr(import_module(module), attribute)
+        except (ImportError, AttributeError):
+            continue
+    return None
+
+
+def _without_raw(schema: Any) -> Any:
+    """Return a struct whose fields of undecoded JSON, which no schema can have as a default, are optional objects."""
+    if not issubclass(schema, msgspec.Struct):
+        return schema
+    fields = msgspec.structs.fields(schema)
+    if all(field.type is not msgspec.Raw for field in fields):
+        return schema
+    described = []
+    for field in fields:
+        if field.type is msgspec.Raw:
+            described.append((field.name, dict[str, Any] | msgspec.UnsetType, msgspec.UNSET))
+        elif field.required:
+            described.append((field.name, field.type))
+        else:
+            described.append(
+                (field.name, field.type, msgspec.field(default=field.default, default_factory=field.default_factory))
+            )
+    plain = msgspec.defstruct(schema.__name__, described, kw_only=True, forbid_unknown_fields=True)
+    plain.__doc__ = schema.__doc__
+    return plain
+
+
+def schema_text(kind: str) -> str | None:
+    """Return the JSON Schema of one of `SCHEMAS`; None where no such type exists."""
+    found = find(SCHEMAS[kind])
+    if found is None:
+        return None
+    return json.dumps(msgspec.json.schema(_without_raw(found)), indent=2, ensure_ascii=False)
+
+
+def commands(group: click.Group, path: str) -> Iterator[tuple[str, click.Command]]:
+    """Yield every command of a group and of the groups in it, with the words that call it."""
+    for name, command in group.commands.items():
+        yield f"{path} {name}", command
+        if isinstance(command, click.Group):
+            yield from commands(command, f"{path} {name}")
+
+
+def options_by_section(command: click.Command, context: click.Context) -> dict[str, list[tuple[str, str]]]:
+    """Return the options of a command, names and help, by the heading under which its own help lists them."""
+    sections: dict[str, list[tuple[str, str]]] = {}
+    for option in command.get_params(context):
+        if isinstance(option, click.Option) and (record := option.get_help_record(context)):
+            sections.setdefault(str(getattr(option, "section", "Options")), []).append(record)
+    order = list(map(str, command.sections(context))) if hasattr(command, "sections") else list(sections)
+    return {heading: sections[heading] for heading in order if heading in sections}
+
+
+def command_text(path: str, command: click.Command) -> str:
+    """Return the section of one command, as Markdown."""
+    context = click.Context(command, info_name=path)
+    lines = [f"## {path}", "", f"    {path} {' '.join(command.collect_usage_pieces(context))}", ""]
+    paragraphs = (command.help or "").replace("\b\n", "").split("\n\n")
+    lines += [_prose(" ".join(paragraph.split())) + "\n" for paragraph in paragraphs]
+    if isinstance(command, click.Group):
+        return "\n".join(lines)
+    for heading, options in options_by_section(command, context).items():
+        lines += [f"**{heading}**", "", "| option | |", "|---|---|"]
+        lines += [f"| `{_cell(names)}` | {_prose(_cell(text))} |" for names, text in options]
+        lines.append("")
+    example = re.search(r"^ +(motionmind .*)$", command.epilog or "", re.M)
+    if example:
+        lines += ["Example:", "", f"    {example[1]}", ""]
+    return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+def _prose(text: str) -> str:
+    """Escape what Markdown would take for markup."""
+    return re.sub(r"([*_<>\[\]])", r"\\\1", text)
+
+
+class CommandLine(SphinxDirective):
+    """Every command with its options."""
+
+    def run(self) -> list[nodes.Node]:
+        """Walk the commands and write a section for each."""
+        from motionmind.cli import app
+
+        text = "\n\n".join(command_text(path, command) for path, command in commands(app, "motionmind"))
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+class PublicNames(SphinxDirective):
+    """The public names by subject; a name without a subject is a warning."""
+
+    def run(self) -> list[nodes.Node]:
+        """Write a section for each subject."""
+        import motionmind
+
+        grouped = {name for names in SUBJECTS.values() for name in names}
+        for name in sorted(grouped ^ (set(motionmind.__all__) - {"__version__"})):
+            _log.warning("docs/_extensions/reference.py: SUBJECTS and motionmind.__all__ differ in %s", name)
+        text = "\n\n".join(
+            "\n".join([f"## {subject}", *(self._entry(name) for name in names if hasattr(motionmind, name))])
+            for subject, names in SUBJECTS.items()
+        )
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+    @staticmethod
+    def _entry(name: str) -> str:
+        import motionmind
+
+        thing = getattr(motionmind, name)
+        if not isinstance(thing, type):
+            kind, members = "function", ""
+        elif issubclass(thing, Exception):
+            kind, members = "exception", ""
+        else:
+            kind, members = "class", "\n   :members:"
+        return f"\n```{{eval-rst}}\n.. auto{kind}:: motionmind.{name}{members}\n```\n"
+
+
+class JsonSchema(SphinxDirective):
+    """The JSON Schema of a file or a report."""
+
+    required_arguments: ClassVar[int] = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Write it as a block of code; warn where the type is missing."""
+        kind = self.arguments[0]
+        text = schema_text(kind)
+        if text is None:
+            if kind not in MAY_BE_MISSING:
+                _log.warning("there is none of %s", ", ".join(SCHEMAS[kind]), location=self.get_location())
+            return []
+        block = nodes.literal_block(text, text, language="json")
+        return [block]
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Register the directives."""
+    app.add_directive("command-line", CommandLine)
+    app.add_directive("public-names", PublicNames)
+    app.add_directive("json-schema", JsonSchema)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,53 @@
+"""How Sphinx builds the documents: `sphinx-build -W -q -b html docs docs/_build`."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "_extensions")]
+
+import motionmind  # noqa: E402
+
+project = "MotionMind"
+author = "The MotionMind authors"
+copyright = author  # noqa: A001 (Sphinx's name)
+release = version = motionmind.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
+exclude_patterns = ["_build", "_extensions"]
+default_role = "code"
+html_theme = "furo"
+html_title = "MotionMind"
+html_show_copyright = False
+html_copy_source = False
+
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence"]
+suppress_warnings = ["myst.xref_missing"]  # links out of docs/; tests/docs/test_documents.py follows every link
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+_SPAN = re.compile(r"(`[^`]*`)")
+
+
+def _quote_markup(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Escape what reStructuredText would take for markup: docstrings are prose with `code` in backticks."""
+    for number, line in enumerate(lines):
+        parts = _SPAN.split(line)
+        parts[::2] = [re.sub(r"([|*]|(?<=\w)_(?=\W|$))", r"\\\1", part) for part in parts[::2]]
+        lines[number] = "".join(parts)
+
+
+def setup(app: Any) -> None:
+    """Clean docstrings before napoleon reads their sections."""
+    app.connect("autodoc-process-docstring", _quote_markup, priority=100)
