@@ -12,11 +12,11 @@ from itertools import pairwise
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
-FASTEST = 10_000.0  # frames a second; more is a typing error, not a camera
 _MOMENT = 1e-6  # seconds: times no further apart count as equal
 
 

@@ -21,14 +21,11 @@ def explain(report: Path, as_json: bool) -> None:
     For each move: which joints move, how likely that is, and where it was seen. REPORT is a file that tween --report
     wrote.
     """
-    from motionmind.tween.narrative import explain, lines, plain, read_report
+    from motionmind.tween.narrative import explain
+    from motionmind.tween.report import read_report
 
-    found = explain(read_report(report))
-    if as_json:
-        click.echo(json.dumps(plain(found)))
-        return
-    for line in lines(found):
-        click.echo(line)
+    explanation = explain(read_report(report))
+    click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
 
 
 @command("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg")

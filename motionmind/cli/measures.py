@@ -52,7 +52,7 @@ def measure(
     from motionmind.metrics.measure import MeasureReport, measure
     from motionmind.retarget.retarget import own_skeleton
     from motionmind.tween.engine import Engine
-    from motionmind.tween.narrative import read_report
+    from motionmind.tween.report import read_report
 
     motion = own_skeleton(read(file, **source), read_mapping(joints))
     engine = Engine.load(corpus, home)

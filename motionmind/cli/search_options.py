@@ -1,11 +1,10 @@
-"""The options of commands that search for movement: one for each argument of `Engine.tween`."""
+"""The options of commands that search for movement: one for each field of `TweenRequest`, with its default."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar, get_args
 
 import click
 
@@ -13,44 +12,18 @@ from motionmind.cli.options import Section, given_option, option
 from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
+from motionmind.grammar.schemes import Scheme, Weights
+from motionmind.tween.request import TweenRequest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-DEFAULTS: Mapping[str, Any] = MappingProxyType(
-    {
-        "moves": None,
-        "max_moves": 60,
-        "duration": None,
-        "pin": (),
-        "hold": (),
-        "avoid": (),
-        "via": (),
-        "diversity": 2.0,
-        "sample": False,
-        "seed": 0,
-        "strict": False,
-        "posturewise": False,
-        "node_budget": 200_000,
-        "memory": None,
-        "weights": "conditional",
-        "novelty": 0.0,
-        "coordination": "posture",
-        "lambda_": 1.0,
-        "beta": 1.0,
-        "tau": 1.0,
-        "bridge_price": 1.0,
-        "fps": 30.0,
-        "follow": None,
-    }
-)
 
 
 @dataclass(frozen=True)
 class SearchOption:
-    """An option for one argument of `Engine.tween`.
+    """An option for one field of `TweenRequest`.
 
     Attributes:
-        field: the argument's name.
+        field: the field's name.
         flags: the option's names on the command line.
         section: the heading that --help lists it under.
         help: its help text.
@@ -170,14 +143,14 @@ SEARCH_OPTIONS = (
         "--coordination",
         _WEIGH,
         "Coordinate joints by their postures, by their progressions from posture to posture, or not at all.",
-        click.Choice(["posture", "progression", "none"]),
+        click.Choice(get_args(Scheme)),
     ),
     SearchOption(
         "weights",
         "--weights",
         _WEIGH,
         "Weigh transitions by their conditional probability, or by the formula as printed in the papers.",
-        click.Choice(["conditional", "printed"]),
+        click.Choice(get_args(Weights)),
         advanced=True,
     ),
     SearchOption(
@@ -208,37 +181,27 @@ SEARCH_OPTIONS = (
 )
 
 
-def search_options(defaults: Mapping[str, Any]) -> Callable[[_Function], _Function]:
-    """Add all options of the search to a command.
-
-    Args:
-        defaults: the default of each field in `SEARCH_OPTIONS`.
-    """
-
-    def decorate(function: _Function) -> _Function:
-        for row in reversed(SEARCH_OPTIONS):
-            attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
-            function = option(
-                row.flags,
-                row.field,
-                section=row.section,
-                advanced=row.advanced,
-                default=defaults[row.field],
-                metavar=row.metavar,
-                multiple=row.multiple,
-                help=row.help,
-                **attributes,
-            )(function)
-        return function
-
-    return decorate
-
-
-searching = search_options(DEFAULTS)
+def searching(function: _Function) -> _Function:
+    """Add all options of the search to a command, with the defaults of `TweenRequest`."""
+    defaults = {field.name: field.default for field in fields(TweenRequest)}
+    for row in reversed(SEARCH_OPTIONS):
+        attributes = {"is_flag": True} if row.type is bool else {"type": row.type}
+        function = option(
+            row.flags,
+            row.field,
+            section=row.section,
+            advanced=row.advanced,
+            default=() if row.multiple else defaults[row.field],
+            metavar=row.metavar,
+            multiple=row.multiple,
+            help=row.help,
+            **attributes,
+        )(function)
+    return function
 
 
 def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn the values of the search options into arguments of `Engine.tween`, reading the postures to pass through.
+    """Turn the values of the search options into fields of `TweenRequest`, reading the postures to pass through.
 
     Args:
         options: a value for each field in `SEARCH_OPTIONS`, as the running command got them.

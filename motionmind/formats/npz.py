@@ -29,7 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats
-from motionmind.body.motion import FASTEST, Motion
+from motionmind.body.motion import Motion
+from motionmind.body.rates import FASTEST
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.formats._clock import even_step

@@ -7,13 +7,12 @@ state s of chain j has the row `starts[j] + s` in flat arrays.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
-
-Weights = Literal["conditional", "printed"]
+from motionmind.grammar.schemes import Weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,7 +159,7 @@ def diagnose(
 def _remedies(
     graph: csr_array, grammar: Grammar, corpus: Corpus, space: StateSpace, chain: int, a: int, b: int, strict: bool
 ) -> Iterator[tuple[str, int | None]]:
-    """Yield each change that might help a chain from state `a` to `b`, and the moves it then needs, None for no path."""
+    """Yield each change that might help a chain from state `a` to `b`, and the moves that it then needs, if any do."""
     if strict:
         first, last = grammar.transitions.starts[chain], grammar.transitions.starts[chain + 1]
         indptr = grammar.bridges.indptr[first : last + 1]

@@ -142,8 +142,8 @@ def _lines(explanation: Explanation) -> Iterator[str]:
         f"gap {explanation.gap:.2%}"
     )
     yield (
-        f"{explanation.cost:.3f} nats: {explanation.moved:.3f} for the joints' moves, {explanation.coordinated:.3f} for "
-        f"their coordination, {explanation.tolls:.3f} for the number of moves"
+        f"{explanation.cost:.3f} nats: {explanation.moved:.3f} for the joints' moves, {explanation.coordinated:.3f} "
+        f"for their coordination, {explanation.tolls:.3f} for the number of moves"
     )
     for move in explanation.moves:
         yield ""

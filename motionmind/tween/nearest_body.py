@@ -22,7 +22,7 @@ def nearest_posture(corpus: Corpus, rotations: Floats) -> int:
 
 
 def diagnose_posturewise(corpus: Corpus, bodies: Bodies, near: tuple[int, int], rules: Rules) -> str:
-    """Return in words why no whole postures lead between the corpus's postures nearest to A and B, and which come nearest."""
+    """Say why no whole postures lead between the corpus's postures nearest to A and B, and which come nearest."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import shortest_path
 

@@ -10,7 +10,7 @@ import numpy as np
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
-from motionmind.grammar.transitions import Weights
+from motionmind.grammar.schemes import Weights
 from motionmind.search.problem import Model
 
 

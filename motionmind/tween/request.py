@@ -187,7 +187,8 @@ class TweenRequest:
         """Return the request as plain values for JSON, as a report's `asked` has it.
 
         What a default depends on is filled in: the node budget for a body of so many joint chains, and whether the
-        motion follows the path. Postures to pass through are told by their moves, tweens to differ from by their number.
+        motion follows the path. Postures to pass through are given by their moves, tweens to differ from by their
+        number.
         """
         values = {field.name.rstrip("_"): getattr(self, field.name) for field in fields(self)}
         del values["posturewise"]

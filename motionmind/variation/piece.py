@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.body.motion import FASTEST, Insertion, Motion, Posture
+from motionmind.body.motion import Insertion, Motion, Posture
+from motionmind.body.rates import FASTEST
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot

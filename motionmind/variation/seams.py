@@ -8,9 +8,8 @@ corpus (or, posturewise, the whole body does), or turns faster than it ever does
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sized
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from inspect import signature
 from typing import Annotated, Any, Generic, TypeVar
 
 import msgspec
@@ -21,9 +20,10 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.errors import NoPathError, SkeletonError, did_you_mean
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
-from motionmind.tween.certificate import Bridge, Wait
+from motionmind.tween.certificate import Bridge, Wait, gap_of
 from motionmind.tween.engine import Engine
-from motionmind.tween.result import Tween, gap_of
+from motionmind.tween.request import TweenRequest
+from motionmind.tween.result import Tween
 from motionmind.variation.arguments import check_whole
 from motionmind.variation.piece import Piece
 
@@ -243,10 +243,10 @@ def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
 
     Raises:
         MotionMindError: `alternatives` is out of its range.
-        TypeError: `Engine.tween` takes no argument of a name in `options`.
+        TypeError: a name in `options` is no field of `TweenRequest`.
     """
     check_whole("alternatives", alternatives, 1)
-    known = signature(Engine.tween).parameters.keys() - {"self", "a", "b", "unlike"}
+    known = {field.name for field in fields(TweenRequest)} - {"unlike"}
     for name in options:
         if name not in known:
             raise TypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
