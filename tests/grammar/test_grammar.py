@@ -17,6 +17,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+from toys import solution
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry import rotations as rot
@@ -332,7 +333,9 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
     rng = np.random.default_rng(seed)
     start, goal = (rng.integers(body.sizes) for _ in range(2))
     optima = brute_force(body, learned.bridges, scheme, factor, bridge_price, start, goal, wait=0.7, moves=4)
-    found = solution(Problem(build_model(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000)))
+    found = solution(
+        Problem(build_model(learned, scheme, factor, bridge_price), start, goal, Rules(0.7, 0.4, 1, 4, 100_000))
+    )
     least = min(optima[moves] + 0.4 * moves for moves in range(1, 5))
     if found is None:
         assert least == np.inf

@@ -272,7 +272,9 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
             trellis = smaller
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON)
+        cost, lower, _, _ = astar.search(
+            trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON
+        )
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -322,7 +324,9 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         if trellis.chains == 1:
             continue
         tables = pair_chains.build(trellis, messages)
-        cost, lower, _, _ = astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON)
+        cost, lower, _, _ = astar.search(
+            trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON
+        )
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
