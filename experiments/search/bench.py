@@ -187,18 +187,18 @@ def estimates(trellis: Trellis) -> Iterator[tuple[str, PairChains]]:
     back = np.zeros(trellis.up_ptr[-1])  # the most that a position can save in the coupling to a kid
     for u in range(len(back)):
         back[u] = trellis.col_cost[trellis.col_ptr[u] : trellis.col_ptr[u + 1]].min(initial=0.0)
-    yield "each joint alone, in any number of moves", tables(trellis, alone(trellis, back, ends_at_goal=True), back)
+    yield "each joint alone, in any number of moves", as_tables(trellis, alone(trellis, back, ends_at_goal=True), back)
     yield (
         "each joint alone, in the moves that are left",
-        tables(trellis, alone(trellis, back, ends_at_goal=False), back),
+        as_tables(trellis, alone(trellis, back, ends_at_goal=False), back),
     )
     messages = trws.no_messages(trellis)
     trws.tighten(trellis, messages, np.zeros(len(trellis.dom_ptr) - 1, np.int64), 160, np.inf)
-    yield "messages", tables(trellis, messages.up_row, messages.up_col, messages.constants)
+    yield "messages", as_tables(trellis, messages.up_row, messages.up_col, messages.constants)
     tables, through = pair_chains.build(trellis, messages), np.zeros(len(trellis.dom))
     for _ in range(10):
         pair_chains.sweep(trellis, tables, through)
-    yield "pair_chains, 10 sweeps", cut
+    yield "pair_chains, 10 sweeps", tables
 
 
 def alone(trellis: Trellis, back: Floats, ends_at_goal: bool) -> Floats:
@@ -228,7 +228,7 @@ def alone(trellis: Trellis, back: Floats, ends_at_goal: bool) -> Floats:
     return rest
 
 
-def tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> PairChains:
+def as_tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> PairChains:
     """The estimate `rest` by position [P] plus `back` by coupling row where only the parent has moved, in A*'s form.
 
     `constants` [n] is what it counts besides for each variable to come.

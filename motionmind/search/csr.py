@@ -8,24 +8,10 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.jit import jit
 
 
-@jit
-def find_entry(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
-    """Return the index of the entry at (row, column); -1 where the row does not list the column."""
-    at = insertion_point(ptr, columns, row, column)
-    return at if at < ptr[row + 1] and columns[at] == column else -1
-
-
-@jit
 def insertion_point(ptr: Ints, columns: Int32s, row: int, column: int) -> int:
     """Return the index of the first entry of a row whose column is not less than `column`; the row's end if none is."""
-    low, high = ptr[row], ptr[row + 1]
-    while low < high:
-        middle = (low + high) // 2
-        if columns[middle] < column:
-            low = middle + 1
-        else:
-            high = middle
-    return int(low)
+    first, last = ptr[row], ptr[row + 1]
+    return int(first + np.searchsorted(columns[first:last], column))
 
 
 @jit

@@ -9,8 +9,8 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.costs import add_couplings, path_cost, set_moment_costs
-from motionmind.search.trellis import Trellis
+from motionmind.search.costs import coupling, edge_cost, path_cost
+from motionmind.search.trellis import Trellis, correction
 
 
 @jit
@@ -42,7 +42,11 @@ def _minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
             rest = 0.0 if t == trellis.moves else np.inf
             for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
                 rest = min(rest, trellis.row_cost[e] + value[trellis.row_to[e]])
-            value[p] = add_couplings(trellis, path, i, p, rest + trellis.unary[p])
+            value[p] = rest + trellis.unary[p] + coupling(trellis, path, i, p)
+            for child in range(chain + 1, chains):
+                below = i - chain + child
+                if trellis.parents[child] == chain:
+                    value[p] += correction(trellis, trellis.up_ptr[below] + p - trellis.dom_ptr[i], path[below])
     for i in range(chain + chains, len(path), chains):
         before, least = path[i - chains], np.inf
         for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
@@ -62,14 +66,15 @@ def _minimise_moment(trellis: Trellis, path: Ints, t: int) -> None:
     value = np.full(trellis.dom_ptr[(t + 1) * chains] - first, np.inf)
     for chain in range(chains - 1, -1, -1):
         i = t * chains + chain
-        set_moment_costs(trellis, path, i, value)
-        for child in range(chain + 1, chains):
-            if trellis.parents[child] == chain:
-                for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-                    if value[p - first] < np.inf:
-                        value[p - first] += _cheapest(trellis, value, first, i - chain + child, p - trellis.dom_ptr[i])[
-                            0
-                        ]
+        before = path[i - chains]
+        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+            p = trellis.row_to[e]
+            value[p - first] = trellis.row_cost[e] + trellis.unary[p]
+            if t < trellis.moves:
+                value[p - first] += edge_cost(trellis, p, path[i + chains])
+            for child in range(chain + 1, chains):
+                if trellis.parents[child] == chain:
+                    value[p - first] += _cheapest(trellis, value, first, i - chain + child, p - trellis.dom_ptr[i])[0]
     for chain in range(chains):
         i, parent = t * chains + chain, trellis.parents[chain]
         above = -1 if parent < 0 else path[i - chain + parent] - trellis.dom_ptr[i - chain + parent]

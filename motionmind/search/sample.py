@@ -20,10 +20,10 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.costs import add_couplings, path_cost, set_moment_costs
+from motionmind.search.costs import coupling, edge_cost, path_cost
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Trellis, segment_trellises
+from motionmind.search.trellis import Trellis, correction, segment_trellises
 
 ROUNDS = 100  # each samples every chain and every moment once
 
@@ -75,7 +75,11 @@ def _sample_chain(trellis: Trellis, path: Ints, chain: int, rng: np.random.Gener
     for t in range(trellis.moves, 0, -1):
         i = t * chains + chain
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            value[p] = add_couplings(trellis, path, i, p, trellis.unary[p])
+            value[p] = trellis.unary[p] + coupling(trellis, path, i, p)
+            for child in range(chain + 1, chains):
+                below = i - chain + child
+                if trellis.parents[child] == chain:
+                    value[p] += correction(trellis, trellis.up_ptr[below] + p - trellis.dom_ptr[i], path[below])
             if t < trellis.moves:
                 edges = slice(trellis.row_ptr[p], trellis.row_ptr[p + 1])
                 value[p] += _soft_min(trellis.row_cost[edges] + value[trellis.row_to[edges]])
@@ -95,10 +99,23 @@ def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generato
     value = np.full(trellis.dom_ptr[(t + 1) * chains] - first, np.inf)
     for chain in range(chains - 1, -1, -1):
         i = t * chains + chain
-        set_moment_costs(trellis, path, i, value)
+        before = path[i - chains]
+        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+            p = trellis.row_to[e]
+            value[p - first] = trellis.row_cost[e] + trellis.unary[p]
+            if t < trellis.moves:
+                value[p - first] += edge_cost(trellis, p, path[i + chains])
         for child in range(chain + 1, chains):
             if trellis.parents[child] == chain:
-                _add_child(trellis, value, first, i, i - chain + child)
+                below = i - chain + child
+                alone = _soft_min(value[trellis.dom_ptr[below] - first : trellis.dom_ptr[below + 1] - first])
+                for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+                    if value[p - first] < np.inf:
+                        u = trellis.up_ptr[below] + p - trellis.dom_ptr[i]
+                        pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
+                        # Without corrections the sum is 1; a listed pair changes it by exp(-(v + d)) - exp(-v).
+                        listed = np.exp(alone - value[trellis.col_to[pairs] - first])
+                        value[p - first] += alone - np.log1p(np.sum(listed * np.expm1(-trellis.col_cost[pairs])))
     for chain in range(chains):
         i, parent = t * chains + chain, trellis.parents[chain]
         costs = value[trellis.dom_ptr[i] - first : trellis.dom_ptr[i + 1] - first].copy()
@@ -108,22 +125,6 @@ def _sample_moment(trellis: Trellis, path: Ints, t: int, rng: np.random.Generato
             for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1]):
                 costs[trellis.col_to[q] - trellis.dom_ptr[i]] += trellis.col_cost[q]
         path[i] = trellis.dom_ptr[i] + _sample_index(costs, rng)
-
-
-@jit
-def _add_child(trellis: Trellis, value: Floats, first: int, i: int, below: int) -> None:
-    """Add to the values of variable i -log of the sum of exp(-cost) over its child variable `below` and all below it.
-
-    Without corrections that sum is the same for every position of i; a listed pair changes it by
-    exp(-(v + d)) - exp(-v), v the child's value and d the correction.
-    """
-    uncorrected = _soft_min(value[trellis.dom_ptr[below] - first : trellis.dom_ptr[below + 1] - first])
-    for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-        if value[p - first] < np.inf:
-            u = trellis.up_ptr[below] + p - trellis.dom_ptr[i]
-            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
-            listed = np.exp(uncorrected - value[trellis.col_to[pairs] - first])
-            value[p - first] += uncorrected - np.log1p(np.sum(listed * np.expm1(-trellis.col_cost[pairs])))
 
 
 @jit

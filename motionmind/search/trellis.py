@@ -10,7 +10,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.csr import find_entry, select_entries
+from motionmind.search.csr import select_entries
 from motionmind.search.problem import Model, Problem, costs_to_go
 
 
@@ -98,8 +98,14 @@ def build_trellis(model: Model, start: Ints, moves: int, to_go: Floats, below: f
 @jit
 def correction(trellis: Trellis, u: int, x: int) -> float:
     """Return the correction in nats of position `x` in coupling row `u`; 0 for a pair that is not listed."""
-    q = find_entry(trellis.col_ptr, trellis.col_to, u, x)
-    return float(trellis.col_cost[q]) if q >= 0 else 0.0
+    low, high = trellis.col_ptr[u], trellis.col_ptr[u + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if trellis.col_to[middle] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return float(trellis.col_cost[low]) if low < trellis.col_ptr[u + 1] and trellis.col_to[low] == x else 0.0
 
 
 @jit

@@ -17,6 +17,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+from toys import solution
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry import rotations as rot

@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pgmpy.models import DiscreteBayesianNetwork
 from pgmpy.parameter_estimator import DiscreteBayesianEstimator
+from toys import solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.corpus.bundled import bundled

@@ -16,7 +16,7 @@ import pytest
 from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toys import Toy, evaluate, random_toy, trellis_of
+from toys import Toy, evaluate, random_toy, solution, trellis_of
 
 from motionmind._typing import Bools, Int32s
 from motionmind.body.motion import Posture

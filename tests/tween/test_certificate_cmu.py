@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toys import random_toy
+from toys import random_toy, solution
 
 from motionmind.discretize import Codebook
 from motionmind.formats import read_motion

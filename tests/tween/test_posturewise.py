@@ -14,7 +14,7 @@ from command_line import Run
 from toys import random_toy
 
 from motionmind.body.motion import Posture
-from motionmind.errors import MotionMindError, NoPathError
+from motionmind.errors import InfeasibleError, MotionMindError, NoPathError
 from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
 from motionmind.tween.nearest_body import nearest_posture
@@ -65,7 +65,6 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
             if parent >= 0 and listed[chain][body[parent], body[chain]] == 0.0:
                 listed[chain][body[parent], body[chain]] = -1e-3
     toy = replace(toy, corrections=tuple(listed), goal=tuple(map(int, states[rng.integers(60)])))
-    start, goal = toy.ends()
     bodies = find_bodies(states, begins, begins + 1)
     graph = nx.DiGraph((tuple(map(int, states[i])), tuple(map(int, states[i + 1]))) for i in begins)
     for shortest, longest in ((1, 7), (4, 4)):
