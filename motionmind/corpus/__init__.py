@@ -1,1 +1,1 @@
-"""A corpus: clips of movement with their provenance, in memory and on disk."""
+"""Corpora: clips of movement with their provenance, gathered from recordings, in memory and on disk."""

@@ -1,4 +1,4 @@
-"""Where the data that comes with MotionMind lives."""
+"""Locates the data bundled with MotionMind."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ FOLDERS = ("corpora", "discretization")
 
 
 def bundled(folder: str) -> Path:
-    """The bundled folder called `folder`, "corpora" or "discretization".
+    """Return the path of a bundled folder, "corpora" or "discretization".
 
-    A wheel carries both inside the package, under `_bundled`; a checkout, and an editable install of one, has them
-    beside the package. Nothing else in MotionMind knows this. CorpusError where neither place has the folder.
+    A wheel holds both inside the package, under `_bundled`; a checkout, or an editable install, has them beside the
+    package. Only this function knows that.
+
+    Raises:
+        CorpusError: the name is unknown, or the folder is in neither place.
     """
     if folder not in FOLDERS:
         raise CorpusError(f"no bundled folder {folder!r}; there are {' and '.join(FOLDERS)}")

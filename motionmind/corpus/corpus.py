@@ -1,4 +1,4 @@
-"""A corpus in memory: clips of postures on one skeleton, one after another, with where they come from."""
+"""A corpus in memory: consecutive clips of postures on one skeleton, with their provenance."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 
 Facing = Literal["free", "stage"]
 
-FACING = "facing"  # the chain of the body's turn about the vertical
-DEAREST = 100.0  # nats a move backwards; a count of exp(-100) is one that no search will ever pay
+FACING = "facing"  # the joint chain of the body's turn about the vertical
+MAX_PRICE = 100.0  # nats per move backwards; no search will use a count of exp(-100)
 
 
 @dataclass(frozen=True)
@@ -29,14 +29,14 @@ class Clip:
     """One unbroken stretch of movement: postures `start` to `stop - 1` of the corpus.
 
     Attributes:
-        name: of the recording, or of a part of it.
-        start: its first posture.
-        stop: the one after its last.
-        about: a line on what it is.
-        corpus: the corpus that it was taken from; "" for this corpus itself.
-        weight: what each of its postures and moves counts; the heaviest clip's count 1.
+        name: the recording's name, or that of a part of it.
+        start: index of its first posture.
+        stop: index after its last posture.
+        about: a one-line description.
+        corpus: the corpus that it was taken from; "" for this one.
+        weight: count of each of its postures and moves; the heaviest clip has 1.
         mirrored: whether left and right are exchanged.
-        reverse: the price in nats a move at which it is learned backwards too; None where it is not.
+        reverse: the price, in nats per move, of learning it backwards too; None if it is not.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Clip:
 
     @property
     def label(self) -> str:
-        """The name, with where it comes from and whether it is mirrored: "ballet: jump (mirrored)"."""
+        """The name with its corpus and whether it is mirrored: "ballet: jump (mirrored)"."""
         return f"{self.corpus}: " * bool(self.corpus) + self.name + " (mirrored)" * self.mirrored
 
     @property
     def reverse_weight(self) -> float:
-        """What each of its moves counts backwards: 0 where none does."""
+        """Count of each of its moves backwards; 0 if it is not learned backwards."""
         return 0.0 if self.reverse is None else self.weight * math.exp(-self.reverse)
 
 
@@ -67,10 +67,10 @@ class Moves:
     """M moves between postures of a corpus.
 
     Attributes:
-        begins: the posture that each leads from [M].
-        ends: the posture that it leads to [M]: the next one, or, where a clip is learned backwards, the one before.
-        seconds: how long it takes [M].
-        weights: what it counts [M].
+        begins: index of the posture that each leads from [M].
+        ends: index of the posture that it leads to [M]: the next one, or the one before for a move backwards.
+        seconds: durations [M].
+        weights: counts [M].
     """
 
     begins: Ints
@@ -81,7 +81,7 @@ class Moves:
 
 @dataclass(frozen=True)
 class JointFlip:
-    """A joint that turns by `degrees` from one frame of a recording to the next, faster than a body can."""
+    """A fault of a recording: a joint turns by `degrees` up to `frame` from the one before, faster than a body can."""
 
     clip: str
     joint: str
@@ -94,22 +94,22 @@ class Corpus:
     """Movement to learn from.
 
     Attributes:
-        name: what the corpus is called.
-        skeleton: the body; of several performers, the first one's proportions.
-        clips: where each clip lies.
+        name: the corpus's name.
+        skeleton: the body; with the first performer's proportions if there are several.
+        clips: the clips, in order and without gaps.
         rotations: local rotations of all postures [N, J, 4].
         root: positions of the root joint [N, 3], metres.
         times: seconds in the clip's own recording [N], increasing within a clip.
-        detail: what the postures leave out of the recording [N, K, J, 3]: the rotation vectors, radians, by which it
-            departs from the spline through its clip's postures at K moments even in time between each and the next.
-        facing: "stage" where the root's full orientation is its state, "free" where its turn about the vertical is
-            taken out of it and is a chain of its own.
-        rate: postures a second, None where they are keyframes with their own times.
-        title: a line on what it is.
+        detail: the recording's departures from the spline through its clip's postures [N, K, J, 3]: rotation vectors,
+            radians, at K evenly spaced times between each posture and the next.
+        facing: "stage" if the root's full orientation is its state; "free" if its turn about the vertical is removed
+            from it and is a joint chain of its own.
+        rate: postures per second; None if they are keyframes with their own times.
+        title: a one-line description.
         author: who made it.
         source: where it comes from.
-        licence: under which it may be used.
-        faults: of the corpus's own recordings.
+        licence: the licence for its use.
+        faults: joint flips in the corpus's own recordings.
     """
 
     name: str
@@ -143,10 +143,10 @@ class Corpus:
         if [0, *(stop for _, stop in bounds)] != [*(start for start, _ in bounds), count]:
             raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {count}")
         for clip in self.clips:
-            if not (0.0 < clip.weight < math.inf and (clip.reverse is None or 0.0 <= clip.reverse <= DEAREST)):
+            if not (0.0 < clip.weight < math.inf and (clip.reverse is None or 0.0 <= clip.reverse <= MAX_PRICE)):
                 raise CorpusError(
                     f"corpus {self.name!r}: {clip.label} weighs {clip.weight} and costs {clip.reverse} nats a move "
-                    f"backwards; a weight must be above 0, a price from 0 to {DEAREST:g}"
+                    f"backwards; a weight must be above 0, a price from 0 to {MAX_PRICE:g}"
                 )
         if self.facing not in ("free", "stage"):
             raise CorpusError(f"corpus {self.name!r}: facing must be 'free' or 'stage', not {self.facing!r}")
@@ -158,8 +158,7 @@ class Corpus:
 
     @cached_property
     def moves(self) -> Moves:
-        """All moves from a posture to the next one in the same clip; then, of clips that are learned backwards too,
-        those to the one before."""
+        """All moves from a posture to the next in its clip; then, for clips learned backwards, to the one before."""
         forward = _ranges((clip.start, clip.stop - 1) for clip in self.clips)
         backward = _ranges((clip.start, clip.stop - 1) for clip in self.clips if clip.reverse is not None)
         begins, ends = np.concatenate([forward, backward + 1]), np.concatenate([forward + 1, backward])
@@ -169,32 +168,32 @@ class Corpus:
 
     @property
     def begins(self) -> Ints:
-        """Postures from which the moves lead [M]."""
+        """Indices of the postures that the moves lead from [M]."""
         return self.moves.begins
 
     @property
     def seconds(self) -> Floats:
-        """Durations of the moves [M]."""
+        """Durations of the moves [M], seconds."""
         return self.moves.seconds
 
     @cached_property
     def weights(self) -> Floats:
-        """What each posture counts [N]. To see a clip backwards too says nothing new of how the body stands in it."""
+        """Counts of the postures [N]. A clip learned backwards shows the same postures, so they count once."""
         return np.array([clip.weight for clip in self.clips])[self._clip_of]
 
     @cached_property
     def chains(self) -> tuple[str, ...]:
-        """What moves on its own [L]: the joints, then the facing where it is free."""
+        """Names of the joint chains [L]: the joints, then the facing if it is free."""
         return (*self.skeleton.names, FACING) if self.facing == "free" else self.skeleton.names
 
     @cached_property
     def chain_parents(self) -> Ints:
-        """Parent chain of each chain [L], -1 for the root and the facing."""
+        """Index of each joint chain's parent [L], -1 for the root and the facing."""
         free = (-1,) if self.facing == "free" else ()
         return np.array((*self.skeleton.parents, *free), dtype=np.int64)
 
     def to_chains(self, rotations: Floats) -> Floats:
-        """Orientations of the chains [..., L, 4] of postures with local rotations [..., J, 4]."""
+        """Convert postures' local rotations [..., J, 4] to orientations of the joint chains [..., L, 4]."""
         if self.facing == "stage":
             return rotations
         turn = rot.about_vertical(rot.heading(rotations[..., 0, :]))
@@ -202,7 +201,7 @@ class Corpus:
         return np.concatenate([tilt[..., None, :], rotations[..., 1:, :], turn[..., None, :]], axis=-2)
 
     def from_chains(self, chains: Floats) -> Floats:
-        """Local rotations [..., J, 4] from orientations of the chains [..., L, 4]; the inverse of `to_chains`."""
+        """Convert orientations of the joint chains [..., L, 4] to local rotations [..., J, 4]; inverts `to_chains`."""
         if self.facing == "stage":
             return chains
         pelvis = rot.mul(chains[..., -1, :], chains[..., 0, :])
@@ -213,21 +212,21 @@ class Corpus:
         return np.repeat(np.arange(len(self.clips), dtype=np.int32), [clip.stop - clip.start for clip in self.clips])
 
     def where(self, posture: int) -> tuple[str, int]:
-        """The clip that a posture is in and its number there."""
+        """Return the name of a posture's clip, and the posture's number there, from 0."""
         clip = self.clip_of(posture)
         return clip.name, posture - clip.start
 
     def clip_of(self, posture: int) -> Clip:
-        """The clip that a posture is in."""
+        """Return the clip that a posture is in."""
         return self.clips[int(self._clip_of[posture])]
 
     def motion(self, clip: Clip) -> Motion:
-        """One of the corpus's clips as a motion: its postures."""
+        """Return a clip's N postures as a motion."""
         here = slice(clip.start, clip.stop)
         return Motion(self.skeleton, self.rotations[here], self.root[here], self.times[here], clip.name)
 
     def recording(self, clip: Clip) -> Motion:
-        """One of the corpus's clips with the detail between its postures; where there is none, its postures."""
+        """Return a clip as a motion of its N postures and, if the corpus keeps detail, K frames between each two."""
         postures, between = self.motion(clip), self.detail.shape[1]
         if between == 0 or len(clip) == 1:
             return postures
@@ -243,10 +242,11 @@ class Corpus:
 
 
 def subdivide_times(times: Floats, between: int) -> Floats:
-    """Times [N] with so many more between each and the next, even in time [(N - 1) (between + 1) + 1]."""
+    """Insert `between` evenly spaced times between each of `times` [N] and the next: [(N - 1) (between + 1) + 1]."""
     share = np.arange(between + 1) / (between + 1)
     return np.append((times[:-1, None] + share * np.diff(times)[:, None]).ravel(), times[-1])
 
 
 def _ranges(bounds: Iterable[tuple[int, int]]) -> Ints:
+    """Concatenate the ranges from each start up to its stop."""
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in bounds)]).astype(np.int64)

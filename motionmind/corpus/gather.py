@@ -1,4 +1,4 @@
-"""From recordings, and from other corpora, to a corpus: faults found, postures made even in time, clips mirrored."""
+"""Gathers recordings and other corpora into a corpus: cuts them at faults, resamples them, mirrors them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import DEAREST, Clip, Corpus, Facing, JointFlip, subdivide_times
+from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, subdivide_times
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
@@ -23,13 +23,13 @@ Flips = Literal["drop", "keep", "split"]
 FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
-FINE = 30.0  # moments a second at which it is kept what lies between postures
-FAULT_DEGREES = 30.0  # a joint that is so far off between two postures was not recorded well
-_COARSE = 20.0  # frames a second; a recording of fewer has nothing to keep
+DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
+FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
+_COARSE = 20.0  # frames per second; a slower recording has no detail to keep
 
 
 class Gathering(TypedDict, total=False):
-    """Options of `gather`, for those who hand them on."""
+    """Options of `gather`, for functions that pass them on."""
 
     rate: float | None
     skip: int
@@ -46,10 +46,16 @@ class Gathering(TypedDict, total=False):
 
 
 def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[JointFlip, ...]:
-    """Joints that turn by more than `degrees` from one frame to the next, and faster than 3,000 degrees a second.
+    """Find joints that turn by more than `degrees` between consecutive frames, and faster than 3,000 degrees a second.
 
-    The second condition spares keyframes and slow cameras, whose frames lie far apart, and quick throws and kicks. A
-    fault's frame is the first one after the jump.
+    The second condition spares keyframes and slow cameras, whose frames are far apart, and quick throws and kicks.
+
+    Args:
+        motion: the recording.
+        degrees: the largest credible turn between two frames.
+
+    Returns:
+        The flips in order of time, each with the first frame after it.
     """
     turned = np.degrees(rot.angle(motion.rotations[:-1], motion.rotations[1:]))
     speed = turned / np.diff(motion.times)[:, None]
@@ -77,38 +83,41 @@ def gather(
     source: str = "",
     licence: str = "",
 ) -> Corpus:
-    """A corpus of `motions`, and of the corpora to `mix` with them, all on the same joints.
+    """Gather `motions`, and the corpora to `mix` with them, into a corpus; all are on the same joints.
 
     Args:
-        name: of the corpus.
-        motions: the recordings, named; one of a name that is taken is numbered.
-        rate: postures a second; None keeps every frame with its own time.
+        name: the corpus's name.
+        motions: the recordings, named; repeated names are numbered.
+        rate: postures per second; None keeps every frame with its own time.
         skip: frames to drop at each recording's start, such as an added T-pose.
-        facing: "free" takes the turn about the vertical out of the root's state, to be a chain of its own; "stage"
-            leaves it there, so that what faces the wall is another state than what faces the public.
-        flips: what becomes of a recording with faults (`find_flips`): `split` cuts it there, so that no jump is
-            learned, `keep` takes it as it is, `drop` leaves it out.
-        flip_degrees: what counts as one, in one frame.
-        mirror: whether to learn from all clips with left and right exchanged, too.
-        reverse: the price, nats a move, at which to learn from all clips played backwards, too: there each move counts
-            exp(-price). None leaves it with what is so in a corpus that is mixed in.
-        mix: other corpora, each with what its postures and moves count there where those of `motions` count 1. Only
-            the ratios matter: the heaviest is made 1. Their clips are taken as they are, and made even in time if
-            `rate` says so; `skip` and `flips` are for the recordings.
-        about: a line on each clip, by its name.
-        title: a line on what the corpus is.
+        facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
+            "stage" leaves it there, and facing the wall is then another state than facing the audience.
+        flips: treatment of a recording with flips (`find_flips`): `split` cuts it there, and no flip is learned, `keep`
+            takes it unchanged, `drop` leaves it out.
+        flip_degrees: the turn in one frame that counts as a flip.
+        mirror: whether to learn from the mirror images of all clips, too.
+        reverse: the price, in nats per move, of learning from all clips backwards, too: there each move counts
+            exp(-price). None keeps the prices of corpora mixed in, and adds no others.
+        mix: other corpora, each with the count of its postures and moves relative to those of `motions`, which have 1.
+            Only ratios matter: the largest becomes 1. Their clips are taken unchanged, or resampled at `rate`; `skip`
+            and `flips` apply to the recordings only.
+        about: one-line descriptions of clips, by name.
+        title: a one-line description of the corpus.
         author: who made it.
         source: where it comes from.
-        licence: under which it may be used.
+        licence: the licence for its use.
+
+    Returns:
+        The corpus.
 
     Raises:
-        CorpusError: nothing is left to learn from, two recordings or corpora differ in their joints or cannot be
-            brought to one rate, or an option is out of its range.
+        CorpusError: nothing is left to learn from, recordings or corpora differ in their joints or cannot be brought to
+            one rate, or an option is out of range.
         SkeletonError: the body cannot be mirrored.
     """
-    _check(skip, flips, flip_degrees, reverse)
+    _check_options(skip, flips, flip_degrees, reverse)
     _check_mix(name, mix, rate)
-    recordings, faults, body = _recorded(motions, rate, skip, flips, flip_degrees)
+    recordings, faults, body = _cut_recordings(motions, rate, skip, flips, flip_degrees)
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
     pieces = [
@@ -120,37 +129,22 @@ def gather(
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
-        pieces += _taken(other, weight, rate)
+        pieces += _take_clips(other, weight, rate)
     if not pieces or body is None:
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
     if rate is None:
         rate = _common_rate(bool(recordings), mix)
     if mirror:
         pieces += _mirror_images(pieces)
-    lengths = np.cumsum([0, *(len(piece.postures) for piece in pieces)])
-    if lengths[-1] == len(pieces):
-        what = f" at {rate:g} postures a second" if rate else ""
-        raise CorpusError(f"corpus {name!r}: no recording holds two postures{what}, so there is no move to learn")
-    heaviest = max(piece.clip.weight for piece in pieces)
-    between = max(round(FINE / rate) - 1, 0) if rate else 0
-    clips = tuple(
-        replace(
-            piece.clip,
-            start=int(start),
-            stop=int(stop),
-            weight=piece.clip.weight / heaviest,
-            reverse=piece.clip.reverse if reverse is None else reverse,
-        )
-        for piece, start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
-    )
+    between = max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
     return Corpus(
         name,
         body,
-        clips,
+        _lay_out_clips(name, pieces, rate, reverse),
         np.concatenate([piece.postures.rotations for piece in pieces]),
         np.concatenate([piece.postures.root for piece in pieces]),
         np.concatenate([piece.postures.times for piece in pieces]),
-        np.concatenate([_left_out(piece.postures, piece.recording, between) for piece in pieces]),
+        np.concatenate([_detail(piece.postures, piece.recording, between) for piece in pieces]),
         facing,
         rate,
         title,
@@ -161,21 +155,23 @@ def gather(
     )
 
 
-# --- what is asked for ------------------------------------------------------------------------------------------------
+# --- options ----------------------------------------------------------------------------------------------------------
 
 
-def _check(skip: int, flips: Flips, flip_degrees: float, reverse: float | None) -> None:
+def _check_options(skip: int, flips: Flips, flip_degrees: float, reverse: float | None) -> None:
+    """Raise CorpusError if an option is out of range."""
     if skip < 0:
         raise CorpusError(f"the number of frames to skip must be at least 0, not {skip}")
     if flips not in get_args(Flips):
         raise CorpusError(f"flips must be one of {', '.join(get_args(Flips))}, not {flips!r}")
     if not 0.0 < flip_degrees <= 180.0:
         raise CorpusError(f"the angle of a flip must be above 0 and at most 180 degrees, not {flip_degrees}")
-    if reverse is not None and not 0.0 <= reverse <= DEAREST:
-        raise CorpusError(f"the price of a move backwards must be from 0 to {DEAREST:g} nats, not {reverse}")
+    if reverse is not None and not 0.0 <= reverse <= MAX_PRICE:
+        raise CorpusError(f"the price of a move backwards must be from 0 to {MAX_PRICE:g} nats, not {reverse}")
 
 
 def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | None) -> None:
+    """Raise CorpusError if a weight, a name or a rate rules a corpus out."""
     names = [other.name for other, _ in mix]
     for other, weight in mix:
         if not LIGHTEST <= weight <= HEAVIEST:
@@ -183,7 +179,7 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
                 f"the weight of corpus {other.name!r} must be from {LIGHTEST:g} to {HEAVIEST:g}, not {weight}"
             )
         if other.name == name:
-            raise CorpusError(f"corpus {name!r} cannot be mixed into itself; give what is built another name")
+            raise CorpusError(f"corpus {name!r} cannot be mixed into itself; give the new corpus another name")
         if names.count(other.name) > 1:
             raise CorpusError(f"two of the corpora to mix are called {other.name!r}")
         if rate is not None and other.rate is not None and rate > other.rate:
@@ -193,7 +189,7 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
 
 
 def _common_rate(recordings: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
-    """The rate of corpora that are mixed as they are, and of recordings of which every frame is taken."""
+    """Return the rate of corpora mixed unchanged and of recordings taken frame by frame; CorpusError if they differ."""
     found: dict[float | None, str] = {None: "the recordings"} if recordings else {}
     for mixed, _ in mix:
         found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
@@ -207,20 +203,41 @@ def _pace(rate: float | None) -> str:
     return "frame by frame" if rate is None else f"{rate:g} postures a second"
 
 
-# --- clips, which do not know yet where they lie ----------------------------------------------------------------------
+# --- clips without their place in the corpus --------------------------------------------------------------------------
 
 
 class _Piece(NamedTuple):
-    """A clip: its postures, the recording that they are from, and what else is known of it."""
+    """A clip: its postures, their recording, and its other attributes."""
 
     postures: Motion
     recording: Motion
     clip: Clip
 
 
-def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
-    """What postures leave out of a recording, as a corpus keeps it [N, between, J, 3]; none of the last posture, nor of
-    a joint in a move in which it jumps."""
+def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reverse: float | None) -> tuple[Clip, ...]:
+    """Place the clips one after the other, with the heaviest weight scaled to 1; CorpusError if they have no moves."""
+    lengths = np.cumsum([0, *(len(piece.postures) for piece in pieces)])
+    if lengths[-1] == len(pieces):
+        at_rate = f" at {rate:g} postures a second" if rate else ""
+        raise CorpusError(f"corpus {name!r}: no recording holds two postures{at_rate}, so there is no move to learn")
+    heaviest = max(piece.clip.weight for piece in pieces)
+    return tuple(
+        replace(
+            piece.clip,
+            start=int(start),
+            stop=int(stop),
+            weight=piece.clip.weight / heaviest,
+            reverse=piece.clip.reverse if reverse is None else reverse,
+        )
+        for piece, start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
+    )
+
+
+def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
+    """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
+
+    They are 0 after the last posture, and for a joint in a move in which it departs by more than `FAULT_DEGREES`.
+    """
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
     if between > 0 and count > 1 and recording.fps >= _COARSE:
@@ -233,11 +250,13 @@ def _left_out(postures: Motion, recording: Motion, between: int) -> NDArray[np.f
     return out
 
 
-def _recorded(
+def _cut_recordings(
     motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
 ) -> tuple[list[tuple[Motion, Motion]], list[JointFlip], Skeleton | None]:
-    """The recordings without what is skipped, cut at faults, with their postures even in time before them; the faults;
-    the first one's body."""
+    """Skip frames, and cut recordings at faults.
+
+    Return (postures at `rate`, recording) for each part, the faults, and the first recording's body.
+    """
     pieces: list[tuple[Motion, Motion]] = []
     faults: list[JointFlip] = []
     names: set[str] = set()
@@ -252,7 +271,7 @@ def _recorded(
             )
         if skip >= len(recording):
             raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
-        motion = replace(recording.slice(skip, len(recording)), name=_free(recording.name or "clip", names))
+        motion = replace(recording.slice(skip, len(recording)), name=_free_name(recording.name or "clip", names))
         names.add(motion.name)
         found = find_flips(motion, flip_degrees)
         faults += [JointFlip(f.clip, f.joint, f.frame + skip, f.degrees) for f in found]
@@ -260,12 +279,12 @@ def _recorded(
             continue
         cuts = sorted({f.frame for f in found}) if flips == "split" else []
         parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
-        pieces += _named([(part if rate is None else part.resample(rate), part) for part in parts], motion.name)
+        pieces += _number_parts([(part if rate is None else part.resample(rate), part) for part in parts], motion.name)
     return pieces, faults, first.skeleton if first else None
 
 
-def _taken(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
-    """The clips of another corpus, by which they go from then on, where each counts `weight` times as much."""
+def _take_clips(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
+    """Take the clips of another corpus, marked with its name, each counting `weight` times as much."""
     out = []
     for clip in other.clips:
         motion = other.motion(clip)
@@ -277,11 +296,11 @@ def _taken(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
 
 
 def _mirror_images(pieces: Sequence[_Piece]) -> list[_Piece]:
-    """The clips with left and right exchanged, but for those of which a corpus that is mixed in has the image."""
-    there = {(clip.corpus, clip.name) for _, _, clip in pieces if clip.mirrored}
+    """Mirror the clips, except those whose mirror image is already there, from a corpus mixed in."""
+    present = {(clip.corpus, clip.name) for _, _, clip in pieces if clip.mirrored}
     out = []
     for postures, recording, clip in pieces:
-        if (clip.corpus, clip.name) not in there:
+        if (clip.corpus, clip.name) not in present:
             try:
                 out.append(_Piece(mirrored(postures), mirrored(recording), replace(clip, mirrored=True)))
             except SkeletonError as error:
@@ -289,8 +308,8 @@ def _mirror_images(pieces: Sequence[_Piece]) -> list[_Piece]:
     return out
 
 
-def _named(parts: list[tuple[Motion, Motion]], name: str) -> list[tuple[Motion, Motion]]:
-    """Parts of a recording that was cut are numbered; a part of a single posture teaches no move and is left out."""
+def _number_parts(parts: list[tuple[Motion, Motion]], name: str) -> list[tuple[Motion, Motion]]:
+    """Number the parts of a recording that was cut, and drop those of a single posture, which have no move."""
     if len(parts) == 1:
         return parts
     return [
@@ -300,7 +319,7 @@ def _named(parts: list[tuple[Motion, Motion]], name: str) -> list[tuple[Motion, 
     ]
 
 
-def _free(name: str, taken: set[str]) -> str:
-    """The name, or "name (2)" and so on if it is taken."""
+def _free_name(name: str, taken: set[str]) -> str:
+    """Return the name, or "name (2)" and so on if it is taken."""
     numbered = (f"{name} ({i})" for i in count(2))
     return next(free for free in chain([name], numbered) if free not in taken)

@@ -1,4 +1,4 @@
-"""What manifests say: of corpora that people write, and of those that were built from movement."""
+"""Schemas of manifests, of corpora that people write and of corpora built from movement."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _Vector = tuple[float, float, float]
 
 
 class ClipFile(msgspec.Struct, frozen=True):
-    """A clip of a corpus that people write; `file` is beside the manifest."""
+    """A clip of a corpus that people write; `file` is relative to the manifest's folder."""
 
     name: str
     file: str
@@ -23,7 +23,7 @@ class ClipFile(msgspec.Struct, frozen=True):
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True):
-    """What all manifests say: of whom and what a corpus is; attributes as of Corpus."""
+    """Fields of every manifest: a corpus's content and origin; attributes as in Corpus."""
 
     name: str
     title: str
@@ -35,20 +35,20 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SourceManifest(Provenance, frozen=True, kw_only=True):
-    """A corpus as people write it: its scores and clips' files, and a discretization as `from_spec` reads it."""
+    """A corpus that people write: scores, or files of clips, and a discretization as `from_spec` reads it."""
 
     discretization: dict[str, Any]
     clips: list[ClipFile] = []
     scores: list[str] = []
 
     def __post_init__(self) -> None:
-        """A corpus has one or the other."""
+        """Check that there are clips or scores."""
         if not (self.clips or self.scores):
             raise ValueError("there is no key `clips` with a clip in it, nor `scores` with a score")
 
 
 class BodyEntry(msgspec.Struct, frozen=True):
-    """A skeleton; attributes as of Skeleton."""
+    """A skeleton; attributes as in Skeleton."""
 
     name: str
     names: tuple[str, ...]
@@ -58,7 +58,7 @@ class BodyEntry(msgspec.Struct, frozen=True):
 
 
 class SpaceEntry(msgspec.Struct, frozen=True):
-    """A state space without its centres; attributes as of StateSpace."""
+    """A state space without its centres; attributes as in StateSpace."""
 
     kind: str
     starts: list[int]
@@ -67,7 +67,7 @@ class SpaceEntry(msgspec.Struct, frozen=True):
 
 
 class BuiltManifest(Provenance, frozen=True, kw_only=True):
-    """What was learned from a corpus, but for its arrays."""
+    """A built corpus without its arrays; attributes as in Corpus."""
 
     skeleton: BodyEntry
     clips: tuple[Clip, ...]
@@ -76,7 +76,7 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:
-    """A manifest, read from `path`, as `schema`; FormatError names the key that is missing or wrong."""
+    """Convert a manifest, read from `path`, to `schema`; FormatError names the key that is missing or wrong."""
     try:
         return msgspec.convert(manifest, schema)
     except msgspec.ValidationError as error:

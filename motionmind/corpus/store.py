@@ -1,4 +1,4 @@
-"""Folders of arrays with a manifest: how a built corpus lies on disk, and where corpora are found."""
+"""Corpora on disk: folders of arrays with a manifest, and where to find them."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ LEARNED_BY = (
 
 
 def home(folder: str | os.PathLike[str] | None = None) -> Path:
-    """Where a user's corpora live: `folder`, else $MOTIONMIND_HOME, else the platform's data directory."""
+    """Return the folder of a user's data: `folder`, else $MOTIONMIND_HOME, else the platform's data directory."""
     chosen = folder or os.environ.get("MOTIONMIND_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("motionmind", appauthor=False))
 
 
 def known(folder: str | os.PathLike[str] | None = None) -> dict[str, Path]:
-    """All corpora by name: the bundled ones, and those under `home(folder)`; sorted."""
+    """Return the folders of all corpora by name, sorted: the bundled ones, and those under `home(folder)`."""
     found = {}
     for place in (bundled("corpora"), home(folder) / "corpora"):
         if place.is_dir():
@@ -47,18 +47,18 @@ def known(folder: str | os.PathLike[str] | None = None) -> dict[str, Path]:
 
 
 def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
-    """The folder of the corpus called `name`, or that is at the path `name`; CorpusError names the known ones."""
+    """Return the folder of the corpus with this name, or at this path; CorpusError names the known ones."""
     corpora = known(folder)
     if name in corpora:
         return corpora[name]
-    with suppress(OSError, ValueError):  # what cannot be a path at all: too long, with a zero byte
+    with suppress(OSError, ValueError):  # not a possible path: too long, or with a zero byte
         if name and (Path(name) / MANIFEST).is_file():
             return Path(name)
     raise CorpusError(f"no corpus {name!r}; there are {', '.join(corpora) or 'none'}")
 
 
 def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
-    """Where a corpus that a user builds goes; CorpusError for a name that is none, or a bundled corpus's."""
+    """Return the folder for a new corpus of a user; CorpusError if the name is invalid or a bundled corpus's."""
     if not re.fullmatch(r"\w[\w.-]{0,63}", name):
         raise CorpusError(f"{name!r:.80} cannot be a corpus's name: use letters, digits, -, _ and . (64 at most)")
     if (bundled("corpora") / name / MANIFEST).is_file():
@@ -67,7 +67,7 @@ def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a corpus folder; FormatError where it is none, or of a version that is not known."""
+    """Read the manifest of a corpus's folder; FormatError if it is invalid or of an unknown version."""
     path = folder / MANIFEST
     try:
         manifest = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
@@ -83,9 +83,17 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write a folder with its manifest and one .npy file an array; an older one is replaced when all is there.
+    """Write a corpus's folder: its manifest, and one .npy file per array.
 
-    CorpusError where it cannot be written, or where the folder holds anything that this did not write.
+    An existing corpus is replaced once the new one is complete.
+
+    Args:
+        folder: the corpus's folder.
+        manifest: plain values for JSON; format, version and the arrays' shapes are added.
+        arrays: by name.
+
+    Raises:
+        CorpusError: the folder cannot be written, or holds files that are not a corpus's.
     """
     aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     try:
@@ -108,7 +116,7 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
 
 
 def _swap(new: Path, folder: Path) -> None:
-    """Put a new folder in the place of an older one, which comes back if that fails."""
+    """Replace a folder by a new one; restore the old one if that fails."""
     if not folder.exists():
         new.rename(folder)
         return
@@ -123,9 +131,17 @@ def _swap(new: Path, folder: Path) -> None:
 
 
 def load(folder: Path, manifest: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """The manifest and the arrays of a folder, memory-mapped; FormatError where any is not as it was saved.
+    """Load a corpus's folder.
 
-    The `manifest` is read if it has not been.
+    Args:
+        folder: the corpus's folder.
+        manifest: its manifest if it has been read; None reads it.
+
+    Returns:
+        The manifest, and the arrays by name, memory-mapped.
+
+    Raises:
+        FormatError: the manifest or an array is missing, damaged, or not the one that was saved.
     """
     manifest = read_manifest(folder) if manifest is None else manifest
     shapes = manifest.get("arrays")
@@ -135,9 +151,9 @@ def load(folder: Path, manifest: dict[str, Any] | None = None) -> tuple[dict[str
     for name, shape in shapes.items():
         path = folder / f"{name}.npy"
         try:
-            # A plain view: still mapped, without the subclass that makes every slice slower.
+            # A plain view: still mapped, but without the subclass, which slows every slice.
             arrays[name] = np.asarray(np.lib.format.open_memmap(path, mode="r"))
-        except Exception as error:  # the header is Python, and a damaged one can raise whatever its parser does
+        except Exception as error:  # the header is Python; parsing a damaged one can raise anything
             raise FormatError(f"cannot be read as an array: {error}; build the corpus again", path=path) from error
         if [arrays[name].dtype.str, *arrays[name].shape] != shape:
             raise FormatError("is not the array that was saved; build the corpus again", path=path)
@@ -167,5 +183,5 @@ def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]
 
 
 def cache() -> Path:
-    """Where corpora built from bundled sources are kept."""
+    """Return the folder that caches corpora built from bundled sources."""
     return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / "corpora"

@@ -1,4 +1,4 @@
-"""Names what a format cannot hold, so that no loss is silent."""
+"""Names what a format cannot hold: no loss is silent."""
 
 from __future__ import annotations
 

@@ -270,7 +270,7 @@ def _is_tempo(text: str) -> bool:
 
 
 def _is_hold(text: str) -> bool:
-    """Return whether a line has only the first cell, so that the posture is held."""
+    """Return whether a line has only the first cell: the posture is held."""
     first = text.split(maxsplit=1)[0]
     return first == "start" or bool(re.fullmatch(r"[\d./]+", first))
 
