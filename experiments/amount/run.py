@@ -41,7 +41,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, name: str, clips: int, mirror: bool, order: int, count: int) -> list[Row]:
-    """A corpus of some clips, in an order drawn at random, asked for tweens between postures of all of them."""
+    """Learn from some clips, in random order, and make tweens between postures of all of them."""
     whole = corpus(data, name)
     drawn = np.random.default_rng(order).permutation(len(whole.clips))[:clips]
     small = part(whole, drawn, mirror)
@@ -107,7 +107,7 @@ def tell(rows: list[Row]) -> str:
 
 
 def means(rows: list[Row]) -> list[Row]:
-    """The mean over the orders in which clips were added."""
+    """Return the mean over the orders in which clips were added."""
     groups: dict[tuple[str, int, bool], list[Row]] = {}
     for row in rows:
         groups.setdefault((row["corpus"], row["clips"], row["mirror"]), []).append(row)

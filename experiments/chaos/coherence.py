@@ -1,4 +1,4 @@
-"""How long stretches of the piece survive a chaotic reordering: Lorenz against Rossler, and both against baselines.
+"""Lengths of the stretches of a piece that survive chaotic reordering: Lorenz, Rossler and baselines.
 
 python experiments/chaos/coherence.py [--nudges 400] [--seed 0] [--csv runs.csv] [--plot runs.svg]
 
@@ -7,9 +7,9 @@ of a piece's postures matters. Each of the nudges goes with a start of its own, 
 two variations share their sites; its direction is random, in standard deviations of the attractor's coordinates, its
 length 0.001 to 0.1 of them (uniform in the logarithm), and the same for both flows: that makes the pairs.
 
-A flow has no frame rate: how far apart in time its points are taken is a choice, and runs depend on it. So the flows
-are compared at three: with one step for both, with equally many points a turn, and with neighbours parting equally
-between points; and along a range of both measures.
+A flow has no frame rate: the time between its points is a choice, and runs depend on it. So the flows are compared in
+three ways: with one step for both, with equally many points a turn, and with equal divergence of neighbours between
+points; and along a range of the last two.
 """
 
 import argparse
@@ -49,7 +49,7 @@ CURVE_PIECE, CURVE_NUDGES = "medley", 200
 
 @dataclass(frozen=True)
 class Known:
-    """A flow with what is to be known of its attractor: its exponent, the time of a turn, its spread, starts on it."""
+    """A flow with properties of its attractor: the exponent, the time of a turn, the spread, and starts on it."""
 
     flow: Flow
     exponent: float
@@ -67,12 +67,12 @@ class Known:
         return cls(flow, largest_exponent(flow), len(z) * flow.step / float(turns), points.std(axis=0), starts)
 
     def sampling(self, interval: float) -> tuple[int, float]:
-        """Steps between points that are `interval` apart, and their length: no longer than the flow's own."""
+        """Return the number of steps between points `interval` apart, and the step, no longer than the flow's own."""
         every = max(EVERY, int(np.ceil(interval / self.flow.step)))
         return every, interval / every
 
     def varied(self, index: int, count: int, nudge: Floats, interval: float, rng: Generator) -> Row:
-        """Runs of the variation from the start of this index, of Dabby's mapping along the same, and of a shuffle."""
+        """Return mean runs of the variation from one start, of Dabby's mapping along it, and of a shuffle."""
         every, step = self.sampling(interval)
         found = itinerary(
             self.flow,
@@ -125,14 +125,14 @@ def main() -> None:
 
 
 def drawn(count: int, rng: Generator) -> Floats:
-    """Nudges [count, 3] in standard deviations."""
+    """Draw nudges [count, 3], in standard deviations."""
     directions = rng.normal(size=(count, 3))
     sizes = 10.0 ** rng.uniform(-3.0, -1.0, count)
     return sizes[:, None] * directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def measured(flows: dict[str, Known], lengths: dict[str, int], nudges: Floats, rng: Generator) -> Iterator[Row]:
-    """A row for each piece, sampling, flow and nudge."""
+    """Return a row for each piece, sampling, flow and nudge."""
     equal_turns = {name: known.turn / POINTS_A_TURN for name, known in flows.items()}
     parting = flows["lorenz"].exponent * equal_turns["lorenz"]
     samplings = {
@@ -149,7 +149,7 @@ def measured(flows: dict[str, Known], lengths: dict[str, int], nudges: Floats, r
 
 
 def along(flows: dict[str, Known], count: int, nudges: Floats, rng: Generator) -> Iterator[Row]:
-    """A row for each flow, interval of RANGE and nudge."""
+    """Return a row for each flow, interval of RANGE and nudge."""
     for known in flows.values():
         for nats in RANGE:
             for n, nudge in enumerate(nudges):
@@ -191,14 +191,14 @@ def report(rows: list[Row], lengths: dict[str, int], rng: Generator) -> None:
 
 
 def flipped(differences: Floats, rng: Generator) -> float:
-    """The two-sided p of a paired permutation test: how often random signs give as large a mean."""
+    """Return the two-sided p of a paired permutation test: how often random signs give as large a mean."""
     signs = rng.choice((-1.0, 1.0), size=(FLIPS, len(differences)))
     met = np.abs(signs @ differences) >= np.abs(differences.sum()) * (1.0 - 1e-12)
     return float((met.sum() + 1) / (FLIPS + 1))
 
 
 def holm(values: list[float]) -> Floats:
-    """p corrected for as many tests: Holm, Scand. J. Statistics 6:65 (1979)."""
+    """Correct p values for multiple tests by the method of Holm, Scand. J. Statistics 6:65 (1979)."""
     order = np.argsort(values)
     factors = len(values) - np.arange(len(values))
     corrected = np.empty(len(values))
@@ -207,7 +207,7 @@ def holm(values: list[float]) -> Floats:
 
 
 def bootstrapped(differences: Floats, rng: Generator) -> tuple[float, float, float]:
-    """The ratio of geometric means with the ends of its 95 % interval, by percentiles."""
+    """Return the ratio of geometric means and its 95 % bootstrap interval, by percentiles."""
     drawn = rng.integers(len(differences), size=(BOOTSTRAPS, len(differences)))
     low, high = np.percentile(differences[drawn].mean(axis=1), [2.5, 97.5])
     return float(np.exp(differences.mean())), float(np.exp(low)), float(np.exp(high))
@@ -221,7 +221,7 @@ def report_curve(curve: list[Row]) -> None:
 
 
 def means(curve: list[Row], flow: str, what: str) -> list[tuple[float, float, float]]:
-    """Nats a point, points a turn and the geometric mean of `what`, for each interval."""
+    """Return nats a point, points a turn and the geometric mean of `what`, for each interval."""
     out = []
     mine = [r for r in curve if r["flow"] == flow]
     for interval in dict.fromkeys(r["interval"] for r in mine):
@@ -238,7 +238,7 @@ QUARTILES = ("25 %", "50 %", "75 %")
 
 
 def summary(rows: list[Row]) -> Iterator[list[object]]:
-    """Quartiles of each measure, for each piece, sampling and flow, of so many variations that have it."""
+    """Tabulate quartiles of each measure for each piece, sampling and flow, with the number of variations."""
     groups: dict[tuple[object, ...], list[Row]] = {}
     for one in rows:
         key = (one["piece"], one["sampling"], one["flow"], *(f"{one[what]:.4g}" for what in ALIKE))
@@ -261,7 +261,7 @@ AXES = (
 
 
 def drawing(curve: list[Row], count: int) -> str:
-    """An SVG: mean runs over what neighbours part by between points, and over points a turn; both axes logarithmic."""
+    """Plot mean runs over the divergence between points, and over points a turn, as SVG with logarithmic axes."""
 
     def at(panel: int, value: float, run: float) -> tuple[float, float]:
         low, high = AXES[panel][0]

@@ -1,4 +1,4 @@
-"""How long reordering takes: the k-d tree against comparing all, the whole procedure, and memory.
+"""Time and memory of reordering: the k-d tree against brute force, and the whole procedure.
 
 python experiments/chaos/reorder.py [--repeats 7]
 
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def compare(name: str, repeats: int) -> None:
-    """Reordering alone, with the tree and without."""
+    """Time reordering alone, with the tree and by brute force."""
     print(f"\n{name}: reordering alone, ms (the papers: {PAPERS})")
     found = []
     for count in COMPARED:
@@ -71,7 +71,7 @@ def compare(name: str, repeats: int) -> None:
 
 @jit
 def compare_all(sites: Floats, points: Floats) -> Ints:
-    """The nearest site of each point, by looking at all."""
+    """Return the nearest site of each point by brute force."""
     out = np.empty(len(points), np.int64)
     for n in range(len(points)):
         least = np.inf
@@ -85,7 +85,7 @@ def compare_all(sites: Floats, points: Floats) -> Ints:
 
 
 def measure_memory(count: int) -> None:
-    """What the process has grown by at most."""
+    """Return the peak growth of the process's memory."""
     itinerary(FLOWS["lorenz"], 10, nudge=NUDGE)
     before = peak()
     itinerary(FLOWS["lorenz"], count, nudge=NUDGE)
@@ -94,12 +94,12 @@ def measure_memory(count: int) -> None:
 
 
 def peak() -> int:
-    """The most memory that this process held, bytes."""
+    """Return the peak memory of this process, bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def least(work: Callable[[], object], repeats: int) -> float:
-    """The least time in seconds that `work` took."""
+    """Return the shortest time that `work` took, seconds."""
     times = []
     for _ in range(repeats):
         began = perf_counter()

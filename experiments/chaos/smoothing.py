@@ -1,4 +1,4 @@
-"""How many transitions of chaotic variations are abrupt, and how many of these the engine smooths, by which movement.
+"""Count the abrupt transitions of chaotic variations, and those that the engine smooths.
 
 python experiments/chaos/smoothing.py --csv experiments/chaos/smoothing.csv
 """
@@ -29,54 +29,54 @@ LEAST = 200  # postures of a variation, or as many as the piece has if it has mo
 
 
 def piece_of(engine: Engine, clip: str) -> Piece:
-    """A clip of a corpus; its postures may face anywhere where the corpus's may."""
+    """Return a clip of a corpus as a piece, with the corpus's facing."""
     found = next(one for one in engine.corpus.clips if one.name == clip)
     return Piece.of(engine.corpus.motion(found), facing=engine.corpus.facing)
 
 
 def measure(variations: list[Variation]) -> dict[str, object]:
-    """Abrupt transitions before and after in 100 moves, the share that was solved, and what by."""
+    """Count abrupt transitions per 100 moves before and after smoothing, the share solved, and the insertions."""
     seams = [seam for variation in variations for seam in variation.seams]
-    joins = [seam.transition for seam in seams if seam.transition and seam.transition.is_abrupt]
+    abrupt = [seam.transition for seam in seams if seam.transition and seam.transition.is_abrupt]
     found = [seam.insertion for seam in seams if seam.insertion]
     moves = sum(len(variation.postures) - 1 for variation in variations)
-    after = moves + sum(way.moves - 1 for way in found)
-    lengths = np.array([way.moves for way in found] or [0])
+    after = moves + sum(one.moves - 1 for one in found)
+    lengths = np.array([one.moves for one in found] or [0])
     return {
         "moves": moves,
         "seams": len(seams),
-        "abrupt": len(joins),
-        "of_seams": round(len(joins) / max(1, len(seams)), 3),
-        "per_100": round(100 * len(joins) / moves, 1),
+        "abrupt": len(abrupt),
+        "of_seams": round(len(abrupt) / max(1, len(seams)), 3),
+        "per_100": round(100 * len(abrupt) / moves, 1),
         "solved": len(found),
-        "share": round(len(found) / max(1, len(joins)), 3),
-        "after_per_100": round(100 * (len(joins) - len(found)) / after, 1),
+        "share": round(len(found) / max(1, len(abrupt)), 3),
+        "after_per_100": round(100 * (len(abrupt) - len(found)) / after, 1),
         "least": int(lengths.min()),
         "median": float(np.median(lengths)),
         "most": int(lengths.max()),
-        "bridged": sum(bool(way.bridges) for way in found),
-        "bridges": sum(len(way.bridges) for way in found),
-        "joint_moves": sum(way.moves * way.path.shape[1] for way in found),
-        "proven": sum(way.status == "optimal" for way in found),
+        "bridged": sum(bool(one.bridges) for one in found),
+        "bridges": sum(len(one.bridges) for one in found),
+        "joint_moves": sum(one.moves * one.path.shape[1] for one in found),
+        "proven": sum(one.status == "optimal" for one in found),
     }
 
 
 def shuffled(variations: list[Variation], engine: Engine) -> float | None:
-    """Share of the seams that are abrupt where the piece is shuffled in chunks as long as each variation's own runs.
+    """Return the abrupt share of the seams of shuffles, in chunks as long as each variation's own runs.
 
-    None where the variations do not leave the piece within as many postures as it has.
+    None if the variations do not leave the piece's order within as many postures as it has.
     """
     rng, found = np.random.default_rng(SEED), []
     for variation in variations:
         lengths = runs(variation.postures[: len(variation.piece)])
         for order in (chunk_shuffled(lengths, rng) for _ in range(SHUFFLES)):
             pairs = [(int(i), int(k)) for i, k in pairwise(order) if k != i + 1]
-            found += [join.is_abrupt for join in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
+            found += [one.is_abrupt for one in judge_transitions(variation.piece, pairs, engine, posturewise=False)]
     return round(float(np.mean(found)), 3) if found else None
 
 
 def recorded(folder: Path) -> tuple[Engine, list[Piece]]:
-    """What was learned from a folder of recordings, and each of them as a piece."""
+    """Learn from a folder of recordings, and return the engine and each recording as a piece."""
     clips = [replace(own_skeleton(read_motion(path)), name=path.stem) for path in sorted(folder.glob("*.bvh"))]
     clips = [clip.slice(1, len(clip)) for clip in clips]  # without the added T-pose
     return Engine.fit(clips, name=folder.name, rate=RATE), [Piece.of(clip, RATE) for clip in clips]
@@ -88,16 +88,16 @@ def main() -> None:
     parser.add_argument("--recorded", type=Path, help="a folder of BVH files, smoothed by what was learned from them")
     arguments = parser.parse_args()
     engines = {name: Engine.load(name) for name, _ in PIECES}
-    asked = [
+    questions = [
         (clip, [piece_of(engines[corpus], clip)], engines[by], NUDGES)
         for corpus, clip in PIECES
         for by in dict.fromkeys((corpus, "ballet"))
     ]
     if arguments.recorded:
         engine, pieces = recorded(arguments.recorded)
-        asked.append((f"{len(pieces)} recordings", pieces, engine, NUDGES[:1]))
+        questions.append((f"{len(pieces)} recordings", pieces, engine, NUDGES[:1]))
     rows = []
-    for name, pieces, engine, nudges in asked:
+    for name, pieces, engine, nudges in questions:
         for flow, (rule, options) in product(FLOWS, RULES.items()):
             began = perf_counter()
             variations = [

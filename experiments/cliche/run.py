@@ -31,7 +31,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, corpus: str, kind: str, novelty: float, count: int, seed: int) -> list[Row]:
-    """Tweens between the same pairs of postures of a corpus, all with one novelty."""
+    """Make tweens between the same pairs of postures of a corpus, all with one novelty."""
     found = engine(data, corpus, kind)
     habits = learn_habits(found.grammar)
     moves, spread, bridged, unattested = [], [], [], []

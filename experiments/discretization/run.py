@@ -34,7 +34,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, name: str, kind: str, degrees: float, count: int, seed: int) -> list[Row]:
-    """One discretization of one corpus: sizes, errors on clips that were learned from and that were not, and tweens."""
+    """Measure one discretization of one corpus: sizes, errors on training and held-out clips, and tweens."""
     whole = corpus(data, name)
     found = engine(data, name, kind, degrees)
     apart = np.arange(0, len(whole.clips), 5)
@@ -76,10 +76,10 @@ def work(data: str | None, name: str, kind: str, degrees: float, count: int, see
 
 
 def errors(found: Engine, movement: Corpus, seed: int) -> dict[str, float]:
-    """What is lost if each of some postures of a corpus is replaced by what its states stand for.
+    """Measure the loss if postures of a corpus are replaced by the centres of their states.
 
-    The mean over joints of the angle, degrees; how far fingertips and toe tips go, the pelvis being where it was, cm;
-    and how many times as much as the movement itself the sequence of states jerks.
+    The loss is the mean angle over joints, degrees; the displacement of fingertips and toe tips, with the pelvis in
+    place, cm; and the jerk of the sequence of states as a multiple of the movement's own.
     """
     body = movement.skeleton
     joints = len(body)

@@ -37,8 +37,8 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, name: str, sequence: str, windows: int, seed: int) -> list[Row]:
-    """Tweens between postures of one sequence that lie 2 s apart, by what was learned from the others."""
-    found, who = without(data, name, sequence), judge(data, name)
+    """Make tweens between postures of one sequence 2 s apart, with what was learned from the other sequences."""
+    found, classifier = without(data, name, sequence), style_classifier(data, name)
     places = [
         (piece, start)
         for piece in movement(data, name, FRAMES)[sequence]
@@ -70,8 +70,8 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
                     "sequence": sequence,
                     "window": int(number),
                     "kind": kind,
-                    "taken": int(who.takes(rotations[:FRAMES], name, sequence)),
-                    "distance": who.distance(rotations[:FRAMES], name, sequence),
+                    "taken": int(classifier.takes(rotations[:FRAMES], name, sequence)),
+                    "distance": classifier.distance(rotations[:FRAMES], name, sequence),
                     "speed": angular_speed(rotations, FPS).mean(),
                     "legs_collide": legs.mean(),
                     "others_collide": others.mean(),
@@ -83,8 +83,8 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
 
 
 @lru_cache(maxsize=1)
-def judge(data: str | None, name: str) -> StyleClassifier:
-    """Who tells the corpus from others."""
+def style_classifier(data: str | None, name: str) -> StyleClassifier:
+    """Fit the classifier that tells the corpus from others."""
     names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
     return fit_style_classifier(
         {
@@ -99,8 +99,7 @@ def judge(data: str | None, name: str) -> StyleClassifier:
 
 
 def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Bools, Bools]:
-    """Whether the legs, or any two other parts that are apart when the body rests, reach into each other by more than
-    1 cm: two [T]."""
+    """Tell whether the legs, and whether any two other parts that are apart at rest, overlap by more than 1 cm [T]."""
     body = shape_of(skeleton)
     rest = _deepest(skeleton, np.tile(rot.IDENTITY, (1, len(skeleton), 1)), np.zeros((1, 3)))[0]
     parts = np.array(body.parts[: len(body.cones)])
@@ -112,7 +111,7 @@ def collides(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Bools
 
 
 def _deepest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
-    """How far each of the body's round cones reaches into each other one [T, N, N], metres; negative where apart."""
+    """Return how deep each pair of the body's round cones overlaps [T, N, N], metres; negative if apart."""
     cones, _ = shape_of(skeleton).solids(rotations, root)
     share = np.linspace(0.0, 1.0, POINTS)
     centres = cones.a[..., None, :] + share[:, None] * (cones.b - cones.a)[..., None, :]
@@ -126,7 +125,7 @@ def _deepest(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
 
 
 def off_balance(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
-    """How far the centre of mass is outside what the feet on the floor enclose, cm: the mean over frames with a foot
+    """Return how far the centre of mass is outside the support of the feet, cm: the mean over frames with a foot
     down. How far a point is outside a hull is the most, over directions, by which it is further than all corners."""
     mass = anatomy("human23").centre_of_mass(rotations, root)
     feet = np.array(find_feet(skeleton))
@@ -208,7 +207,7 @@ def _by_sequence(rows: list[Row], kind: str, key: str) -> dict[str, list[float]]
 
 
 def _difference(rows: list[Row], one: str, other: str, key: str) -> tuple[float, float, float]:
-    """The mean over windows of one kind less another, and its 95 % interval over sequences."""
+    """Return the mean difference over windows of one kind and another, and its 95 % interval over sequences."""
     mine, theirs = _by_sequence(rows, one, key), _by_sequence(rows, other, key)
     found = [np.subtract(mine[sequence], theirs[sequence]) for sequence in mine]
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""How sharp the classifier of style is: of held-out windows, SLERP and shuffles, what it takes for their corpus.
+"""Sharpness of the style classifier: the shares of held-out windows, SLERP and shuffles that it accepts.
 
 python experiments/net/sharpness.py [--data ../shared/data] [--seed 0]
 """

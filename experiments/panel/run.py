@@ -41,7 +41,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row]:
-    """Each of some abrupt transitions, joined under one rule."""
+    """Join some abrupt transitions under one rule, one row each."""
     found, pieces = material(data, by)
     own = usual(found)
     pairs = [(piece, pair) for piece in pieces for pair in leaps(len(piece))]
@@ -49,8 +49,8 @@ def work(data: str | None, by: str, rule: str, most: int, seed: int) -> list[Row
     out: list[Row] = []
     for number in order:
         piece, pair = pairs[number]
-        (join,) = judge_transitions(piece, [pair], found, posturewise=False)
-        if not join.is_abrupt:
+        (transition,) = judge_transitions(piece, [pair], found, posturewise=False)
+        if not transition.is_abrupt:
             continue
         row: Row = {
             "by": by,
@@ -94,7 +94,7 @@ def material(data: str | None, by: str) -> tuple[Engine, list[Piece]]:
 
 
 def leaps(count: int) -> list[tuple[int, int]]:
-    """Where variations of a piece of so many postures leave its order: from which posture to which other, once each."""
+    """List the pairs of postures between which variations of a piece of so many postures leave its order, once each."""
     found: dict[tuple[int, int], None] = {}
     for flow in FLOWS:
         for nudge in NUDGES:
@@ -105,8 +105,8 @@ def leaps(count: int) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of a corpus's joints: the speed and the jerk [J] that each goes beyond in one frame of a hundred,
-    and how many in a hundred of its own moves are awkward all the same."""
+    """The speed and the jerk [J] that each joint of a corpus exceeds in one frame of a hundred, and how many in a
+    hundred of the corpus's own moves count as awkward by these."""
 
     speed: Floats
     jerk: Floats
@@ -128,12 +128,12 @@ def usual(found: Engine) -> Usual:
 
 
 def awkward(motion: Motion, moves: Floats, speed: Floats, jerk: Floats) -> Bools:
-    """Whether in each move some joint turns faster and jerks more than `speed` and `jerk` [J]."""
+    """Tell, for each move, whether some joint exceeds both its `speed` and its `jerk` [J]."""
     if len(motion) < 4:
         return np.zeros(len(moves) - 1, dtype=bool)
 
     def has(values: Floats, most: Floats, frames: int) -> Bools:
-        """Whether each joint goes beyond the most within each move [T, J]; a value is of so many frames."""
+        """Tell whether each joint exceeds its limit within each move [T, J]; a value is of so many frames."""
         at = np.searchsorted(moves, motion.times[: len(values)] + 0.5 * frames / FPS, side="right") - 1
         out = np.zeros((len(moves) - 1, values.shape[1]), dtype=bool)
         np.logical_or.at(out, at.clip(0, len(out) - 1), values > most)

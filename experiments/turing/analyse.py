@@ -1,11 +1,11 @@
-"""What raters said: means, and whether what was made is told from what was danced.
+"""Analysis of raters' answers: means, and whether generated movement is told from danced movement.
 
 python experiments/turing/analyse.py FOLDER/key.json answers-*.json
 
-For each scale the means, with 95 % intervals over raters, and an analysis of variance in which raters and films are
-both drawn from many: F1 of raters' means, F2 of films' means, and from both min F' (Clark, "The
+For each scale it prints the means, with 95 % intervals over raters, and an analysis of variance in which both raters
+and films are random effects: F1 of raters' means, F2 of films' means, and min F' of both (Clark, "The
 language-as-fixed-effect fallacy", J. Verbal Learning and Verbal Behavior 12:335, 1973), which is small unless the
-difference holds for other raters and for other films too. Partial eta squared, of F1, says how large it is.
+difference generalises to other raters and other films. Partial eta squared, of F1, is the size of the effect.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ KINDS = ("danced", "made")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What raters said of one scale.
+    """The analysis of one scale.
 
     Attributes:
-        means: of each kind.
+        means: mean rating of each kind.
         half: half of the 95 % interval of the difference, danced less made, over raters.
-        f1, f2, min_f: F of raters, of films, and min F'.
-        p: of min F'.
+        f1, f2, min_f: F over raters, F over films, and min F'.
+        p: p value of min F'.
         eta: partial eta squared of F1.
-        raters, films: how many.
+        raters, films: their numbers.
     """
 
     means: tuple[float, float]
@@ -53,7 +53,7 @@ class Verdict:
 
 
 def judged(ratings: Floats, made: Bools) -> Verdict:
-    """The verdict on ratings [raters, films] of films that were `made` [films], or else danced."""
+    """Analyse ratings [raters, films] of films that were `made` [films], or else danced."""
     from scipy.stats import f, t
 
     raters, films = ratings.shape
@@ -90,7 +90,7 @@ def judged(ratings: Floats, made: Bools) -> Verdict:
 
 
 def read(key: Path, answers: list[Path]) -> tuple[dict[str, Floats], Bools]:
-    """Ratings [raters, films] by scale, and which films were made."""
+    """Read the ratings [raters, films] of each scale, and which films were made."""
     kinds: dict[str, dict[str, Any]] = json.loads(key.read_text())
     films = sorted(kinds)
     given = [json.loads(path.read_text()) for path in answers]

@@ -76,12 +76,12 @@ def fill(folder: Path, data: str | None, name: str, films: int, seed: int) -> No
 
 
 def plain(motion: Motion) -> Motion:
-    """The movement without any mark of who made it."""
+    """Return the movement without any mark of its origin."""
     return replace(motion, times=motion.times - motion.times[0], name="", insertions=())
 
 
 def page(films: list[str]) -> str:
-    """The page that shows films and takes answers."""
+    """Return the page that shows films and takes answers."""
     scales = "".join(
         f"<fieldset><legend>{escape(question)}</legend><span>{escape(low)}</span>"
         + "".join(f'<label><input type="radio" name="{scale}" value="{n}">{n}</label>' for n in range(1, 6))

@@ -26,7 +26,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
 
 
 def work(raters: int, difference: float, tests: int, seed: int) -> list[Row]:
-    """How often raters that nobody is are told to see a difference that is there, and how large it then seems."""
+    """Estimate how often a true difference is detected with simulated raters, and how large it then seems."""
     rng = np.random.default_rng([seed, raters, round(100 * difference)])
     made = np.arange(FILMS) % 2 == 1
     verdicts = [judged(simulated(rng, raters, made, difference), made) for _ in range(tests)]
@@ -43,7 +43,7 @@ def work(raters: int, difference: float, tests: int, seed: int) -> list[Row]:
 
 
 def simulated(rng: np.random.Generator, raters: int, made: Bools, difference: float) -> Floats:
-    """Ratings from 1 to 5 [raters, films] of raters who like what was `made` less, by so many points."""
+    """Simulate ratings from 1 to 5 [raters, films] of raters who rate films that were `made` so many points lower."""
     liked = 3.2 + RATER * rng.normal(size=(raters, 1)) + FILM * rng.normal(size=len(made)) - difference * made
     return np.clip(np.round(liked + REST * rng.normal(size=(raters, len(made)))), 1.0, 5.0)
 

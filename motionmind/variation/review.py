@@ -155,7 +155,7 @@ class ReviewState:
         return tuple(seams)
 
     def looks_like(self, other: ReviewState) -> bool:
-        """Whether a reviewer sees the same in another state: its postures, its seams and their insertions."""
+        """Tell whether a reviewer sees the same in another state: its postures, its seams and their insertions."""
         mine, theirs = (
             [(seam.number, seam.transition, seam.decision, seam.chosen) for seam in state.seams]
             for state in (self, other)
@@ -265,5 +265,5 @@ def _number_seams(state: ReviewState) -> ReviewState:
 
 
 def is_seam(start: int, end: int) -> bool:
-    """Whether going from posture `start` of a piece to posture `end` is neither the piece's own step nor a stay."""
+    """Tell whether going from posture `start` to posture `end` is neither the piece's own step nor a stay."""
     return end not in (start, start + 1)

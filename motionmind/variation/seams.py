@@ -140,7 +140,7 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
         return self.is_abrupt and not self.candidates and not self.failure
 
     def tells_more_than(self, other: JudgedTransition[C] | None) -> bool:
-        """Whether it adds to an earlier judgement of the same transition; None stands for no judgement."""
+        """Tell whether it adds to an earlier judgement of the same transition; None stands for no judgement."""
         if other is None or self.candidates or not self.is_abrupt:
             return True
         mine, theirs = ((one.corpus, one.abrupt_joints, one.failure) for one in (self, other))
