@@ -190,9 +190,7 @@ def test_between_frames_rotations_are_slerped_and_the_root_is_linear(show: Calla
     for share in (0.0, 0.3, 0.9):
         time = (1.0 - share) * motion.times[1] + share * motion.times[2]
         rotations, root = tab.get(
-            "(() => { const q = Array(92), p = Array(3); motionmind.motion.sample("
-            + repr(float(time))
-            + ", q, p); "
+            "(() => { const q = Array(92), p = Array(3); motionmind.motion.sample(" + repr(float(time)) + ", q, p); "
             "return [q, p] })()"
         )
         wanted = rot.slerp(motion.rotations[1], motion.rotations[2], share)
@@ -483,9 +481,7 @@ def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -
     motion = bridged()
     for part, ends in ((motion, 2), (motion.slice(3, 12), 1), (motion.slice(3, 6), 0)):
         tab = show(part)
-        assert tab.get("motionmind.motion.insertions.map(one => motionmind.motion.ends(one).length)") == [
-            ends
-        ]
+        assert tab.get("motionmind.motion.insertions.map(one => motionmind.motion.ends(one).length)") == [ends]
         assert tab.get("document.getElementById('ends').hidden") == (ends == 0)
 
 
