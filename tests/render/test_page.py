@@ -190,9 +190,7 @@ def test_between_frames_rotations_are_slerped_and_the_root_is_linear(show: Calla
     for share in (0.0, 0.3, 0.9):
         time = (1.0 - share) * motion.times[1] + share * motion.times[2]
         rotations, root = tab.get(
-            "(() => { const q = Array(92), p = Array(3); motionmind.body.motion.sample("
-            + repr(float(time))
-            + ", q, p); "
+            "(() => { const q = Array(92), p = Array(3); motionmind.motion.sample(" + repr(float(time)) + ", q, p); "
             "return [q, p] })()"
         )
         wanted = rot.slerp(motion.rotations[1], motion.rotations[2], share)
@@ -203,8 +201,8 @@ def test_between_frames_rotations_are_slerped_and_the_root_is_linear(show: Calla
 def test_what_is_inserted_and_bridged_is_what_the_motion_says(show: Callable[..., Opened]) -> None:
     motion = bridged()
     tab = show(motion)
-    inserted = tab.get("[...motionmind.body.motion.times].map(time => motionmind.body.motion.insertedAt(time))")
-    joints = tab.get("[...motionmind.body.motion.times].map(time => motionmind.body.motion.bridgedAt(time))")
+    inserted = tab.get("[...motionmind.motion.times].map(time => motionmind.motion.insertedAt(time))")
+    joints = tab.get("[...motionmind.motion.times].map(time => motionmind.motion.bridgedAt(time))")
     assert inserted == motion.inserted().tolist()
     assert joints == [np.flatnonzero(row).tolist() for row in motion.bridged()]
 
@@ -447,7 +445,7 @@ def test_names_are_only_text(show: Callable[..., Opened]) -> None:
     )
     tab = show(motion)
     tab.get("motionmind.player.seek(0.5)")
-    assert tab.get("motionmind.body.motion.name") == name
+    assert tab.get("motionmind.motion.name") == name
     assert tab.get("document.querySelector('h1').textContent") == name
     assert tab.get("document.getElementById('bridged').innerText") == "bridged: pelvis<b>&"
     assert tab.get("document.querySelectorAll('b').length") == 0
@@ -483,9 +481,7 @@ def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -
     motion = bridged()
     for part, ends in ((motion, 2), (motion.slice(3, 12), 1), (motion.slice(3, 6), 0)):
         tab = show(part)
-        assert tab.get("motionmind.body.motion.insertions.map(one => motionmind.body.motion.ends(one).length)") == [
-            ends
-        ]
+        assert tab.get("motionmind.motion.insertions.map(one => motionmind.motion.ends(one).length)") == [ends]
         assert tab.get("document.getElementById('ends').hidden") == (ends == 0)
 
 
