@@ -20,6 +20,7 @@ release = version = motionmind.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
 exclude_patterns = ["_build", "_extensions"]
 default_role = "code"
+smartquotes = False  # options begin with two hyphens
 html_theme = "furo"
 html_title = "MotionMind"
 html_show_copyright = False

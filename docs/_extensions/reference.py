@@ -88,12 +88,14 @@ def schema_text(kind: str) -> str | None:
     return json.dumps(msgspec.json.schema(_without_raw(found)), indent=2, ensure_ascii=False)
 
 
-def commands(group: click.Group, path: str) -> Iterator[tuple[str, click.Command]]:
-    """Yield every command of a group and of the groups in it, with the words that call it."""
-    for name, command in group.commands.items():
-        yield f"{path} {name}", command
+def commands(context: click.Context) -> Iterator[click.Context]:
+    """Yield a context for every command of a group and of the groups in it."""
+    assert isinstance(context.command, click.Group)
+    for name, command in context.command.commands.items():
+        inner = click.Context(command, context, name, **command.context_settings)
+        yield inner
         if isinstance(command, click.Group):
-            yield from commands(command, f"{path} {name}")
+            yield from commands(inner)
 
 
 def options_by_section(command: click.Command, context: click.Context) -> dict[str, list[tuple[str, str]]]:
@@ -106,9 +108,9 @@ def options_by_section(command: click.Command, context: click.Context) -> dict[s
     return {heading: sections[heading] for heading in order if heading in sections}
 
 
-def command_text(path: str, command: click.Command) -> str:
+def command_text(context: click.Context) -> str:
     """Return the section of one command, as Markdown."""
-    context = click.Context(command, info_name=path)
+    command, path = context.command, context.command_path
     lines = [f"## {path}", "", f"    {path} {' '.join(command.collect_usage_pieces(context))}", ""]
     paragraphs = (command.help or "").replace("\b\n", "").split("\n\n")
     lines += [_prose(" ".join(paragraph.split())) + "\n" for paragraph in paragraphs]
@@ -140,7 +142,8 @@ class CommandLine(SphinxDirective):
         """Walk the commands and write a section for each."""
         from motionmind.cli import app
 
-        text = "\n\n".join(command_text(path, command) for path, command in commands(app, "motionmind"))
+        top = click.Context(app, info_name="motionmind", **app.context_settings)
+        text = "\n\n".join(map(command_text, commands(top)))
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 
@@ -170,7 +173,7 @@ class PublicNames(SphinxDirective):
         elif issubclass(thing, Exception):
             kind, members = "exception", ""
         else:
-            kind, members = "class", "\n   :members:"
+            kind, members = "class", "\n   :members:" + "\n   :inherited-members:" * (name == "Engine")
         return f"\n```{{eval-rst}}\n.. auto{kind}:: motionmind.{name}{members}\n```\n"
 
 
