@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from numbers import Integral
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_args
@@ -69,7 +69,7 @@ class TweenRequest:
     moves: int | tuple[int, int] | None = None
     max_moves: int = 60
     duration: float | None = None
-    pin: Mapping[str, str] = MappingProxyType({})
+    pin: Mapping[str, str] = field(default_factory=dict)
     hold: Sequence[str] = ()
     avoid: Sequence[tuple[str, int | str]] = ()
     via: Sequence[Posture | tuple[Posture, int]] = ()
@@ -92,6 +92,10 @@ class TweenRequest:
     follow: bool | None = None
 
     def __post_init__(self) -> None:
+        # Copies, so that what is asked stays as it was when the caller's own lists change.
+        object.__setattr__(self, "pin", MappingProxyType(dict(self.pin)))
+        for name in ("hold", "avoid", "via", "unlike"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         self._check_combinations()
         _check_count("max_moves", self.max_moves, MOST_MOVES)
         least, most = self.move_range
@@ -136,7 +140,7 @@ class TweenRequest:
             TypeError: there is no such option.
             MotionMindError: as for the constructor.
         """
-        known = [field.name for field in fields(cls)]
+        known = [one.name for one in fields(cls)]
         for name in options:
             if name not in known:
                 raise TypeError(f"a tween has no option {name!r}{did_you_mean(name, known)}")
@@ -190,7 +194,7 @@ class TweenRequest:
         motion follows the path. Postures to pass through are given by their moves, tweens to differ from by their
         number.
         """
-        values = {field.name.rstrip("_"): getattr(self, field.name) for field in fields(self)}
+        values = {one.name.rstrip("_"): getattr(self, one.name) for one in fields(self)}
         del values["posturewise"]
         return values | {
             "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
