@@ -11,7 +11,15 @@ from typing import Any
 
 
 class MotionMindError(Exception):
-    """Root of all errors caused by bad input; the command line prints it in one line and exits with code 2."""
+    """Root of all errors caused by bad input; the command line prints it in one line and exits with code 2.
+
+    >>> from motionmind import Engine, MotionMindError
+    >>> try:
+    ...     Engine.load("opera")
+    ... except MotionMindError as error:
+    ...     print(str(error).partition(";")[0])
+    no corpus 'opera'
+    """
 
 
 class FormatError(MotionMindError):
@@ -21,6 +29,11 @@ class FormatError(MotionMindError):
         message: what was wrong, and what would be right.
         path: the file, put before the message.
         line: the line in that file, counted from 1.
+
+    >>> from motionmind import read_motion
+    >>> read_motion("nowhere.bvh")
+    Traceback (most recent call last):
+    motionmind.errors.FormatError: nowhere.bvh: cannot be read: there is no such file or folder
     """
 
     def __init__(self, message: str, *, path: object | None = None, line: int | None = None) -> None:
@@ -29,11 +42,23 @@ class FormatError(MotionMindError):
 
 
 class SkeletonError(MotionMindError):
-    """A skeleton that is not a tree, or movement on a skeleton other than the expected one."""
+    """A skeleton that is not a tree, or movement on a skeleton other than the expected one.
+
+    >>> from motionmind import human23
+    >>> human23().index("tail")
+    Traceback (most recent call last):
+    motionmind.errors.SkeletonError: no joint 'tail' in human23; ...
+    """
 
 
 class CorpusError(MotionMindError):
-    """A corpus that does not exist, cannot be read, or holds nothing to learn from."""
+    """A corpus that does not exist, cannot be read, or holds nothing to learn from.
+
+    >>> from motionmind import Engine
+    >>> Engine.load("opera")
+    Traceback (most recent call last):
+    motionmind.errors.CorpusError: no corpus 'opera'; there are ballet, hands, karate, ...
+    """
 
 
 class NoPathError(MotionMindError):
@@ -42,6 +67,13 @@ class NoPathError(MotionMindError):
     Args:
         message: the diagnosis in words.
         diagnosis: the same as plain values, ready for JSON, if joints move on their own; None otherwise.
+
+    >>> from motionmind import Engine
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> engine.tween(motion.posture(0), motion.posture(9), moves=1, strict=True)
+    Traceback (most recent call last):
+    motionmind.errors.NoPathError: no path from A to B in at most 1 move ...
     """
 
     def __init__(self, message: str, diagnosis: dict[str, Any] | None = None) -> None:
@@ -54,7 +86,16 @@ class InfeasibleError(MotionMindError):
 
 
 class MotionMindWarning(UserWarning):
-    """Input that was repaired on reading (a quaternion normalised, a frame count corrected), and where."""
+    """Input that was repaired on reading (a quaternion normalised, a frame count corrected), and where.
+
+    >>> import warnings
+    >>> from motionmind import MotionMindWarning, read_motion
+    >>> with warnings.catch_warnings():  # refuse files that need mending
+    ...     warnings.simplefilter("error", MotionMindWarning)
+    ...     read_motion("nowhere.bvh")
+    Traceback (most recent call last):
+    motionmind.errors.FormatError: nowhere.bvh: cannot be read: there is no such file or folder
+    """
 
 
 def quoted(text: str, most: int = 40) -> str:

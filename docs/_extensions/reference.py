@@ -22,40 +22,30 @@ from sphinx.util.docutils import SphinxDirective
 _log = logging.getLogger(__name__)
 
 SUBJECTS = {
-    "Tweens": ("Engine", "Tween", "Bridge", "Wait", "Source"),
+    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "list_corpora"),
+    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure"),
     "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
-    "Files": ("read_motion", "read_posture", "write_motion", "write_posture", "compose"),
-    "Skeletons of your own": ("own_skeleton", "to_human23"),
-    "States": ("make_discretization",),
+    "Files": ("read_motion", "read_posture", "write_motion", "write_posture", "lossy_fields"),
+    "Scores": ("compose", "read_score"),
+    "Skeletons of your own": ("own_skeleton", "to_human23", "read_joint_mapping"),
+    "States": ("make_discretization", "name_states", "write_library"),
     "Variations": ("vary", "Variation", "Piece", "Seam", "Flow", "flow_of", "read_variation", "write_variation"),
-    "Pictures": ("write_picture", "contact_sheet"),
+    "Pictures": ("write_picture", "contact_sheet", "write_joint_graph", "write_attractor"),
     "Errors": ("MotionMindError", "FormatError", "SkeletonError", "CorpusError", "NoPathError", "MotionMindWarning"),
 }
 
-# The types of files and reports, by every name that they may have; the first that exists is documented.
+# The types of files and reports.
 SCHEMAS = {
-    "posture": ("motionmind.formats.posture_json.PostureSchema",),
-    "motion": ("motionmind.formats.motion_json.MotionSchema",),
-    "variation": ("motionmind.variation.variation_json.VariationSchema",),
-    "tween-report": ("motionmind.tween.report.TweenReport", "motionmind.tween.narrative.Report"),
-    "source-manifest": ("motionmind.corpus.manifest.SourceManifest",),
-    "built-manifest": ("motionmind.corpus.manifest.BuiltManifest",),
-    "corpus-summary": ("motionmind.learned.summary.CorpusSummary",),
-    "measure-report": ("motionmind.metrics.measure.MeasureReport",),
-    "variation-report": ("motionmind.variation.variation.VariationReport",),
+    "posture": "motionmind.formats.posture_json.PostureSchema",
+    "motion": "motionmind.formats.motion_json.MotionSchema",
+    "variation": "motionmind.variation.variation_json.VariationSchema",
+    "tween-report": "motionmind.tween.report.TweenReport",
+    "source-manifest": "motionmind.corpus.manifest.SourceManifest",
+    "built-manifest": "motionmind.corpus.manifest.BuiltManifest",
+    "corpus-summary": "motionmind.learned.summary.CorpusSummary",
+    "measure-report": "motionmind.metrics.measure.MeasureReport",
+    "variation-report": "motionmind.variation.report.VariationReport",
 }
-MAY_BE_MISSING = {"corpus-summary", "measure-report", "variation-report"}
-
-
-def find(names: tuple[str, ...]) -> Any:
-    """Return the first of some dotted names that exists, or None."""
-    for name in names:
-        module, _, attribute = name.rpartition(".")
-        try:
-            return getattr(import_module(module), attribute)
-        except (ImportError, AttributeError):
-            continue
-    return None
 
 
 def _without_raw(schema: Any) -> Any:
@@ -80,12 +70,11 @@ def _without_raw(schema: Any) -> Any:
     return plain
 
 
-def schema_text(kind: str) -> str | None:
-    """Return the JSON Schema of one of `SCHEMAS`; None where no such type exists."""
-    found = find(SCHEMAS[kind])
-    if found is None:
-        return None
-    return json.dumps(msgspec.json.schema(_without_raw(found)), indent=2, ensure_ascii=False)
+def schema_text(kind: str) -> str:
+    """Return the JSON Schema of one of `SCHEMAS`."""
+    module, _, name = SCHEMAS[kind].rpartition(".")
+    schema = msgspec.json.schema(_without_raw(getattr(import_module(module), name)))
+    return json.dumps(schema, indent=2, ensure_ascii=False)
 
 
 def commands(context: click.Context) -> Iterator[click.Context]:
@@ -183,15 +172,9 @@ class JsonSchema(SphinxDirective):
     required_arguments: ClassVar[int] = 1
 
     def run(self) -> list[nodes.Node]:
-        """Write it as a block of code; warn where the type is missing."""
-        kind = self.arguments[0]
-        text = schema_text(kind)
-        if text is None:
-            if kind not in MAY_BE_MISSING:
-                _log.warning("there is none of %s", ", ".join(SCHEMAS[kind]), location=self.get_location())
-            return []
-        block = nodes.literal_block(text, text, language="json")
-        return [block]
+        """Write it as a block of code."""
+        text = schema_text(self.arguments[0])
+        return [nodes.literal_block(text, text, language="json")]
 
 
 def setup(app: Any) -> dict[str, Any]:

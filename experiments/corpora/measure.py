@@ -26,7 +26,9 @@ ANGLES += ("shoulder flexion", "shoulder abduction", "elbow flexion")
 
 def main(recordings: list[str]) -> None:
     names = [
-        name for name, folder in store.known("nowhere").items() if store.read_manifest(folder)["format"] == store.FORMAT
+        name
+        for name, folder in store.list_corpora("nowhere").items()
+        if store.read_manifest(folder)["format"] == store.FORMAT
     ]
     with tempfile.TemporaryDirectory() as cache:
         os.environ["XDG_CACHE_HOME"] = cache

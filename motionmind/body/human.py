@@ -80,7 +80,12 @@ _KNUCKLES: tuple[_Row, ...] = (
 
 @cache
 def human23() -> Skeleton:
-    """Return the default body: 23 joints, 1.70 m, at rest in a T-pose facing +Z with all joint axes the world's."""
+    """Return the default body: 23 joints, 1.70 m, at rest in a T-pose facing +Z with all joint axes the world's.
+
+    >>> from motionmind import human23
+    >>> len(human23()), human23().names[0]
+    (23, 'pelvis')
+    """
     return _skeleton("human23", _human(_ARM))
 
 
@@ -107,6 +112,10 @@ def human44() -> Skeleton:
     The joints of human23 keep their names, places and axes. Children of `lumbar`, `thorax` or `cervical` there hang
     from the end of that row here: `thorax` from `lumbar_upper`, clavicles and `cervical` from `thorax_upper`,
     `atlantal` from `axial`.
+
+    >>> from motionmind import human44
+    >>> len(human44())
+    44
     """
     rows = _human(_ARM + _THUMB)
     for row in (*_VERTEBRAE, *_both_sides(_KNUCKLES)):

@@ -28,6 +28,13 @@ class Posture:
         skeleton: the body.
         rotations: unit quaternions x, y, z, w [J, 4], each local to the parent's frame.
         root: position of the root joint [3], metres.
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> posture.skeleton.name
+    'human23'
     """
 
     skeleton: Skeleton
@@ -49,6 +56,11 @@ class Insertion:
     Attributes:
         times: times [M + 1] of the postures that its M moves join, seconds; the first is A's, the last B's.
         bridged: moves of joints that no corpus attests: the joint's name, and the number of the move from 0.
+
+    >>> import numpy as np
+    >>> from motionmind import Insertion
+    >>> Insertion(np.array([0.0, 0.4, 0.8]), bridged=(("left_hip", 1),)).bridged
+    (('left_hip', 1),)
     """
 
     times: Floats
@@ -80,6 +92,14 @@ class Motion:
         times: seconds, strictly increasing [T].
         name: the clip's name.
         insertions: the stretches that the engine made, in order of time; empty for movement that is all recorded.
+
+    >>> import numpy as np
+    >>> from motionmind import Motion, Posture, human23
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> motion = Motion(human23(), np.stack([at_rest] * 3), np.zeros((3, 3)), np.array([0.0, 0.5, 1.0]))
+    >>> len(motion), len(motion.resample(10.0))
+    (3, 11)
     """
 
     skeleton: Skeleton

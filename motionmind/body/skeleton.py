@@ -24,6 +24,12 @@ class Skeleton:
         offsets: place of each joint in its parent's frame [J, 3], metres (the root's is 0).
         tips: place of each leaf's far end (fingertip, toe tip, crown) in the leaf's own frame [J, 3], metres;
             0 for joints without one.
+
+    >>> import numpy as np
+    >>> from motionmind import Skeleton
+    >>> arm = Skeleton("arm", ("shoulder", "elbow"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]))
+    >>> len(arm), arm.children(0)
+    (2, [1])
     """
 
     name: str

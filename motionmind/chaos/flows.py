@@ -34,6 +34,10 @@ class Flow:
         parameters: parameters by name, in the order in which the field takes them.
         dimensions: names of the coordinates [d]; by default x1, x2 and so on.
         about: the equations and their source.
+
+    >>> from motionmind import flow_of
+    >>> flow_of("lorenz").dimensions
+    ('x', 'y', 'z')
     """
 
     name: str
@@ -76,6 +80,10 @@ def flow_of(name: str, **parameters: float) -> Flow:
 
     Raises:
         MotionMindError: there is no flow or no parameter of that name, or a value is not a finite number.
+
+    >>> from motionmind import flow_of
+    >>> flow_of("lorenz", rho=28.0).parameters["rho"]
+    28.0
     """
     if name not in FLOWS:
         raise MotionMindError(f"no flow {name!r}; there are {', '.join(sorted(FLOWS))}")

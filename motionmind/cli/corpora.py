@@ -177,10 +177,10 @@ def _read_clips(
 @HOME
 def list_corpora(as_json: bool, home: Path | None) -> None:
     """List all corpora, bundled and your own."""
-    from motionmind.corpus.store import known, read_manifest
+    from motionmind.corpus.store import list_corpora, read_manifest
 
     found = []
-    for name, folder in known(home).items():
+    for name, folder in list_corpora(home).items():
         try:
             title = str(read_manifest(folder).get("title") or "")
         except MotionMindError as error:

@@ -17,17 +17,19 @@ if TYPE_CHECKING:
 def is_collection(source: Path, home: Path | None) -> bool:
     """Return whether a source is a score, a corpus's name or folder, or CORPUS/CLIP; otherwise it is a file of one
     movement, whose suffix gives its format."""
-    from motionmind.corpus.store import known
+    from motionmind.corpus.store import list_corpora
 
-    return source.suffix.lower() in (".score", "") or source.is_dir() or split_clip(source, home)[0] in known(home)
+    return (
+        source.suffix.lower() in (".score", "") or source.is_dir() or split_clip(source, home)[0] in list_corpora(home)
+    )
 
 
 def split_clip(source: Path, home: Path | None) -> tuple[str, str | None]:
     """Split CORPUS/CLIP into the corpus's name and the clip's; return any other source as it is, with None."""
-    from motionmind.corpus.store import known
+    from motionmind.corpus.store import list_corpora
 
     name, *clip = source.parts or (str(source),)
-    if clip and name in known(home) and not source.exists():
+    if clip and name in list_corpora(home) and not source.exists():
         return name, "/".join(clip)
     return str(source), None
 

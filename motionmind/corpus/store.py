@@ -37,8 +37,13 @@ def home(folder: str | os.PathLike[str] | None = None) -> Path:
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("motionmind", appauthor=False))
 
 
-def known(folder: str | os.PathLike[str] | None = None) -> dict[str, Path]:
-    """Return the folders of all corpora by name, sorted: the bundled ones, and those under `home(folder)`."""
+def list_corpora(folder: str | os.PathLike[str] | None = None) -> dict[str, Path]:
+    """Return the folders of all corpora by name, sorted: the bundled ones, and those under `home(folder)`.
+
+    >>> from motionmind import list_corpora
+    >>> "ballet" in list_corpora()
+    True
+    """
     found = {}
     for place in (bundled("corpora"), home(folder) / "corpora"):
         if place.is_dir():
@@ -48,7 +53,7 @@ def known(folder: str | os.PathLike[str] | None = None) -> dict[str, Path]:
 
 def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Return the folder of the corpus with this name, or at this path; CorpusError names the known ones."""
-    corpora = known(folder)
+    corpora = list_corpora(folder)
     if name in corpora:
         return corpora[name]
     with suppress(OSError, ValueError):  # not a possible path: too long, or with a zero byte

@@ -245,6 +245,21 @@ def write_library(path: FilePath, library: Library) -> None:
     """Write a library as a person would: in turns where hundredths of a degree are exact, else in quaternions.
 
     `read_library` reads the same states; the comments of a file that was read are not kept.
+
+    >>> from pathlib import Path
+    >>> text = '''title  Two bends of the knees
+    ... body   human23
+    ... legs
+    ...   stand = stand out 10 turn 8
+    ...   bend = stand out 10 turn 8, bend 30
+    ... clip bends: Down and up
+    ...   start | stand
+    ...   1     | bend
+    ...   1     | stand
+    ... '''
+    >>> _ = Path("bends.score").write_text(text)
+    >>> from motionmind import name_states, read_score, write_library
+    >>> write_library("mine.toml", name_states([read_score("bends.score")], 12.0))
     """
     write_atomically(path, format_library(library).encode())
 

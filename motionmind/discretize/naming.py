@@ -40,6 +40,22 @@ def name_states(
     Raises:
         MotionMindError: there is no clip to name states after, scores are for several bodies, or a tolerance is out of
             range.
+
+    >>> from pathlib import Path
+    >>> text = '''title  Two bends of the knees
+    ... body   human23
+    ... legs
+    ...   stand = stand out 10 turn 8
+    ...   bend = stand out 10 turn 8, bend 30
+    ... clip bends: Down and up
+    ...   start | stand
+    ...   1     | bend
+    ...   1     | stand
+    ... '''
+    >>> _ = Path("bends.score").write_text(text)
+    >>> from motionmind import name_states, read_score
+    >>> name_states([read_score("bends.score")], 12.0).skeleton
+    'human23'
     """
     scores, per_joint = list(scores), per_joint or {}
     check_range("tolerance in degrees", {"": tolerance, **per_joint}, 0.01, 180.0)

@@ -41,6 +41,10 @@ def make_discretization(
     Raises:
         MotionMindError: a tolerance is out of range.
         FormatError: there is no such kind or library.
+
+    >>> from motionmind import make_discretization
+    >>> make_discretization("codebook", tolerance=10.0, per_joint={"left_hip": 5.0}).tolerance
+    10.0
     """
     per_joint = dict(per_joint or {})
     if kind == "codebook":

@@ -51,6 +51,14 @@ def read_motion(
 
     Raises:
         FormatError: the suffix is unknown, the file does not exist, or its content does not match its suffix.
+
+    >>> import numpy as np
+    >>> from motionmind import Motion, Posture, human23, read_motion, write_motion
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> write_motion("rest.bvh", posture.as_motion())
+    >>> len(read_motion("rest.bvh"))
+    1
     """
     suffix = _suffix(path, _READABLE, "read")
     # Formats are imported here, so a program loads only those it uses.
@@ -106,6 +114,14 @@ def read_posture(
     Raises:
         FormatError: as `read_motion`; or the file has several frames and `frame` is None.
         MotionMindError: there is no such frame.
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, read_posture, write_posture
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> write_posture("rest.json", posture)
+    >>> read_posture("rest.json").skeleton.name
+    'human23'
     """
     motion = read_motion(path, unit=unit, asf=asf, skeleton=skeleton)
     if frame is None and len(motion) > 1:
@@ -126,6 +142,12 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
 
     Raises:
         MotionMindError: the suffix is unknown, the format cannot hold this motion, or the file cannot be written.
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, write_motion
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> write_motion("rest.bvh", posture.as_motion(), unit="m")
     """
     suffix = _suffix(path, _WRITABLE, "written")
     if suffix == ".bvh":
@@ -155,6 +177,12 @@ def write_posture(path: FilePath, posture: Posture) -> None:
 
     Raises:
         MotionMindError: as `write_motion`.
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, write_posture
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> write_posture("rest.json", posture)
     """
     if _suffix(path, _WRITABLE, "written") == ".json":
         from motionmind.formats.posture_json import write_posture_json

@@ -42,6 +42,12 @@ class Figure:
         high: 95th percentile, likewise.
         unit: the unit of all three; "" for counts and shares.
         about: a description in words.
+
+    >>> from motionmind import Engine, measure
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> measure(motion, engine)["speed"].unit
+    'rad/s'
     """
 
     value: float
@@ -132,6 +138,13 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     Raises:
         SkeletonError: the movement is on other joints.
         MotionMindError: the movement is too short to measure, or the path is of another corpus.
+
+    >>> from motionmind import Engine, measure
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> figures = measure(motion, engine)
+    >>> figures["attested"].value
+    1.0
     """
     corpus = learned.corpus
     motion = _on(corpus.skeleton, motion)

@@ -37,6 +37,23 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
     Raises:
         FormatError: the score is invalid, has no such clip, or demands what the body cannot do; names file, line and
             word.
+
+    >>> from pathlib import Path
+    >>> text = '''title  Two bends of the knees
+    ... body   human23
+    ... legs
+    ...   stand = stand out 10 turn 8
+    ...   bend = stand out 10 turn 8, bend 30
+    ... clip bends: Down and up
+    ...   start | stand
+    ...   1     | bend
+    ...   1     | stand
+    ... '''
+    >>> _ = Path("bends.score").write_text(text)
+    >>> from motionmind import compose
+    >>> motion = compose("bends.score", "bends")
+    >>> len(motion)
+    3
     """
     score = read_score(path)
     names = [found.name for found in score.clips]

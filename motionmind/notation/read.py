@@ -55,6 +55,22 @@ def read_score(path: FilePath) -> Score:
 
     Raises:
         FormatError: something in it is not understood; names file, line and word.
+
+    >>> from pathlib import Path
+    >>> text = '''title  Two bends of the knees
+    ... body   human23
+    ... legs
+    ...   stand = stand out 10 turn 8
+    ...   bend = stand out 10 turn 8, bend 30
+    ... clip bends: Down and up
+    ...   start | stand
+    ...   1     | bend
+    ...   1     | stand
+    ... '''
+    >>> _ = Path("bends.score").write_text(text)
+    >>> from motionmind import read_score
+    >>> [clip.name for clip in read_score("bends.score").clips]
+    ['bends']
     """
     return _read(Path(path), ())
 

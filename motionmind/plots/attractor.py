@@ -48,14 +48,10 @@ def write_attractor(path: FilePath, variation: Variation) -> None:
         MotionMindError: the suffix is unknown, the trajectories cannot be computed again (see `portrait_of`), or the
             file cannot be written.
 
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> from motionmind import compose, flow_of, vary
-    >>> piece = compose("corpora/macarena/macarena.score").slice(0, 40)
-    >>> with TemporaryDirectory() as folder:
-    ...     write_attractor(Path(folder) / "rossler.svg", vary(piece, flow=flow_of("rossler")))
-    ...     (Path(folder) / "rossler.svg").read_text()[:4]
-    '<svg'
+    >>> from motionmind import Engine, vary, write_attractor
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> write_attractor("attractor.svg", vary(motion, nudge=1.0))
     """
     suffix = Path(path).suffix.lower()
     if suffix not in ATTRACTORS:

@@ -48,13 +48,8 @@ def write_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
     Raises:
         MotionMindError: the suffix is unknown, the corpus has no such joint, or the file cannot be written.
 
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> from motionmind import Engine
-    >>> with TemporaryDirectory() as folder:
-    ...     graph = write_joint_graph(Path(folder) / "hip.svg", Engine.load("ballet"), "left_hip")
-    ...     (Path(folder) / "hip.svg").read_text()[:4]
-    '<svg'
+    >>> from motionmind import Engine, write_joint_graph
+    >>> graph = write_joint_graph("hip.svg", Engine.load("ballet"), "left_hip")
     >>> graph.graph["joint"]
     'left_hip'
     """

@@ -80,10 +80,10 @@ def contact_sheet(
 
     >>> import numpy as np
     >>> from motionmind import Posture, contact_sheet, human23
-    >>> body = human23()
-    >>> posture = Posture(body, np.tile([0.0, 0.0, 0.0, 1.0], (len(body), 1)), np.array([0.0, 0.95, 0.0]))
-    >>> contact_sheet(posture.as_motion()).size
-    (339, 378)
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> contact_sheet(posture.as_motion()).mode
+    'RGB'
     """
     if side not in ("right", "left") or (columns is not None and columns < 1):
         raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")

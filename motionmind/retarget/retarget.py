@@ -78,6 +78,12 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     Raises:
         SkeletonError: the skeleton does not map to human23, or its zero pose does not show how the body stands.
         MotionMindError: `up` is neither "y" nor "z".
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human44, to_human23
+    >>> posture = Posture(human44(), np.tile([0.0, 0.0, 0.0, 1.0], (44, 1)), np.zeros(3))
+    >>> len(to_human23(posture).skeleton)
+    23
     """
     if up not in (None, "y", "z"):
         raise MotionMindError(f'up must be "y" or "z", not {up!r}')
@@ -109,6 +115,13 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
 
     Raises:
         SkeletonError: as `to_human23`.
+
+    >>> import numpy as np
+    >>> from motionmind import Posture, human23, own_skeleton
+    >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
+    >>> posture = Posture(human23(), at_rest, np.zeros(3))
+    >>> own_skeleton(posture).skeleton.name
+    'human23'
     """
     known = joint_mapping(movement.skeleton) is not None and not is_human44(movement.skeleton)
     return to_human23(movement, joints) if known or joints is not None else movement

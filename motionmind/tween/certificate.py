@@ -90,6 +90,10 @@ class Bridge:
         move: number of the move, from 0.
         degrees: angle between the two states.
         price: nats.
+
+    >>> from motionmind import Bridge
+    >>> Bridge("left_hip", move=2, degrees=12.5, price=12.5).price
+    12.5
     """
 
     joint: str
@@ -106,6 +110,10 @@ class Wait:
         joint: the joint's name.
         move: number of the move, from 0.
         price: nats.
+
+    >>> from motionmind import Wait
+    >>> Wait("left_wrist", move=3, price=1.0).joint
+    'left_wrist'
     """
 
     joint: str
@@ -124,6 +132,10 @@ class Source:
         mirrored: whether the clip was learned with left and right exchanged.
         reversed: whether the clip was learned backwards: the move leads to the posture before.
         seconds: that posture's time in its recording.
+
+    >>> from motionmind import Source
+    >>> Source("plies", posture=12, corpus="ballet", seconds=4.8).clip
+    'plies'
     """
 
     clip: str

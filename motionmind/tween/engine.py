@@ -35,7 +35,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Engine(LearnedCorpus):
-    """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus)."""
+    """A learned corpus, ready to answer; `Engine.fit` learns one and `Engine.load` opens one (see LearnedCorpus).
+
+    >>> from motionmind import Engine
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
+    >>> tween.status, tween.moves
+    ('optimal', 3)
+    """
 
     def tween(
         self,

@@ -72,6 +72,13 @@ class Explanation(msgspec.Struct, frozen=True):
         coordinated: part of the cost for how joints coordinate, nats.
         tolls: part of the cost for the number of moves, nats.
         moves: the moves.
+
+    >>> from motionmind import Engine, explain
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> explanation = explain(engine.tween(motion.posture(0), motion.posture(3), moves=3))
+    >>> str(explanation).splitlines()[0].startswith("3 moves in ")
+    True
     """
 
     status: str
@@ -95,7 +102,15 @@ class Explanation(msgspec.Struct, frozen=True):
 
 
 def explain(tween: Tween | TweenReport) -> Explanation:
-    """Explain a tween, or its report, move by move."""
+    """Explain a tween, or its report, move by move.
+
+    >>> from motionmind import Engine, explain
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> explanation = explain(engine.tween(motion.posture(0), motion.posture(3), moves=3))
+    >>> len(explanation.moves), explanation.moves[0].joints[0].joint
+    (3, 'pelvis')
+    """
     report = tween if isinstance(tween, TweenReport) else report_of(tween)
     costs = report.costs
     moves = []

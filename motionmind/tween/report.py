@@ -60,6 +60,16 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         degrees: angle of each joint's move [T][L].
         likelihood: P(state arrived in | state left) of each joint's move; 0 where it is not attested [T][L].
         costs: the cost taken apart.
+
+    >>> from motionmind import Engine, read_report
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> import json
+    >>> from pathlib import Path
+    >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
+    >>> _ = Path("report.json").write_text(json.dumps(tween.report()))
+    >>> read_report("report.json").moves
+    3
     """
 
     asked: dict[str, Any] = {}
@@ -154,6 +164,16 @@ def read_report(path: FilePath) -> TweenReport:
 
     Raises:
         FormatError: there is no such file, or it is no report of a tween; the message says what is wrong.
+
+    >>> from motionmind import Engine, read_report
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> import json
+    >>> from pathlib import Path
+    >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
+    >>> _ = Path("report.json").write_text(json.dumps(tween.report()))
+    >>> read_report("report.json").status
+    'optimal'
     """
     try:
         return msgspec.json.decode(read_bytes(path), type=TweenReport)

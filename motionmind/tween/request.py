@@ -64,6 +64,13 @@ class TweenRequest:
 
     Raises:
         MotionMindError: a value is out of its range, or two of them contradict each other.
+
+    >>> from motionmind import TweenRequest
+    >>> TweenRequest(duration=2.0, hold=["left_ankle"]).duration
+    2.0
+    >>> TweenRequest(novelty=2.0)
+    Traceback (most recent call last):
+    motionmind.errors.MotionMindError: novelty must be a number from 0 to 1, not 2.0
     """
 
     moves: int | tuple[int, int] | None = None

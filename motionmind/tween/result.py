@@ -44,6 +44,13 @@ class Tween:
             to run.
         search_problem: the problem that was searched.
         request: what was asked.
+
+    >>> from motionmind import Engine
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
+    >>> round(tween.gap, 6), tween.path.shape == (4, len(tween.joints))
+    (0.0, True)
     """
 
     motion: Motion

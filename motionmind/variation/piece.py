@@ -66,6 +66,12 @@ class Piece:
         frames: the frame of each posture [N], increasing from 0.
         facing: "free" if the piece may face anywhere: a chunk then continues in the heading in which the last one
             ended. "stage" if each posture keeps its own orientation.
+
+    >>> from motionmind import Engine, Piece
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> len(Piece.of(motion, rate=1.0))
+    33
     """
 
     motion: Motion

@@ -93,6 +93,13 @@ class Seam:
         transition: the corpus's judgement of it; None if no corpus has judged it.
         decision: open, approved or discarded.
         chosen: the number of the chosen candidate of the transition, counted from 1.
+
+    >>> from motionmind import Engine, vary
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> seam = vary(motion, nudge=1.0).seams[0]
+    >>> seam.number, seam.end - seam.start not in (0, 1)
+    (1, True)
     """
 
     number: int

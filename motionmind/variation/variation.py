@@ -85,6 +85,13 @@ class Variation:
         order: the postures of the piece as the trajectories gave them [L].
         transitions: the judged transitions that it began with; none if no corpus was given.
         edits: the edits since, in order.
+
+    >>> from motionmind import Engine, vary
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> variation = vary(motion, nudge=1.0).cut(2, 4, before=8)
+    >>> variation.postures[:10].tolist()
+    [0, 1, 5, 6, 7, 2, 3, 4, 8, 9]
     """
 
     piece: Piece
@@ -271,6 +278,13 @@ def vary(
         MotionMindError: an argument is out of its range, or a trajectory diverges or settles.
         SkeletonError: the piece is on another skeleton than the corpus.
         TypeError: there is no such argument.
+
+    >>> from motionmind import Engine, flow_of, vary
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> variation = vary(motion, flow=flow_of("rossler"), nudge=0.5, length=40)
+    >>> len(variation.order)
+    40
     """
     on_progress = take_renamed(options, "told", "on_progress", on_progress)
     check_asked(alternatives, options)

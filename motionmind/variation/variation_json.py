@@ -72,6 +72,13 @@ def read_variation(path: FilePath) -> Variation:
     Raises:
         FormatError: the file cannot be read, holds movement alone, is of an unknown version, or its parts do not fit
             together. The message says which.
+
+    >>> from motionmind import Engine, read_variation, vary, write_variation
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> write_variation("variation.json", vary(motion, nudge=1.0))
+    >>> len(read_variation("variation.json").order) == len(motion)
+    True
     """
     file = _read_motion(path)
     schema = _json.decode(bytes(file.variation), VariationSchema, path)
@@ -94,7 +101,13 @@ def read_variation(path: FilePath) -> Variation:
 
 
 def write_variation(path: FilePath, variation: Variation) -> None:
-    """Write a variation, whole or not at all; MotionMindError if it cannot be written."""
+    """Write a variation, whole or not at all; MotionMindError if it cannot be written.
+
+    >>> from motionmind import Engine, vary, write_variation
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> write_variation("variation.json", vary(motion, nudge=1.0))
+    """
     piece = variation.piece
     schema = VariationSchema(
         VERSION,

@@ -473,4 +473,4 @@ def test_from_files_to_a_tween_on_the_command_line(tmp_path: Path, monkeypatch: 
     assert read_motion("tween.txt").skeleton is BODY
     assert "23 joints (human23)" in run("convert tween.json coarse.json --skeleton human23")
     assert read_motion("coarse.json").skeleton is COARSE
-    assert store.known(None)["mine"].is_relative_to(tmp_path / "home")
+    assert store.list_corpora(None)["mine"].is_relative_to(tmp_path / "home")

@@ -445,7 +445,7 @@ def test_corpora_are_found_by_name_and_by_folder(tmp_path: Path) -> None:
     store.save(tmp_path / "corpora" / "arms", MANIFEST, arrays())
     assert store.locate("arms", tmp_path) == tmp_path / "corpora" / "arms"
     assert store.locate(str(tmp_path / "corpora" / "arms")) == tmp_path / "corpora" / "arms"
-    assert list(store.known(tmp_path))[:2] == ["arms", "ballet"]
+    assert list(store.list_corpora(tmp_path))[:2] == ["arms", "ballet"]
     assert store.locate("ballet", tmp_path).parent.name == "corpora"
 
 
