@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
 from motionmind.tween.certificate import Source
 from motionmind.tween.report import TweenReport, report_of
-from motionmind.tween.result import Tween
+
+if TYPE_CHECKING:
+    from motionmind.tween.result import Tween
 
 
 class JointStep(msgspec.Struct, frozen=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -12,7 +12,9 @@ import numpy as np
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.tween.certificate import Bridge, Source, Wait
-from motionmind.tween.result import Tween
+
+if TYPE_CHECKING:
+    from motionmind.tween.result import Tween
 
 
 class PassedPosture(msgspec.Struct, frozen=True):

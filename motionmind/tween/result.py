@@ -11,6 +11,7 @@ from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
+from motionmind.tween.report import plain, report_of
 from motionmind.tween.request import TweenRequest
 
 
@@ -98,8 +99,6 @@ class Tween:
 
     def report(self) -> dict[str, Any]:
         """Return all but the movement itself as plain values for JSON: the fields of `TweenReport`."""
-        from motionmind.tween.report import plain, report_of
-
         return plain(report_of(self))
 
     def problem(self) -> str:
