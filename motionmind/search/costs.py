@@ -1,7 +1,7 @@
 """Costs of a path of positions, of its edges and of its couplings.
 
-Polishing and sampling sum the costs of a chain, or of a moment, in loops of their own: shared functions for these loops
-made polishing 1.4 times slower, since numba counts references to the arrays of a trellis at every call.
+Polishing and sampling sum the costs of a chain, or of a moment, in loops of their own: functions that both called made
+polishing 1.4 times slower.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ def path_cost(trellis: Trellis, path: Ints) -> float:
 def edge_cost(trellis: Trellis, p: int, x: int) -> float:
     """Return the cost of the edge from position `p` to `x`; infinite where there is none.
 
-    The binary search is written out, as in `correction`: a call of a function shared by the two made polishing
-    1.7 times slower.
+    The binary search is written out, as in `correction`: calling one function for both slowed polishing.
     """
     low, high = trellis.row_ptr[p], trellis.row_ptr[p + 1]
     while low < high:
