@@ -1,5 +1,6 @@
 """Measures of movement: distance from the truth, smoothness, foot skating, likelihood, novelty and style."""
 
+from motionmind._moved import renamed
 from motionmind.body.contact import find_feet, find_floor, foot_slide, skating
 from motionmind.metrics.inbetween import l2p, l2q, npss, position_spread, seen
 from motionmind.metrics.paths import Habits, arrival_spread, arrivals, learn_habits
@@ -29,3 +30,13 @@ __all__ = [
     "skating",
     "sparc",
 ]
+
+__getattr__ = renamed(
+    __name__,
+    {
+        "Judge": "StyleClassifier",
+        "find_habits": "learn_habits",
+        "find_judge": "fit_style_classifier",
+        "find_phrases": "learn_phrases",
+    },
+)

@@ -202,7 +202,6 @@ class TweenRequest:
         number.
         """
         values = {one.name.rstrip("_"): getattr(self, one.name) for one in fields(self)}
-        del values["posturewise"]
         return values | {
             "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
             "pin": dict(self.pin),
