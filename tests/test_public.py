@@ -2,6 +2,7 @@
 
 import ast
 import doctest
+import importlib
 import inspect
 import subprocess
 import sys
@@ -104,6 +105,24 @@ def test_a_module_that_moved_is_found_under_its_old_name_with_a_warning(old: str
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("package", "old", "new"),
+    [
+        ("motionmind.formats", "lost", "lossy_fields"),
+        ("motionmind.metrics", "Judge", "StyleClassifier"),
+        ("motionmind.metrics", "find_habits", "learn_habits"),
+        ("motionmind.metrics", "find_judge", "fit_style_classifier"),
+        ("motionmind.metrics", "find_phrases", "learn_phrases"),
+    ],
+)
+def test_a_name_that_changed_is_found_under_its_old_name_with_a_warning(package: str, old: str, new: str) -> None:
+    module = importlib.import_module(package)
+    with pytest.warns(DeprecationWarning, match=f"{old} is now {new}; the old name goes in 0.3"):
+        assert getattr(module, old) is getattr(module, new)
+    with pytest.raises(AttributeError, match="has no attribute 'motor'"):
+        module.motor  # noqa: B018
 
 
 def test_a_module_that_never_was_is_not_found() -> None:

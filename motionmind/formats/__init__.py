@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from motionmind._moved import renamed
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
@@ -23,6 +24,8 @@ from motionmind.files import FilePath, write_atomically
 from motionmind.formats.lossy import lossy_fields
 
 __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
+
+__getattr__ = renamed(__name__, {"lost": "lossy_fields"})
 
 _READABLE = (".json", ".bvh", ".amc", ".txt", ".npz")
 _WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz")
