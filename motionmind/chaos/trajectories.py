@@ -270,7 +270,7 @@ def _step_of(field: Field) -> Step:
 
 @either
 def _near(x: Floats) -> bool:
-    """Whether a point [d] is near enough to the origin for an attractor; NaN is not."""
+    """Return whether a point [d] is near enough to the origin for an attractor; NaN is not."""
     near = True
     for i in range(len(x)):
         near = near and abs(x[i]) < _FAR

@@ -161,7 +161,7 @@ def _smooth(
         smoothed = variation.smooth(
             engine,
             alternatives=request["alternatives"],
-            told=interruption.on_progress,
+            on_progress=interruption.on_progress,
             watch=interruption.watch,
             **arguments,
         )

@@ -43,7 +43,7 @@ from motionmind.formats import _json
 
 
 class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """What the engine inserted: the times of its postures, and (joint, move) for each bridge."""
+    """A stretch that the engine inserted: the times of its postures, and (joint, move) for each bridge."""
 
     times: list[float]
     bridged: list[tuple[str, int]] = []  # msgspec copies it for each object

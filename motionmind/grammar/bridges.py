@@ -65,7 +65,7 @@ def _angles(centres: Floats) -> Floats:
 
 
 def _nearest(angles: Floats) -> Bools:
-    """Whether a state is among the nearest of another, given the angles between them in degrees [S, S]."""
+    """Return whether a state is among the nearest of another, given the angles between them in degrees [S, S]."""
     near = np.zeros(angles.shape, dtype=bool)
     others = angles + np.where(np.eye(len(angles), dtype=bool), np.inf, 0.0)
     order = np.argsort(others, axis=1, kind="stable")[:, :NEAREST]

@@ -22,7 +22,7 @@ ALIKE = 0.2  # radians a joint (root mean square) within which postures of a par
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
-    """How a corpus's bodies hold themselves, travel and stand, in its postures and midway between them.
+    """The carriage of a corpus's bodies: their pose, travel and stance in its postures and midway between them.
 
     There are N moments: the postures, then the middle of each of the M moves. A step is half a move.
 

@@ -18,7 +18,7 @@ from motionmind.learned.learning import Learned, learn
 
 @dataclass(frozen=True, eq=False)
 class LearnedCorpus(Learned):
-    """What was learned from a corpus (see `Learned`), and how long it took to load.
+    """A learned corpus (see `Learned`), and the time that it took to load.
 
     Attributes:
         load_seconds: time that loading took; 0 if it was not loaded.

@@ -72,7 +72,7 @@ class FlipReport(msgspec.Struct, frozen=True):
 
 
 class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
-    """What a corpus is, and how large.
+    """A corpus's description and size.
 
     Attributes:
         name: of the corpus.

@@ -94,7 +94,7 @@ class Habits:
         return (self._moves(path)[1] >= 0).ravel()
 
     def _moves(self, path: States) -> tuple[Bools, Ints, Ints]:
-        """Whether each joint moves, its transition or -1, and the row of the state that it leaves, each [T, joints]."""
+        """Return whether each joint moves, its transition or -1, and the row of the state left, each [T, joints]."""
         graph = self.transitions
         before, after = path[:-1, : self.joints], path[1:, : self.joints]
         edges = np.array(

@@ -1,4 +1,4 @@
-"""From a grammar to what the search reads: every edge and coupling with its cost in nats."""
+"""Building a model from a grammar: every edge and coupling of the search with its cost in nats."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from motionmind.search.problem import Model
 def build_model(
     grammar: Grammar, weights: Weights, coordination: float, bridge_price: float | None, novelty: float = 0.0
 ) -> Model:
-    """The costs of a grammar.
+    """Build the costs of a grammar.
 
     Args:
         grammar: what was learned.
-        weights: how transitions are weighed.
+        weights: scheme of the transitions' costs.
         coordination: lambda, the factor of the network's -log P.
         bridge_price: nats for each degree that a bridge spans; None leaves bridges out.
-        novelty: from 0 to 1, how little it matters which attested transitions are frequent.
+        novelty: from 0, where frequent transitions are cheap, to 1, where all attested from a state cost the same.
     """
     graph, bridges, net = grammar.transitions, grammar.bridges, grammar.coordination
     rows, targets, costs = graph.sources, graph.targets, graph.weights(weights, novelty)
@@ -49,7 +49,7 @@ def build_model(
 
 
 class Couplings(NamedTuple):
-    """How the chains of a Model are coupled; attributes as there."""
+    """The couplings between the chains of a Model; attributes as there."""
 
     parents: Ints
     unary: Floats
@@ -61,7 +61,13 @@ class Couplings(NamedTuple):
 
 
 def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
-    """The costs of a network with a factor; chain j has the rows `starts[j]` to `starts[j + 1]` of its states."""
+    """Build the couplings of a network times a factor.
+
+    Args:
+        net: the network, over states of the chains.
+        starts: first row of each chain's states [L + 1].
+        factor: factor of the network's -log P.
+    """
     unary, alone = factor * net.child_costs, np.zeros(starts[-1])
     corrections = np.zeros(len(net.pair_costs))
     for chain, parent in enumerate(net.parents):
@@ -82,16 +88,19 @@ def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
 
 
 def changes(path: Int32s) -> list[tuple[int, int, int]]:
-    """The moves of a path of states [T + 1, L] from one state to another: chain, from, to."""
+    """List the state changes of a path [T + 1, L]: chain, state left, state arrived in."""
     before, after = path[:-1], path[1:]
     moves, chains = np.nonzero(before != after)
     return list(zip(chains.tolist(), before[moves, chains].tolist(), after[moves, chains].tolist(), strict=True))
 
 
 def penalise(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
-    """The model in which each move from one state to another costs `nats` more for every one of `paths` that makes it.
+    """Return the model in which each state change costs `nats` more for every path of `paths` that makes it.
 
-    To hold still is no move that could be shared.
+    Args:
+        model: the costs; they stay as they are.
+        paths: states [T + 1, L] each.
+        nats: at least 0. A hold is no state change, and costs what it did.
     """
     costs = model.costs.copy()
     for path in paths:
@@ -105,6 +114,6 @@ def penalise(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
 
 
 def shared_moves(path: Int32s, others: Sequence[Int32s]) -> int:
-    """How many moves of chains from one state to another a path shares with others, counted for each of these."""
+    """Count the state changes that a path [T + 1, L] shares with others, once for each of these."""
     made = changes(path)
     return sum(move in theirs for theirs in map(set, map(changes, others)) for move in made)

@@ -1,9 +1,9 @@
-"""The same problem with moves for states, for a coordination that is about moves: [C98]'s progressions.
+"""Lifting a problem from states to moves, for coordination by moves: the progressions of [C98].
 
-A chain's states are then the moves of its joint graph, each of which leads on to those that leave where it ends. What a
-move weighs is what the edge into it costs, and how it goes with the parent's move is a coupling between two states, as
-it is between postures; so all that searches a model searches this one. For each state of the joint graph there is one
-more, without edges into it: being there before any move, where a path starts.
+In the lifted model, a chain's states are the moves of its joint graph, and each leads to the moves that start where it
+ends. The weight of a move is the cost of the edge into it; its coordination with the parent's move is a coupling between
+two states, as between postures. So whatever searches a model can search this one. Each state of the joint graph adds one
+more state, without edges into it: being there before any move, where a path starts.
 """
 
 from __future__ import annotations
@@ -16,10 +16,15 @@ from motionmind.tween.problem import couplings
 
 
 def lift_to_moves(model: Model, net: Coordination, lambda_: float) -> Model:
-    """The model whose states are moves of `model`, coupled by `net` with the factor `lambda_`.
+    """Return the model whose states are moves of `model`.
 
-    State s of a chain is being at s before any move; state S + k is the k-th of the chain's moves. What a path's states
-    are in `model` is the `place` of each.
+    State s of a chain is being at s before any move; state S + k is the k-th of the chain's moves. `place` gives the
+    state of `model` that each stands for.
+
+    Args:
+        model: the costs over states.
+        net: the network that couples moves.
+        lambda_: factor of the network's -log P.
     """
     sizes, first_moves = np.diff(model.starts), model.indptr[model.starts]
     starts = model.starts + first_moves

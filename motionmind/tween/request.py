@@ -28,7 +28,7 @@ SLOWEST = 0.01  # frames a second
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TweenRequest:
-    """What is asked of a tween from posture A to posture B.
+    """A request for a tween from posture A to posture B.
 
     Attributes:
         moves: number of moves, or the least and the greatest number; None lets the search find the best number.

@@ -324,7 +324,7 @@ def _with_candidates(transition: Transition, tweens: Iterable[Tween]) -> Transit
 
 
 def _candidate_of(tween: Tween) -> Candidate:
-    """What a variation keeps of a tween."""
+    """Return the part of a tween that a variation keeps."""
     return Candidate(
         replace(tween.motion, name=""),
         tween.path,
