@@ -1,9 +1,9 @@
 """Lifting a problem from states to moves, for coordination by moves: the progressions of [C98].
 
 In the lifted model, a chain's states are the moves of its joint graph, and each leads to the moves that start where it
-ends. The weight of a move is the cost of the edge into it; its coordination with the parent's move is a coupling between
-two states, as between postures. So whatever searches a model can search this one. Each state of the joint graph adds one
-more state, without edges into it: being there before any move, where a path starts.
+ends. The weight of a move is the cost of the edge into it; its coordination with the parent's move is a coupling
+between two states, as between postures. So whatever searches a model can search this one. Each state of the joint graph
+adds one more state, without edges into it: being there before any move, where a path starts.
 """
 
 from __future__ import annotations
