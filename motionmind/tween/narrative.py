@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import msgspec
 
 from motionmind.tween.certificate import Source
-from motionmind.tween.report import TweenReport, report_of
-
-if TYPE_CHECKING:
-    from motionmind.tween.result import Tween
+from motionmind.tween.report import TweenReport
+from motionmind.tween.result import Tween, report_of
 
 
 class JointStep(msgspec.Struct, frozen=True):

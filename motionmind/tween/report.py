@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,9 +12,6 @@ import numpy as np
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.tween.certificate import Bridge, Source, Wait
-
-if TYPE_CHECKING:
-    from motionmind.tween.result import Tween
 
 
 class PassedPosture(msgspec.Struct, frozen=True):
@@ -111,43 +108,6 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError(f"its tables are not of {moves} moves of {joints} joints")
         if moves < 0 or len(self.times) != moves + 1:
             raise ValueError(f"it has {len(self.path)} postures and {len(self.times)} times")
-
-
-def report_of(tween: Tween) -> TweenReport:
-    """Return the report of a tween."""
-    costs, inner = tween.costs, tween.path_degrees[1:-1]
-
-    def by_joint(row: Sequence[float]) -> dict[str, float]:
-        return dict(zip(tween.joints, map(float, row), strict=True))
-
-    return TweenReport(
-        asked=tween.asked,
-        status=tween.status,
-        cost=tween.cost,
-        lower_bound=tween.lower_bound,
-        gap=tween.gap,
-        moves=tween.moves,
-        expansions=tween.expansions,
-        peak_nodes=tween.peak_nodes,
-        node_budget=tween.node_budget,
-        seconds=tween.seconds,
-        joints=list(tween.joints),
-        path=tween.path.tolist(),
-        attested=tween.attested,
-        bridges=list(tween.bridges),
-        waits=list(tween.waits),
-        shared=tween.shared,
-        vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
-        snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
-        path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},
-        sources=[list(row) for row in tween.sources],
-        detail=list(tween.detail),
-        times=tween.motion.insertions[0].times.tolist(),
-        names=[list(row) for row in costs.names],
-        degrees=costs.degrees.tolist(),
-        likelihood=costs.likelihood.tolist(),
-        costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move),
-    )
 
 
 def plain(report: TweenReport) -> dict[str, Any]:

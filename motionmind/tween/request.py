@@ -10,20 +10,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from numbers import Integral
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Protocol, get_args
 
 from motionmind.body.rates import FASTEST
 from motionmind.errors import MotionMindError, did_you_mean
 from motionmind.grammar.schemes import Scheme, Weights
 
 if TYPE_CHECKING:
+    from motionmind._typing import States
     from motionmind.body.motion import Posture
-    from motionmind.tween.result import Tween
 
 MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory holds
 MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
 SLOWEST = 0.01  # frames a second
+
+
+class HasPath(Protocol):
+    """A tween, of which only the path counts."""
+
+    @property
+    def path(self) -> States:
+        """States of the joint chains [moves + 1, L]."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,7 +88,7 @@ class TweenRequest:
     hold: Sequence[str] = ()
     avoid: Sequence[tuple[str, int | str]] = ()
     via: Sequence[Posture | tuple[Posture, int]] = ()
-    unlike: Sequence[Tween] = ()
+    unlike: Sequence[HasPath] = ()
     diversity: float = 2.0
     sample: bool = False
     seed: int = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
-from motionmind.tween.report import plain, report_of
+from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
 
 
@@ -108,3 +109,40 @@ class Tween:
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
         return cfn(replace(self.search_problem, vias=tuple(vias)), self.moves, self.joints)
+
+
+def report_of(tween: Tween) -> TweenReport:
+    """Return the report of a tween."""
+    costs, inner = tween.costs, tween.path_degrees[1:-1]
+
+    def by_joint(row: Sequence[float]) -> dict[str, float]:
+        return dict(zip(tween.joints, map(float, row), strict=True))
+
+    return TweenReport(
+        asked=tween.asked,
+        status=tween.status,
+        cost=tween.cost,
+        lower_bound=tween.lower_bound,
+        gap=tween.gap,
+        moves=tween.moves,
+        expansions=tween.expansions,
+        peak_nodes=tween.peak_nodes,
+        node_budget=tween.node_budget,
+        seconds=tween.seconds,
+        joints=list(tween.joints),
+        path=tween.path.tolist(),
+        attested=tween.attested,
+        bridges=list(tween.bridges),
+        waits=list(tween.waits),
+        shared=tween.shared,
+        vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
+        snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
+        path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},
+        sources=[list(row) for row in tween.sources],
+        detail=list(tween.detail),
+        times=tween.motion.insertions[0].times.tolist(),
+        names=[list(row) for row in costs.names],
+        degrees=costs.degrees.tolist(),
+        likelihood=costs.likelihood.tolist(),
+        costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move),
+    )

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
 
+from motionmind._typing import Ints
 from motionmind.corpus.corpus import Facing
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, Wait
+from motionmind.variation.course import Course
+from motionmind.variation.piece import Piece
 from motionmind.variation.review import Decision, Seam
 from motionmind.variation.seams import AbruptJoint, Candidate
-
-if TYPE_CHECKING:
-    from motionmind.variation.variation import Course, Variation
 
 
 class PieceReport(msgspec.Struct, frozen=True):
@@ -104,16 +103,23 @@ class VariationReport(msgspec.Struct, frozen=True):
     edits: int
 
 
-def report_of(variation: Variation) -> VariationReport:
-    """Report what a variation is made of: all but the movement."""
-    piece, order = variation.piece, variation.postures
+def report_of(piece: Piece, course: Course, order: Ints, seams: Sequence[Seam], edits: int) -> VariationReport:
+    """Report a variation: all but the movement.
+
+    Args:
+        piece: what it is a variation of.
+        course: the trajectories by which it was made.
+        order: numbers of the piece's postures as they stand now [L].
+        seams: its seams.
+        edits: number of its edits.
+    """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),
-        _course_report(variation.course),
+        _course_report(course),
         order.tolist(),
-        _counts_report(variation),
-        list(map(_seam_report, variation.seams)),
-        len(variation.edits),
+        _counts_report(piece, order, seams),
+        list(map(_seam_report, seams)),
+        edits,
     )
 
 
@@ -131,8 +137,7 @@ def _course_report(course: Course) -> CourseReport:
     )
 
 
-def _counts_report(variation: Variation) -> CountsReport:
-    order, seams = variation.postures, variation.seams
+def _counts_report(piece: Piece, order: Ints, seams: Sequence[Seam]) -> CountsReport:
     stays = np.flatnonzero(np.diff(order) == 0)
     return CountsReport(
         postures=len(order),
@@ -142,7 +147,7 @@ def _counts_report(variation: Variation) -> CountsReport:
         abrupt=sum(seam.is_abrupt for seam in seams),
         unjudged=sum(seam.transition is None for seam in seams),
         stays=len(stays),
-        seconds_still=float(variation.piece.durations[order[stays]].sum()),
+        seconds_still=float(piece.durations[order[stays]].sum()),
     )
 
 

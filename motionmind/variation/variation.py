@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,6 +19,7 @@ from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
+from motionmind.variation.course import Course
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -41,36 +42,6 @@ ALTERNATIVES = 3
 EXPONENT_STEPS = 200_000
 MOST_STEPS = 1_000_000_000  # of a transient: some minutes
 LONGEST = 1_000_000  # postures that a variation may have
-
-
-@dataclass(frozen=True)
-class Course:
-    """The trajectories that a variation was made by, in d dimensions.
-
-    Attributes:
-        flow: the flow's name.
-        parameters: the flow's parameters, by name.
-        start: the start of the piece's trajectory, before its transient [d].
-        nudge: the offset, as asked for, between the starts of the two trajectories once the transient is over [d].
-        skip: points of the trajectories that are left out between two postures.
-        step: the step of the integration, in the flow's units of time.
-        transient: steps that are dropped from the beginning of the piece's trajectory.
-        exponent: the flow's largest Lyapunov exponent, nats a unit of time, accurate to some percent.
-    """
-
-    flow: str
-    parameters: Mapping[str, float]
-    start: tuple[float, ...]
-    nudge: tuple[float, ...]
-    skip: int
-    step: float
-    transient: int
-    exponent: float
-
-    @property
-    def parting(self) -> float:
-        """Nats by which neighbouring trajectories part, on average, from one posture to the next."""
-        return self.exponent * self.step * (self.skip + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +107,9 @@ class Variation:
 
     def report(self) -> dict[str, Any]:
         """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
-        report: dict[str, Any] = msgspec.to_builtins(report_of(self))
+        report: dict[str, Any] = msgspec.to_builtins(
+            report_of(self.piece, self.course, self.postures, self.seams, len(self.edits))
+        )
         return report
 
     # --- edits ------------------------------------------------------------------------------------------------------

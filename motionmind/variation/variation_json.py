@@ -30,10 +30,11 @@ from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
 from motionmind.formats.motion_json import FramesSchema, InsertionSchema, MotionSchema, motion_of, write_motion_json
+from motionmind.variation.course import Course
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam
 from motionmind.variation.seams import Candidate, Index, InsertionCandidate, JudgedTransition, Transition
-from motionmind.variation.variation import Course, Variation
+from motionmind.variation.variation import Variation
 
 VERSION = 1
 _ROUNDING = 1e-6  # of a quaternion and of metres: how far a candidate's ends may be from the piece's postures

@@ -15,8 +15,9 @@ from motionmind.cli import app
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import read_posture
 from motionmind.tween.engine import Engine
-from motionmind.tween.report import TweenReport, encode_report, read_report, report_of
+from motionmind.tween.report import TweenReport, encode_report, read_report
 from motionmind.tween.request import TweenRequest
+from motionmind.tween.result import report_of
 
 FIRST, PLIE = (read_posture(BALLET / "postures" / f"{name}.json") for name in ("first", "plie"))
 
