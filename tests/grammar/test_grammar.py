@@ -350,7 +350,7 @@ def test_the_best_path_is_that_of_brute_force_on_counts_and_cpds(
 
 def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
     code = (
-        "import sys, numpy as np; sys.path.insert(0, sys.argv[1])\n"
+        "import sys, numpy as np; sys.path[:0] = sys.argv[1:]\n"
         "from test_grammar import Problem, Rules, build_model, corpus, grammar, solution\n"
         "for seed in range(3):\n"
         "    body = corpus(seed)\n"
@@ -362,7 +362,7 @@ def test_fresh_processes_give_the_same_bytes_whatever_their_hash_seed() -> None:
     )
     processes = [
         subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-c", code, str(Path(__file__).parent)],
+            [sys.executable, "-W", "ignore", "-c", code, *map(str, Path(__file__).parents[:2])],
             env={**os.environ, "PYTHONHASHSEED": hash_seed},
             stdout=subprocess.PIPE,
         )

@@ -408,7 +408,7 @@ def test_whole_postures_have_no_progressions(engine: Engine) -> None:
 
 
 def test_more_moves_than_a_node_can_number_are_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionmind.tween.engine.MOST_STATES_OF_CHAIN", 50)
+    monkeypatch.setattr("motionmind.tween.formulate.MOST_STATES_OF_CHAIN", 50)
     with pytest.raises(
         MotionMindError, match=r"has \d+ states and moves, and the search takes up to 50; build the corpus"
     ):
