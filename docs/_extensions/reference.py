@@ -40,9 +40,12 @@ SCHEMAS = {
     "motion": "motionmind.formats.motion_json.MotionSchema",
     "variation": "motionmind.variation.variation_json.VariationSchema",
     "tween-report": "motionmind.tween.report.TweenReport",
+    "explanation": "motionmind.tween.narrative.Explanation",
+    "diagnosis": "motionmind.tween.diagnosis.Diagnosis",
     "source-manifest": "motionmind.corpus.manifest.SourceManifest",
     "built-manifest": "motionmind.corpus.manifest.BuiltManifest",
     "corpus-summary": "motionmind.learned.summary.CorpusSummary",
+    "corpus-check": "motionmind.learned.summary.CorpusCheck",
     "measure-report": "motionmind.metrics.measure.MeasureReport",
     "variation-report": "motionmind.variation.report.VariationReport",
 }
