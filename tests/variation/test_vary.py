@@ -509,6 +509,8 @@ def test_damaged_files_are_refused_or_read(
     section = {"variation": json.loads(path.read_text())["variation"]}
     head = path.read_text().split('"variation": ')[0]
     text = json.dumps(section)[1:]
+    path.write_bytes(head.encode() + text.encode())
+    assert read_variation(path).postures.tolist() == variation.postures.tolist()
     refused = 0
     for _ in range(300):
         path.write_bytes(head.encode() + mutate(text, rng))
@@ -516,7 +518,7 @@ def test_damaged_files_are_refused_or_read(
             read_variation(path).motion()
         except MotionMindError:
             refused += 1
-    assert 50 < refused < 300
+    assert refused > 50
 
 
 def test_numpys_numbers_are_written_as_what_they_are(kata: Piece, karate: Engine, tmp_path: Path) -> None:
