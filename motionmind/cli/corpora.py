@@ -22,7 +22,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import heeding_interrupts, note, print_check, print_origins, progress
+from motionmind.cli.printing import note, print_check, print_origins, progress
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.errors import MotionMindError
@@ -139,10 +139,9 @@ def build(
     others = parse_mixture(mix)
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
-    with heeding_interrupts():
-        engine = Engine.fit(
-            clips, name=name, home=home, discretization=discretization, flip_degrees=flip_angle, mix=others, **options
-        )
+    engine = Engine.fit(
+        clips, name=name, home=home, discretization=discretization, flip_degrees=flip_angle, mix=others, **options
+    )
     engine.save(place)
     print_check(engine.check())
     click.echo(f"built {place}")

@@ -7,11 +7,9 @@ import math
 import signal
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
-from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
@@ -61,28 +59,6 @@ def note(message: str) -> None:
 def count(number: int, noun: str) -> str:
     """Format a number of things: "1 move", "2 moves"."""
     return f"{number} {noun}{'s' * (number != 1)}"
-
-
-@contextmanager
-def heeding_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt at the end if Ctrl-C was pressed inside and the interrupt got lost.
-
-    Python drops an interrupt that comes while a module is imported that catches everything, as some large ones do.
-    """
-    is_pressed = False
-
-    def press(number: int, frame: FrameType | None) -> None:
-        nonlocal is_pressed
-        is_pressed = True
-        signal.default_int_handler(number, frame)
-
-    previous = signal.signal(signal.SIGINT, press)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-    if is_pressed:
-        raise KeyboardInterrupt
 
 
 class Interruption:
