@@ -147,6 +147,8 @@ class _Outputs:
     def write(self, results: Sequence[Tween]) -> list[Path]:
         """Write all that was asked for, or nothing if one file fails; return the files."""
         from motionmind.formats import write_atomically
+        from motionmind.tween.report import encode_report
+        from motionmind.tween.result import report_of
 
         files = [path for number in range(1, len(results) + 1) for path in self._files_of(number) if path]
         with all_or_none(files):
@@ -157,7 +159,7 @@ class _Outputs:
                 if problem:
                     write_atomically(problem, result.problem().encode())
                 if report:
-                    write_atomically(report, f"{json.dumps(result.report())}\n".encode())
+                    write_atomically(report, encode_report(report_of(result)))
         return files
 
     def write_diagnosis(self, error: NoPathError) -> None:

@@ -6,6 +6,7 @@ another to the order that the attractor gave. To undo the last edit is to drop i
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -112,7 +113,8 @@ class Seam:
 
     @property
     def join(self) -> Transition | None:
-        """The former name of `transition`."""
+        """The former name of `transition`, which goes in 0.3."""
+        warnings.warn("Seam.join is now Seam.transition; the old name goes in 0.3", DeprecationWarning, stacklevel=2)
         return self.transition
 
     @property

@@ -7,6 +7,7 @@ corpus (or, posturewise, the whole body does), or turns faster than it ever does
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -126,7 +127,8 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
 
     @property
     def breaks(self) -> tuple[AbruptJoint, ...]:
-        """The former name of `abrupt_joints`."""
+        """The former name of `abrupt_joints`, which goes in 0.3."""
+        warnings.warn("breaks is now abrupt_joints; the old name goes in 0.3", DeprecationWarning, stacklevel=2)
         return self.abrupt_joints
 
     @property
