@@ -51,6 +51,8 @@ class Engine(LearnedCorpus):
         b: Posture,
         request: TweenRequest | None = None,
         *,
+        before: Motion | None = None,
+        after: Motion | None = None,
         watch: Watch | None = None,
         **options: Any,
     ) -> Tween:
@@ -60,19 +62,23 @@ class Engine(LearnedCorpus):
             a: where the motion starts, exactly.
             b: where the motion ends, exactly.
             request: what is asked beside the two postures; None asks for nothing more.
+            before: frames that lead up to `a`, which shows how the body moves as it leaves: the last of them is `a`,
+                wherever it stands. None where it is not known.
+            after: frames that follow `b`, in the same way: the first of them is `b`.
             watch: called between pieces of work with the search's progress; where it returns True, the best path so
                 far is the answer, with what is proven by then.
             options: fields of `TweenRequest` to set, as `engine.tween(a, b, duration=2.0)`.
 
         Raises:
             NoPathError: nothing joins them under these rules; the message is the diagnosis.
-            SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
-            MotionMindError: an option is out of its range, or asks for what cannot be.
+            SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
+            MotionMindError: an option is out of its range, or asks for what cannot be; `before` does not end in `a`,
+                `after` does not begin in `b`, or one of them has a single frame.
             TypeError: there is no such option.
         """
         request = TweenRequest.of(request, **options)
         began = perf_counter()
-        formulation = formulate(self, a, b, request)
+        formulation = formulate(self, a, b, request, before, after)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
         if request.sample and len(certificate.path) > 1:
@@ -185,6 +191,8 @@ class Engine(LearnedCorpus):
             seconds=seconds,
             search_problem=searched,
             request=request,
+            before=formulation.before,
+            after=formulation.after,
         )
 
     @cached_property

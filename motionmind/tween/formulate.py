@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23
-from motionmind.body.motion import Posture
+from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
@@ -29,6 +30,10 @@ from motionmind.tween.problem import build_model, penalise
 from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import MOST_MOVES, TweenRequest
 
+_Movement = TypeVar("_Movement", Motion, Posture)
+
+_SAME_POSTURE = 1.0  # degrees: frames that lead up to a posture end in it, but for the rounding of files
+
 
 @dataclass(frozen=True, eq=False)
 class Formulation:
@@ -37,6 +42,10 @@ class Formulation:
     Attributes:
         a: posture A on the corpus's skeleton.
         b: posture B on the corpus's skeleton.
+        leaving: the velocity with which the body leaves A, on the corpus's skeleton; None where it is not given.
+        arriving: the velocity with which the body arrives at B, as `leaving`.
+        before: seconds of the movement that was given before A; None for none.
+        after: seconds of the movement that was given after B; None for none.
         through: postures to pass through on the corpus's skeleton, in order.
         request: what is asked.
         snap_degrees: angle between the orientations of A, the postures to pass through and B, and their states
@@ -52,6 +61,10 @@ class Formulation:
 
     a: Posture
     b: Posture
+    leaving: Velocity | None
+    arriving: Velocity | None
+    before: float | None
+    after: float | None
     through: tuple[Posture, ...]
     request: TweenRequest
     snap_degrees: Floats
@@ -64,21 +77,32 @@ class Formulation:
 
     @property
     def stays(self) -> bool:
-        """Whether no move at all is best: A is B to within rounding, and nothing is asked of the way."""
-        return not self.request.fixes_length and not self.request.via and _same(self.a, self.b)
+        """Whether no move at all is best: A is B to within rounding, does not move, and nothing is asked of the way."""
+        moving = self.leaving is not None or self.arriving is not None
+        return not (self.request.fixes_length or self.request.via or moving) and _same(self.a, self.b)
 
 
-def formulate(learned: LearnedCorpus, a: Posture, b: Posture, request: TweenRequest) -> Formulation:
+def formulate(
+    learned: LearnedCorpus,
+    a: Posture,
+    b: Posture,
+    request: TweenRequest,
+    before: Motion | None = None,
+    after: Motion | None = None,
+) -> Formulation:
     """Bring the postures onto the corpus's skeleton and states, and build the constrained problem from its grammar.
 
     Raises:
-        SkeletonError: a posture is on another skeleton than the corpus, or has no such joint.
+        SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
         NoPathError: a joint to be held has different states in A and B.
-        MotionMindError: the request does not fit the corpus, such as a duration that is too long for it.
+        MotionMindError: the request does not fit the corpus, such as a duration that is too long for it; the movement
+            before A does not end in A, or the one after B begin in B; or it has one frame, which shows no velocity.
     """
     shortest, longest = _move_range(learned, request)
     rules = Rules(request.beta, request.tau, shortest, longest, request.nodes(len(learned.space)))
     a, b = _on_skeleton(learned, a, "posture A"), _on_skeleton(learned, b, "posture B")
+    leaving = None if before is None else _leaving(learned, a, before)
+    arriving = None if after is None else _arriving(learned, b, after)
     vias = [(_on_skeleton(learned, via, f"via {n}"), move) for n, (via, move) in enumerate(request.vias, start=1)]
     through = tuple(via for via, _ in vias)
     joints = len(a.skeleton)
@@ -108,7 +132,21 @@ def formulate(learned: LearnedCorpus, a: Posture, b: Posture, request: TweenRequ
     if by_moves:
         searched, coordination = _lifted(learned, problem, factor)
     return Formulation(
-        a, b, through, request, snap_degrees, nearest, constraints, model, problem, searched, coordination
+        a,
+        b,
+        leaving,
+        arriving,
+        _seconds(before),
+        _seconds(after),
+        through,
+        request,
+        snap_degrees,
+        nearest,
+        constraints,
+        model,
+        problem,
+        searched,
+        coordination,
     )
 
 
@@ -163,15 +201,42 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
     return replace(problem, model=lift_to_moves(held, network, factor), rules=rules), network
 
 
-def _on_skeleton(learned: LearnedCorpus, posture: Posture, which: str) -> Posture:
-    """Return the posture on the corpus's joints; SkeletonError names the difference."""
+def _leaving(learned: LearnedCorpus, a: Posture, before: Motion) -> Velocity:
+    """Return the velocity with which the movement before posture A, on the corpus's skeleton, ends there."""
+    before = _on_skeleton(learned, before, "the movement before A")
+    _check_posture(before.posture(-1), a, "the movement before A does not end in A")
+    return Velocity.at_end(before)
+
+
+def _arriving(learned: LearnedCorpus, b: Posture, after: Motion) -> Velocity:
+    """Return the velocity with which the movement after posture B, on the corpus's skeleton, begins there."""
+    after = _on_skeleton(learned, after, "the movement after B")
+    _check_posture(after.posture(0), b, "the movement after B does not begin in B")
+    return Velocity.at_start(after)
+
+
+def _seconds(motion: Motion | None) -> float | None:
+    """Return how long a motion lasts, seconds; None for none."""
+    return None if motion is None else float(motion.times[-1] - motion.times[0])
+
+
+def _check_posture(found: Posture, expected: Posture, fault: str) -> None:
+    """Check that two postures are one, wherever they stand; MotionMindError with the `fault` names the worst joint."""
+    degrees = np.degrees(rot.angle(found.rotations, expected.rotations))
+    worst = int(degrees.argmax())
+    if degrees[worst] > _SAME_POSTURE:
+        raise MotionMindError(f"{fault}: {found.skeleton.names[worst]} is {degrees[worst]:.3g} degrees off there")
+
+
+def _on_skeleton(learned: LearnedCorpus, movement: _Movement, which: str) -> _Movement:
+    """Return a posture or a motion on the corpus's joints; SkeletonError names the difference."""
     skeleton = learned.corpus.skeleton
-    if human23().difference(skeleton) is None and joint_mapping(posture.skeleton) is not None:
-        posture = to_human23(posture)
-    difference = skeleton.difference(posture.skeleton)
+    if human23().difference(skeleton) is None and joint_mapping(movement.skeleton) is not None:
+        movement = to_human23(movement)
+    difference = skeleton.difference(movement.skeleton)
     if difference is not None:
         raise SkeletonError(f"{which} is on another skeleton than corpus {learned.corpus.name!r}: {difference}")
-    return posture
+    return movement
 
 
 def _same(a: Posture, b: Posture) -> bool:

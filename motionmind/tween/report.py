@@ -33,7 +33,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     """All of a tween but its movement. Rows are by move or posture, then by joint.
 
     Attributes:
-        asked: the request, see `TweenRequest`.
+        asked: the request, see `TweenRequest`; `before` and `after` are seconds of the movement that was given before A
+            and after B, or null.
         status: "optimal", "bounded", "interrupted" or "sampled".
         cost: of the path, nats; the `costs` add up to it.
         lower_bound: no path that fulfils the request costs less, nats.

@@ -46,6 +46,8 @@ class Tween:
             to run.
         search_problem: the problem that was searched.
         request: what was asked.
+        before: seconds of the movement that was given before A; None where A was given alone.
+        after: seconds of the movement that was given after B; None where B was given alone.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
@@ -77,6 +79,8 @@ class Tween:
     seconds: dict[str, float]
     search_problem: Problem
     request: TweenRequest
+    before: float | None
+    after: float | None
 
     @property
     def moves(self) -> int:
@@ -95,8 +99,8 @@ class Tween:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """The request as plain values for JSON: see `TweenRequest.plain`."""
-        return self.request.plain(len(self.joints))
+        """What was asked as plain values for JSON: see `TweenRequest.plain`, and `before` and `after`."""
+        return self.request.plain(len(self.joints)) | {"before": self.before, "after": self.after}
 
     def report(self) -> dict[str, Any]:
         """Return all but the movement itself as plain values for JSON: the fields of `TweenReport`."""

@@ -7,7 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionmind.body.motion import Insertion, Motion, Posture
+from motionmind._typing import Floats
+from motionmind.body.human import human23
+from motionmind.body.mirror import find_sides, mirrored
+from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -23,6 +26,97 @@ def some_motion(frames: int, rate: float = 30.0, seed: int = 0, start: float = 0
         q.append(rot.mul(q[-1], step))
     times = start + np.arange(frames) / rate
     return Motion(ARM, rot.normalise(np.array(q)), np.cumsum(rng.normal(size=(frames, 3)), 0), times, "waving")
+
+
+# --- velocities -------------------------------------------------------------------------------------------------------
+
+
+def turning(frames: int, rate: float, turns: Floats, travel: Floats, seed: int = 0) -> Motion:
+    """An arm that turns steadily by `turns` [2, 3] radians a second about axes of its own, and travels steadily."""
+    start = rot.normalise(np.random.default_rng(seed).normal(size=(2, 4)))
+    times = 5.0 + np.arange(frames) / rate
+    rotations = rot.mul(start, rot.exp(turns * (times - 5.0)[:, None, None]))
+    return Motion(ARM, rot.normalise(rotations), travel * times[:, None], times)
+
+
+@given(st.integers(2, 40), st.sampled_from([5.0, 24.0, 30.0, 120.0]), st.integers(0, 99))
+def test_a_steady_movement_has_its_velocity_at_both_ends(frames: int, rate: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turns, travel = rng.uniform(-4.0, 4.0, (2, 3)), rng.normal(size=3)
+    motion = turning(frames, rate, turns, travel, seed)
+    for found in (Velocity.at_start(motion), Velocity.at_end(motion)):
+        np.testing.assert_allclose(found.rotations, turns, atol=1e-6)
+        np.testing.assert_allclose(found.root, travel, atol=1e-9)
+
+
+def test_a_velocity_foretells_the_next_frame_in_the_joint_s_own_frame() -> None:
+    turns = np.array([[0.0, 3.0, 0.0], [1.0, 0.0, -2.0]])
+    motion = turning(11, 60.0, turns, np.array([0.0, 0.0, 1.2]))
+    found = Velocity.at_end(motion.slice(0, 10))
+    ahead = rot.mul(motion.rotations[9], rot.exp(found.rotations / 60.0))
+    assert rot.angle(ahead, motion.rotations[10]).max() < 1e-9
+    np.testing.assert_allclose(motion.root[9] + found.root / 60.0, motion.root[10], atol=1e-9)
+
+
+@given(st.integers(2, 30), st.sampled_from([8.0, 30.0, 120.0]), st.integers(0, 99))
+def test_a_movement_run_backwards_begins_with_the_velocity_it_ended_with_reversed(
+    frames: int, rate: float, seed: int
+) -> None:
+    motion = some_motion(frames, rate, seed)
+    backwards = Motion(ARM, motion.rotations[::-1], motion.root[::-1], motion.times[-1] - motion.times[::-1])
+    for found, expected in (
+        (Velocity.at_start(backwards), Velocity.at_end(motion)),
+        (Velocity.at_end(backwards), Velocity.at_start(motion)),
+    ):
+        np.testing.assert_allclose(found.rotations, -expected.rotations, atol=1e-9)
+        np.testing.assert_allclose(found.root, -expected.root, atol=1e-9)
+
+
+def test_a_mirror_mirrors_the_velocity() -> None:
+    """A velocity of turning is an axial vector: what a mirror keeps of it is the part along the mirror's axis."""
+    rng, body = np.random.default_rng(3), human23()
+    steps = rot.exp(rng.uniform(-0.2, 0.2, (6, 23, 3)))
+    rotations = np.stack([steps[0], rot.mul(steps[0], steps[1]), rot.mul(steps[0], steps[2])])
+    motion = Motion(body, rot.normalise(rotations), rng.normal(size=(3, 3)), np.array([0.0, 0.03, 0.06]))
+    for ends in (Velocity.at_start, Velocity.at_end):
+        own, seen = ends(motion), ends(mirrored(motion))
+        partners = find_sides(body).partners
+        np.testing.assert_allclose(seen.rotations, own.rotations[partners] * [1.0, -1.0, -1.0], atol=1e-9)
+        np.testing.assert_allclose(seen.root, own.root * [-1.0, 1.0, 1.0], atol=1e-12)
+
+
+def test_a_velocity_is_of_the_last_fifteenth_of_a_second_or_the_last_step() -> None:
+    earlier, later = np.zeros((2, 3)), np.array([[2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    for rate in (30.0, 120.0):
+        count = round(rate / 15.0)
+        still = turning(20, rate, earlier, np.zeros(3))
+        moves = rot.mul(still.rotations[-1], rot.exp(later * (np.arange(count) + 1.0)[:, None, None] / rate))
+        times = 5.0 + np.arange(20 + count) / rate
+        motion = Motion(ARM, np.concatenate([still.rotations, moves]), np.zeros((20 + count, 3)), times)
+        np.testing.assert_allclose(Velocity.at_end(motion).rotations, later, atol=1e-9)
+    keyframes = Motion(ARM, motion.rotations[[0, 10, -1]], np.zeros((3, 3)), np.array([0.0, 1.0, 3.0]))
+    np.testing.assert_allclose(Velocity.at_start(keyframes).rotations, 0.0, atol=1e-9)
+    np.testing.assert_allclose(Velocity.at_end(keyframes).rotations, later * count / rate / 2.0, atol=1e-9)
+
+
+def test_noise_of_single_frames_is_averaged_out() -> None:
+    turns, rng = np.array([[0.0, 1.0, 0.0], [0.5, 0.0, 0.0]]), np.random.default_rng(0)
+    errors = []
+    for seed in range(40):
+        clean = turning(13, 120.0, turns, np.zeros(3), seed)
+        noise = rot.exp(rng.normal(scale=0.002, size=(13, 2, 3)))
+        noisy = Motion(ARM, rot.normalise(rot.mul(clean.rotations, noise)), clean.root, clean.times)
+        pair = noisy.slice(11, 13)
+        errors.append([np.linalg.norm(Velocity.at_end(one).rotations - turns) for one in (noisy, pair)])
+    averaged, of_two = np.mean(errors, axis=0)
+    assert averaged < of_two / 4.0
+
+
+def test_one_frame_shows_no_velocity() -> None:
+    with pytest.raises(MotionMindError, match="waving has one frame, which shows no velocity"):
+        Velocity.at_end(some_motion(1))
+    with pytest.raises(MotionMindError, match="has one frame"):
+        Velocity.at_start(some_motion(1))
 
 
 # --- resampling -------------------------------------------------------------------------------------------------------

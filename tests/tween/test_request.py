@@ -87,7 +87,7 @@ def test_the_command_line_offers_every_field_with_its_default(command: str) -> N
 def test_the_report_repeats_every_field(ballet: Engine) -> None:
     tween = ballet.tween(FIRST, PLIE, duration=2.0, pin={"left_wrist": "B"}, memory=10**8)
     asked = tween.report()["asked"]
-    assert asked.keys() == {field.name.rstrip("_") for field in fields(TweenRequest)}
+    assert asked.keys() == {field.name.rstrip("_") for field in fields(TweenRequest)} | {"before", "after"}
     assert (asked["duration"], asked["pin"], asked["memory"]) == (2.0, {"left_wrist": "B"}, 10**8)
     assert asked["node_budget"] == tween.node_budget > 0
     assert asked["follow"] is True

@@ -1,0 +1,126 @@
+"""Ends that move: frames before A and after B, brought onto the corpus's skeleton as velocities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bundled_clips import ballet_clip
+
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture, Velocity
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.retarget import to_human23
+from motionmind.tween.engine import Engine
+from motionmind.tween.formulate import formulate
+from motionmind.tween.request import TweenRequest
+
+CLIP = ballet_clip("adagio").resample(30.0)
+A, B = CLIP.posture(40), CLIP.posture(100)
+BEFORE, AFTER = CLIP.slice(30, 41), CLIP.slice(100, 104)
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+def stood_elsewhere(motion: Motion) -> Motion:
+    return replace(motion, root=motion.root + np.array([3.0, 0.0, -1.0]), times=motion.times - 40.0)
+
+
+def renamed(motion: Motion) -> Motion:
+    """The same movement on the same joints, by Mixamo's names."""
+    trunk = {"pelvis": "Hips", "lumbar": "Spine", "thorax": "Spine1", "cervical": "Neck", "atlantal": "Head"}
+    limbs = {
+        "hip": "UpLeg",
+        "knee": "Leg",
+        "ankle": "Foot",
+        "toes": "ToeBase",
+        "clavicle": "Shoulder",
+        "shoulder": "Arm",
+        "elbow": "ForeArm",
+        "wrist": "Hand",
+        "fingers": "HandMiddle1",
+    }
+    sided = {f"{side}_{own}": side.title() + other for side in ("left", "right") for own, other in limbs.items()}
+    names = trunk | sided
+    body = motion.skeleton
+    return replace(motion, skeleton=replace(body, name="other", names=tuple(names[joint] for joint in body.names)))
+
+
+def test_the_velocities_are_those_of_the_frames_before_a_and_after_b(ballet: Engine) -> None:
+    found = formulate(ballet, A, B, TweenRequest(), BEFORE, stood_elsewhere(AFTER))
+    assert found.leaving is not None
+    assert found.arriving is not None
+    for velocity, expected in ((found.leaving, Velocity.at_end(BEFORE)), (found.arriving, Velocity.at_start(AFTER))):
+        assert np.abs(velocity.rotations).max() > 0.1
+        np.testing.assert_allclose(velocity.rotations, expected.rotations, atol=1e-9)
+        np.testing.assert_allclose(velocity.root, expected.root, atol=1e-9)
+    alone = formulate(ballet, A, B, TweenRequest(), after=AFTER)
+    assert alone.leaving is None
+    assert alone.arriving is not None
+
+
+def test_velocities_are_on_the_corpus_s_skeleton(ballet: Engine) -> None:
+    """As postures are: movement on another rig is retargeted."""
+    recorded = renamed(BEFORE)
+    found = formulate(ballet, recorded.posture(-1), B, TweenRequest(), recorded)
+    on_human23 = to_human23(recorded)
+    assert human23().difference(on_human23.skeleton) is None
+    assert found.leaving is not None
+    expected = Velocity.at_end(on_human23)
+    np.testing.assert_allclose(found.leaving.rotations, expected.rotations, atol=1e-9)
+    np.testing.assert_allclose(found.leaving.rotations, Velocity.at_end(BEFORE).rotations, atol=1e-5)
+
+
+def test_the_report_says_how_much_movement_was_given(ballet: Engine) -> None:
+    tween = ballet.tween(A, B, moves=4, before=BEFORE)
+    assert tween.report()["asked"]["before"] == pytest.approx(10.0 / 30.0)
+    assert tween.report()["asked"]["after"] is None
+    assert tween.before == pytest.approx(10.0 / 30.0)
+    assert ballet.tween(A, B, moves=4, after=AFTER).asked["after"] == pytest.approx(0.1)
+
+
+def test_the_ends_are_exact_however_they_move(ballet: Engine) -> None:
+    motion = ballet.tween(A, B, before=BEFORE, after=AFTER).motion
+    np.testing.assert_array_equal(motion.rotations[[0, -1]], [A.rotations, B.rotations])
+    np.testing.assert_array_equal(motion.root[[0, -1]], [A.root, B.root])
+
+
+def test_a_body_that_moves_through_a_does_not_stay_there(ballet: Engine) -> None:
+    assert ballet.tween(A, A).moves == 0
+    assert ballet.tween(A, A, before=BEFORE).moves > 0
+    assert ballet.tween(A, A, after=CLIP.slice(40, 50)).moves > 0
+
+
+def test_frames_that_do_not_lead_to_a_or_from_b_are_refused(ballet: Engine) -> None:
+    with pytest.raises(MotionMindError, match=r"before A does not end in A: \w+ is [\d.]+ degrees off there"):
+        ballet.tween(A, B, before=CLIP.slice(20, 31))
+    with pytest.raises(MotionMindError, match=r"after B does not begin in B: \w+ is [\d.]+ degrees off there"):
+        ballet.tween(A, B, after=CLIP.slice(110, 120))
+    turned = BEFORE.rotations.copy()
+    turned[-1, 7] = rot.mul(turned[-1, 7], rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(12.0)))
+    with pytest.raises(MotionMindError, match=f"{CLIP.skeleton.names[7]} is 12 degrees off"):
+        ballet.tween(A, B, before=replace(BEFORE, rotations=turned))
+    turned[-1] = rot.mul(BEFORE.rotations[-1], rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(0.5)))
+    ballet.tween(A, B, moves=3, before=replace(BEFORE, rotations=turned))  # the rounding of a file
+
+
+def test_one_frame_is_no_movement(ballet: Engine) -> None:
+    with pytest.raises(MotionMindError, match="has one frame, which shows no velocity"):
+        ballet.tween(A, B, before=A.as_motion())
+    with pytest.raises(MotionMindError, match="has one frame, which shows no velocity"):
+        ballet.tween(A, B, after=B.as_motion())
+
+
+def test_movement_of_another_body_is_refused(ballet: Engine) -> None:
+    arm = Skeleton("arm", ("shoulder",), (-1,), np.zeros((1, 3)))
+    waving = Posture(arm, rot.IDENTITY[None], np.zeros(3)).as_motion()
+    with pytest.raises(SkeletonError, match="the movement before A is on another skeleton"):
+        ballet.tween(A, B, before=waving)
+    with pytest.raises(SkeletonError, match="the movement after B is on another skeleton"):
+        ballet.tween(A, B, after=waving)
