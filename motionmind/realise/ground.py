@@ -10,7 +10,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry.splines import natural_spline
 from motionmind.realise.feet import plant_feet
-from motionmind.realise.root import root_trajectory, stand
+from motionmind.realise.root import root_trajectory
 
 
 def set_on_floor(
@@ -24,7 +24,6 @@ def set_on_floor(
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
-    plant: bool,
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
 
@@ -41,7 +40,6 @@ def set_on_floor(
             with the first and the last.
         drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
         ends: the first and the last position of the root [3], metres.
-        plant: whether the legs may move so that feet stay where they stand.
     """
     given = 2 * np.array(list(low))
     floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
@@ -54,12 +52,8 @@ def set_on_floor(
     held = np.stack([np.interp(middles, half_steps, limb) for limb in stands.T], axis=1)
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends)
-    if plant:
-        fps = 1.0 / (times[1] - times[0])
-        frames = fps * half_steps[given]
-        rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, frames)
-    else:
-        root = stand(skeleton, rotations, root, heights)
+    fps = 1.0 / (times[1] - times[0])
+    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, fps * half_steps[given])
     root[0], root[-1] = ends
     return rotations, root
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,94 +15,176 @@ from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.marginals import posterior_marginals
-from motionmind.realise.walks import ENDS_WITHIN, FOLLOWS_WITHIN, nearness
+from motionmind.realise.minimal import departure, minimal_movement, trust
+from motionmind.realise.stops import Rates, Stop
+from motionmind.realise.walks import (
+    ENDS_WITHIN,
+    FOLLOWS_WITHIN,
+    LEAVES_WITHIN,
+    SIZES,
+    TRAVELS_WITHIN,
+    TURNS_WITHIN,
+    likelihood,
+    squared_differences,
+    squared_distances,
+)
+
+
+class MeanWalk(NamedTuple):
+    """The mean of walks through a corpus, at T moves and midway between them: the half steps.
+
+    Attributes:
+        poses: orientations of the joints [2 T + 1, J, 4].
+        moments: probabilities of the corpus's moments [2 T + 1, N].
+        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1 (`minimal.trust`).
+    """
+
+    poses: Floats
+    moments: Floats
+    trust: Floats
 
 
 def mean_walk(
-    skeleton: Skeleton, carriage: Carriage, stops: Mapping[int, Floats], half_steps: Floats, path: Floats | None
-) -> tuple[Floats, Floats]:
+    skeleton: Skeleton,
+    carriage: Carriage,
+    rates: Rates | None,
+    stops: Mapping[int, Stop],
+    half_steps: Floats,
+    path: Floats | None,
+) -> MeanWalk:
     """Return the mean over walks from each stop to the next, and how likely each of the corpus's moments is.
 
-    Walks of parts of all sizes count alike. The moments, by which the body travels and stands, are those of walks of
-    the whole and of the part that carries it. The mean comes near the stops but not to them: its offsets there are
-    subtracted along the walk in proportion to time.
+    Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands, are those of walks of
+    the whole and of the part that carries it. The mean is taken as a departure from the minimal movement between the
+    stops, which shrinks as the corpus's postures are farther from them (`motionmind.realise.minimal`). It comes near
+    the stops but not to them: its offsets there are subtracted along the walk in proportion to time, and those of its
+    velocities as `departure` has it.
 
     Args:
         skeleton: the body.
         carriage: the corpus's N moments and its steps between them.
-        stops: orientations of the joints, or of all chains, that the walk passes [L, 4], by the number of moves that
-            lead there; increasing, with the first and the last.
+        rates: velocities in the moments; None where no stop has any.
+        stops: what the walk passes, by the number of moves that lead there; increasing, with the first and the last.
         half_steps: times of the moves and midway between them [2 T + 1], seconds.
         path: orientations to follow at the moves [T + 1, J, 4], or None.
-
-    Returns:
-        Orientations [2 T + 1, J, 4], and probabilities of the moments [2 T + 1, N].
     """
-    joints = len(skeleton)
+    joints, parts = len(skeleton), parts_of(skeleton)
     poses = np.empty((len(half_steps), joints, 4))
     moments = np.empty((len(half_steps), len(carriage.weights)))
-    parts = parts_of(skeleton)
+    trusted = np.empty((len(half_steps) - 1, joints))
     for start, end in pairwise(stops):
-        here, ends = slice(2 * start, 2 * end + 1), np.stack([stops[start], stops[end]])[:, :joints]
-        share = ((half_steps[here] - half_steps[2 * start]) / (half_steps[2 * end] - half_steps[2 * start]))[:, None]
+        here, ends = slice(2 * start, 2 * end + 1), (stops[start], stops[end])
         between = path[start + 1 : end] if path is not None and end > start + 1 else None
-        poses[here], moments[here] = _mean_between(parts, carriage, ends, share, between)
-    for move, chains in stops.items():
-        poses[2 * move] = chains[:joints]
-    return poses, moments
+        walk = _mean_between(parts, carriage, rates, ends, half_steps[here], between)
+        poses[here], moments[here], trusted[2 * start : 2 * end] = walk
+    for move, stop in stops.items():
+        poses[2 * move] = stop.chains[:joints]
+    return MeanWalk(poses, moments, trusted)
 
 
 def _mean_between(
-    parts: tuple[Ints, ...], carriage: Carriage, ends: Floats, share: Floats, path: Floats | None
-) -> tuple[Floats, Floats]:
-    """Return the mean over walks from ends[0] to ends[1] [2, J, 4] in S steps, and the moments' probabilities.
+    parts: tuple[Ints, ...],
+    carriage: Carriage,
+    rates: Rates | None,
+    ends: tuple[Stop, Stop],
+    times: Floats,
+    path: Floats | None,
+) -> tuple[Floats, Floats, Floats]:
+    """Return the mean over walks from one stop to the next, the moments' probabilities, and how far it is trusted.
 
     Args:
         parts: of the body, as in `parts_of`.
         carriage: the corpus's N moments and its steps between them.
-        ends: orientations at both ends [2, J, 4].
-        share: of the time that has passed at each step [S + 1, 1], from 0 to 1.
+        rates: velocities in the moments, or None.
+        ends: both stops.
+        times: of the steps' ends [S + 1], seconds.
         path: orientations to follow at every other step between [S / 2 - 1, J, 4], or None.
 
     Returns:
-        Orientations [S + 1, J, 4], probabilities [S + 1, N].
+        Orientations [S + 1, J, 4], probabilities [S + 1, N], trust [J].
     """
-    straight = rot.slerp(ends[:1], ends[1:], share)
-    groups = _joints_by_parts(parts, ends.shape[1])
+    joints = max(int(part.max()) for part in parts) + 1
+    orientations = np.stack([stop.chains[:joints] for stop in ends])
+    leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
+    minimal = minimal_movement(orientations, times, leaving, arriving)
+    groups = _joints_by_parts(parts, joints)
     shared = {number for numbers in groups for number in numbers[:-1]}
-    poses = np.empty_like(straight)
+    whole, half, limb = SIZES
+    poses, trusted = np.empty_like(minimal), np.empty(joints)
     marginals: dict[int, Floats] = {}
+    trusts: dict[int, float] = {}
     sums: dict[tuple[int, ...], Floats] = {}
     for number, part in enumerate(parts):
-        marginals[number] = _part_marginals(number, part, carriage, ends, len(share), path)
-        for numbers, joints in groups.items():
+        marginals[number], trusts[number] = _part_marginals(number, part, carriage, rates, ends, len(times), path)
+        for numbers, mine in groups.items():
             if numbers[-1] != number:
                 continue
-            if numbers[:-1] not in sums:
-                sums[numbers[:-1]] = np.sum([marginals[n] for n in numbers[:-1]], axis=0)
-            weights = (sums[numbers[:-1]] + marginals[number]) / len(numbers)
-            about = np.ascontiguousarray(straight[:, joints])
-            shown = np.ascontiguousarray(carriage.orientations[:, joints])
+            larger = numbers[:-1]
+            if larger not in sums:
+                sums[larger] = whole * marginals[larger[0]] + half * marginals[larger[1]]
+            weights = sums[larger] + limb * marginals[number]
+            about = np.ascontiguousarray(minimal[:, mine])
+            shown = np.ascontiguousarray(carriage.orientations[:, mine])
             off = rot.log(rot.inv_mul(about, mean_rotations(weights, shown, about)))
-            off -= (1.0 - share)[..., None] * off[:1] + share[..., None] * off[-1:]
-            poses[:, joints] = rot.mul(about, rot.exp(off))
+            off = _without_ends(off, times, leaving is not None, arriving is not None)
+            trusted[mine] = np.dot(SIZES, [trusts[n] for n in numbers])
+            poses[:, mine] = rot.mul(about, rot.exp(trusted[mine, None] * off))
         if number not in shared:
             del marginals[number]  # a large corpus's are large
-    return poses, 0.5 * (marginals[0] + marginals[1])
+    return poses, 0.5 * (marginals[0] + marginals[1]), trusted
+
+
+def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
+    """Return departures [S + 1, m, 3] less what they are at both ends and, where velocities are given, their rates."""
+    share = ((times - times[0]) / (times[-1] - times[0]))[:, None, None]
+    off = off - (1.0 - share) * off[0] - share * off[-1]
+    first = (off[1] - off[0]) / (times[1] - times[0]) if leaving else None
+    last = (off[-1] - off[-2]) / (times[-1] - times[-2]) if arriving else None
+    return np.asarray(off - departure(times, first, last))
 
 
 def _part_marginals(
-    number: int, part: Ints, carriage: Carriage, ends: Floats, count: int, path: Floats | None
-) -> Floats:
-    """Return the posterior marginals [count, N] of walks of one part of the body; arguments as in `_mean_between`."""
+    number: int,
+    part: Ints,
+    carriage: Carriage,
+    rates: Rates | None,
+    ends: tuple[Stop, Stop],
+    count: int,
+    path: Floats | None,
+) -> tuple[Floats, float]:
+    """Return the posterior marginals [count, N] of walks of one part of the body, and how far to trust them.
+
+    Arguments are those of `_mean_between`.
+    """
     shown = np.ascontiguousarray(carriage.orientations[:, part])
     near = np.ones((count, len(carriage.weights)))
     if path is not None:
-        near[2:-2:2] = [nearness(shown, posture, FOLLOWS_WITHIN) for posture in path[:, part]]
-    near[0], near[-1] = (nearness(shown, posture, ENDS_WITHIN) for posture in ends[:, part])
+        near[2:-2:2] = [likelihood(squared_distances(shown, pose) / FOLLOWS_WITHIN**2) for pose in path[:, part]]
+    nearest = np.empty(2)
+    for k, stop in enumerate(ends):
+        off = squared_distances(shown, stop.chains[part])
+        nearest[k] = np.sqrt(off.min())
+        near[-k] = likelihood(off / ENDS_WITHIN**2, *_rate_terms(part, rates, stop))
     near[0] *= carriage.weights
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
-    return posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, near)
+    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, near)
+    way = np.sqrt(squared_distances(ends[0].chains[None, part], ends[1].chains[part])[0])
+    return marginals, trust(nearest, float(way))
+
+
+def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
+    """Return squared differences of the moments' velocities from a stop's [N], in units of their variances.
+
+    Parts with the root know also how the body turns and travels.
+    """
+    if rates is None or stop.rates is None:
+        return []
+    joints = squared_differences(np.ascontiguousarray(rates.joints[:, part]), stop.rates.joints[part])
+    terms = [joints / LEAVES_WITHIN**2]
+    if part[0] == 0:
+        terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
+        terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
+    return terms
 
 
 def _joints_by_parts(parts: tuple[Ints, ...], joints: int) -> dict[tuple[int, ...], list[int]]:

@@ -1,45 +1,28 @@
-"""From a path of states to a motion: exact at both ends, smooth between, on its feet."""
+"""From a path of states to a motion: exact at both ends, smooth between, near the path, on its feet."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
-from motionmind.body.motion import Insertion, Motion, Posture
+from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.detail import detail_of, likest_moves
+from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import set_on_floor
-from motionmind.realise.headings import travel_along, turn_with_path, turn_with_walks
-from motionmind.realise.mean_walk import mean_walk
+from motionmind.realise.headings import correct_headings, travel_along
+from motionmind.realise.minimal import departure
+from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, timeline
-
-
-class _Walk(NamedTuple):
-    """The mean of walks through a corpus, at T moves and midway between them: the half steps.
-
-    Attributes:
-        half_steps: times [2 T + 1], seconds.
-        stops: orientations of all chains [L, 4] that are given, by the number of moves that lead there.
-        poses: orientations of the joints [2 T + 1, J, 4].
-        moments: probabilities of the corpus's moments [2 T + 1, N].
-        moves: probabilities of the corpus's moves in each half step [2 T, M].
-    """
-
-    half_steps: Floats
-    stops: Mapping[int, Floats]
-    poses: Floats
-    moments: Floats
-    moves: Floats
 
 
 def realise(
@@ -49,23 +32,26 @@ def realise(
     corpus: Corpus,
     grammar: Grammar,
     carriage: Carriage,
+    tolerances: Floats,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
-    within: Floats | None = None,
+    leaving: Velocity | None = None,
+    arriving: Velocity | None = None,
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
     Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
-    in the postures there. Between them the body is, at the times of the moves, at the mean of all walks that the corpus
-    knows from `a` to `b` in that time (`motionmind.realise.walks`); a C2 spline joins them, and fine detail of the
-    corpus's recordings is added (`motionmind.realise.detail`). With `within`, walks count more the nearer they are to
-    the path, and each joint is then brought into its state.
+    in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
+    knows from `a` to `b` in that time and that count the more the nearer they are to the path
+    (`motionmind.realise.walks`); a C2 spline joins them. Where that leaves a chain farther from its state than its
+    tolerance, the movement is bent towards the state, smoothly. Fine detail of the corpus's recordings is added
+    (`motionmind.realise.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but not with `within`, which places them
-    already. The lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower
-    under ends that are lower, or higher under ends higher than the corpus knows of such postures.
+    stands. The legs hold what one root cannot (`motionmind.realise.feet`). The lowest point stays as far above the
+    floor as in the corpus's postures; the floor is at 0, or lower under ends that are lower, or higher under ends
+    higher than the corpus knows of such postures.
 
     Args:
         path: states of the chains [T + 1, L].
@@ -74,11 +60,12 @@ def realise(
         corpus: the movement that was learned from.
         grammar: what was learned of its states.
         carriage: how its bodies hold themselves, travel and stand.
+        tolerances: radians within which each chain is of its state at each move [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
-        within: radians within which each joint is of its state at each move [J]; None for the mean of all walks,
-            wherever the path goes.
+        leaving: velocity with which the body leaves `a`; None where it is unknown.
+        arriving: velocity with which it arrives at `b`.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
@@ -88,14 +75,15 @@ def realise(
         return still, np.zeros(0, dtype=np.int64)
     clock = timeline(path, grammar.transitions, fps, length)
     postures = {0: a, **through, len(path) - 1: b}
-    # A path may take more moves than there is time for; the corpus's walks are not to be hurried.
-    count = len(path) - 1 if through or within is not None else clock.usual_moves
-    walk = _mean_walk(path, clock, count, postures, corpus, grammar, carriage, within)
-    headings = _headings(walk, path, clock, corpus, grammar, carriage, follow=within is not None)
-    rotations = _orientations(walk, headings, clock, corpus)
+    stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
+    stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
+    states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
+    walk = _walk_near(states, clock, stops, corpus, carriage)
+    walk = _bend_to_states(walk, states, clock, stops, corpus, tolerances)
+    rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
-    states = None if within is None else grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-    rotations = _limit(rotations, postures, None if states is None else corpus.from_chains(states), carriage.loose)
+    rotations = _with_rates(rotations, clock.frames, leaving, arriving)
+    rotations = _limit(rotations, postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
@@ -107,108 +95,102 @@ def realise(
         size * (walk.moments @ carriage.clearance),
         walk.moments @ carriage.stands,
         carriage.loose,
-        _given_heights(walk.stops, postures),
-        size * travel_along(walk.moves @ carriage.travel, headings),
+        _given_heights(postures, walk),
+        size * travel_along(walk.moves @ carriage.travel, walk.headings),
         (a.root, b.root),
-        plant=within is None,
     )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
 
-def _mean_walk(
-    path: Int32s,
-    clock: Timeline,
-    count: int,
-    postures: Mapping[int, Posture],
-    corpus: Corpus,
-    grammar: Grammar,
-    carriage: Carriage,
-    within: Floats | None,
-) -> _Walk:
-    """Return the mean of walks in `count` moves through the postures, brought `within` the path's states if given.
+def _walk_near(
+    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage
+) -> Expectation:
+    """Return the mean of the walks that pass the stops and are near a path's states [T + 1, L, 4].
 
-    The facing's states are steps of a circle, which the corpus need not show: walks are of joints alone.
+    A path may take more moves than there is time for; the corpus's walks are not to be hurried, and take as many as it
+    usually does.
     """
-    last, skeleton = len(path) - 1, postures[0].skeleton
-    stops = {move: corpus.to_chains(posture.rotations) for move, posture in postures.items()}
-    half_steps, centres = subdivide_times(clock.moves, 1), None
-    if within is not None:
-        joints = len(skeleton)
-        centres = grammar.centres[grammar.transitions.starts[:joints] + path[:, :joints]]
-    if count != last:
-        half_steps = np.linspace(0.0, clock.moves[-1], 2 * count + 1)
-        stops = {0: stops[0], count: stops[last]}
-    poses, moments = mean_walk(skeleton, carriage, stops, half_steps, centres)
-    if within is not None and centres is not None:
-        inner = np.array([move for move in range(len(path)) if move not in stops], dtype=np.intp)
-        poses[2 * inner] = _bring_near(poses[2 * inner], centres[inner], within)
-    # Each half step leads to the middle of a move or from there.
-    known = len(carriage.turn)
-    moves = moments[:-1, -known:] + moments[1:, -known:]
-    moves /= moves.sum(axis=1, keepdims=True)
-    return _Walk(half_steps, stops, poses, moments, moves)
+    last, joints = len(states) - 1, len(corpus.skeleton)
+    half_steps, path = subdivide_times(clock.moves, 1), states[:, :joints]
+    if len(stops) == 2 and clock.usual_moves != last:
+        half_steps = np.linspace(0.0, clock.moves[-1], 2 * clock.usual_moves + 1)
+        path = rotation_spline(clock.moves, path, half_steps[::2])
+        stops = {0: stops[0], clock.usual_moves: stops[last]}
+    return expect(corpus, carriage, stops, half_steps, path)
 
 
-def _bring_near(poses: Floats, centres: Floats, within: Floats) -> Floats:
-    """Return orientations [..., J, 4] moved the short way to at most `within` radians [J] from `centres`."""
-    off = rot.angle(centres, poses)
-    return np.where((off <= within)[..., None], poses, rot.slerp(centres, poses, within / np.maximum(off, 1e-9)))
+def _bend_to_states(
+    walk: Expectation,
+    states: Floats,
+    clock: Timeline,
+    stops: Mapping[int, Stop],
+    corpus: Corpus,
+    tolerances: Floats,
+) -> Expectation:
+    """Return a walk bent so that each chain is within its tolerance [L] of its state [T + 1, L, 4] at each move.
 
-
-def _headings(
-    walk: _Walk, path: Int32s, clock: Timeline, corpus: Corpus, grammar: Grammar, carriage: Carriage, follow: bool
-) -> Floats:
-    """Return headings at the half steps [2 T + 1], radians: the path's if it is to `follow` it, else the walks'."""
-    if corpus.facing != "free":
-        return rot.heading(walk.poses[:, 0])
-    facing = {move: chains[-1] for move, chains in walk.stops.items()}
-    if follow:
-        at_moves = turn_with_path(path[:, -1], grammar, np.diff(clock.moves), facing)
-        return natural_spline(clock.moves, at_moves, walk.half_steps)
-    turn, spread = walk.moves @ carriage.turn, walk.moves @ carriage.turn**2
-    return turn_with_walks(turn, spread, walk.half_steps, facing)
-
-
-def _orientations(walk: _Walk, headings: Floats, clock: Timeline, corpus: Corpus) -> Floats:
-    """Return local rotations [N, J, 4] of the frames: a C2 curve through the walk's poses, turned to the headings."""
-    chains = rotation_spline(walk.half_steps, walk.poses, clock.frames)
+    The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
+    """
+    joints, inner = walk.poses.shape[1], np.ones(len(states), dtype=np.bool_)
+    inner[list(stops)] = False
+    poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
+    missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
+    far = np.linalg.norm(missing, axis=-1, keepdims=True)
+    bends = missing * np.maximum(1.0 - tolerances[:joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
+    poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
+    headings = walk.headings
     if corpus.facing == "free":
-        turn = rot.about_vertical(natural_spline(walk.half_steps, headings, clock.frames))
-        chains = np.concatenate([chains, turn[:, None]], axis=1)
-    return corpus.from_chains(chains)
+        at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
+        centres[~inner] = at_moves[~inner]
+        bent = correct_headings(at_moves, centres, float(tolerances[-1]))
+        headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
+    return walk._replace(poses=poses, headings=headings)
 
 
 def _add_detail(
-    rotations: Floats, walk: _Walk, clock: Timeline, corpus: Corpus, carriage: Carriage
+    rotations: Floats, walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage
 ) -> tuple[Floats, Ints]:
-    """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from."""
+    """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from.
+
+    Each joint has it as far as it is trusted to the corpus's walks.
+    """
     between = corpus.detail.shape[1]
     if not between:
         return rotations, np.zeros(0, dtype=np.int64)
     joints = walk.poses.shape[1]
     moves = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], walk.poses[::2])
     times = subdivide_times(walk.half_steps[::2], between)
-    detail = natural_spline(times, detail_of(corpus, moves), clock.frames)
-    return rot.mul(rotations, rot.exp(detail)), moves
+    trust = np.repeat(walk.trust[::2], between + 1, axis=0)
+    detail = detail_of(corpus, moves) * np.concatenate([trust, trust[-1:]])[..., None]
+    return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 
-def _limit(rotations: Floats, postures: Mapping[int, Posture], states: Floats | None, loose: Bools) -> Floats:
+def _with_rates(rotations: Floats, times: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
+    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities."""
+    turned = rot.log(rot.inv_mul(rotations[[0, -2]], rotations[[1, -1]])) / (times[1] - times[0])
+    first = None if leaving is None else leaving.rotations - turned[0]
+    last = None if arriving is None else arriving.rotations - turned[1]
+    if first is None and last is None:
+        return rotations
+    return rot.mul(rotations, rot.exp(departure(times, first, last)))
+
+
+def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:
     """Return unit rotations [N, J, 4] within the joints' limits, exactly the first and last posture at their ends.
 
-    Limits are widened to the postures, and to the path's `states` [T + 1, J, 4] if it is to be followed.
+    Limits are widened to the postures.
     """
     first, *_, last = postures.values()
     given = np.stack([posture.rotations for posture in postures.values()])
-    if states is not None:
-        given = np.concatenate([given, states])
     out = within_limits(first.skeleton, rot.normalise(rotations), given, loose)
     out[0], out[-1] = first.rotations, last.rotations
     return out
 
 
-def _given_heights(stops: Mapping[int, Floats], postures: Mapping[int, Posture]) -> dict[int, float]:
-    """Return the height of each given posture's lowest point, metres, by the number of moves that lead there."""
+def _given_heights(postures: Mapping[int, Posture], walk: Expectation) -> dict[int, float]:
+    """Return the height of each given posture's lowest point, metres, by the number of the walk's moves to there."""
     first, *_ = postures.values()
     rotations = np.stack([posture.rotations for posture in postures.values()])
     roots = np.stack([posture.root for posture in postures.values()])
-    return dict(zip(stops, lowest_height(first.skeleton, rotations, roots).tolist(), strict=True))
+    moves = [*postures][:-1] + [len(walk.half_steps) // 2]
+    return dict(zip(moves, lowest_height(first.skeleton, rotations, roots).tolist(), strict=True))

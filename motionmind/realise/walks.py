@@ -2,7 +2,8 @@
 
 A walk of a part goes through the corpus's postures, from one to the next as they followed in the clips. Now and then
 it goes over to another posture of the same *cluster*, one that holds the part much alike, and continues from there. A
-walk is more likely the nearer its ends are to the two given postures. Given those ends and the number of moves,
+walk is more likely the nearer its ends are to the two given postures, and its velocities there to those given, if they
+are. Given those ends and the number of moves,
 `motionmind.realise.marginals` computes how likely each of the corpus's postures is at each move, exactly. The mean over
 walks (`motionmind.realise.mean_walk`) is the movement from which the corpus's own differs least in the square.
 
@@ -20,25 +21,50 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
-ENDS_WITHIN = 0.11  # radians a joint, standard deviation: how near a walk's ends are to the given postures
-FOLLOWS_WITHIN = 0.13  # the same: how closely a walk follows a given path
-STRAIGHT_ON = 0.7  # share of steps after which a walk goes straight on as its clip does
-ANYWHERE = 0.003  # share of steps after which it goes on from any posture: some walk joins any two
+ENDS_WITHIN = 0.09  # radians a joint, standard deviation: how near a walk's ends are to the given postures
+LEAVES_WITHIN = 1.0  # radians a second a joint, the same: how near its velocities there are to the given ones
+TURNS_WITHIN = 1.0  # radians a second, the same of the body's turning
+TRAVELS_WITHIN = 0.5  # metres a second, the same of its travel
+FOLLOWS_WITHIN = 0.35  # radians a joint, the same: how closely a walk follows a given path
+SIZES = (0.25, 0.25, 0.5)  # weights of the walks of the whole body, of its half, and of the limb that a joint is in
+STRAIGHT_ON = 0.6  # share of steps after which a walk goes straight on as its clip does
+ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some walk joins any two
 
 
 @jit
-def nearness(orientations: Floats, posture: Floats, width: float) -> Floats:
-    """Return exp(-d^2 / 2 width^2) for each of a part's orientations, divided by that of the nearest [N].
+def squared_distances(orientations: Floats, posture: Floats) -> Floats:
+    """Return the squared distance of each of a part's orientations from a posture, mean over joints [N], radians^2.
 
     Args:
-        orientations: of the part's m joints in the corpus's postures [N, m, 4].
-        posture: orientations that distances d are measured from [m, 4]; d is in radians, root mean square over joints.
-        width: standard deviation, radians.
+        orientations: of the part's m joints in the corpus's moments [N, m, 4].
+        posture: orientations that distances are measured from [m, 4].
     """
     out = np.empty(len(orientations))
     for i in range(len(orientations)):
         out[i] = squared_distance(orientations[i], posture)
-    return np.exp((out.min() - out) / (2.0 * len(posture) * width**2))  # type: ignore[no-any-return]
+    return out / len(posture)
+
+
+@jit
+def squared_differences(rates: Floats, rate: Floats) -> Floats:
+    """Return the squared difference of each of a part's angular velocities [N, m, 3] from one of them [m, 3], mean over
+    joints [N]."""
+    out = np.zeros(len(rates))
+    for i in range(len(rates)):
+        for j in range(len(rate)):
+            for k in range(3):
+                out[i] += (rates[i, j, k] - rate[j, k]) ** 2
+    return out / len(rate)
+
+
+def likelihood(*terms: Floats) -> Floats:
+    """Return exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [N].
+
+    Args:
+        terms: squared distances in units of a variance [N] each.
+    """
+    exponent = 0.5 * np.sum(terms, axis=0)
+    return np.asarray(np.exp(exponent.min() - exponent))
 
 
 @jit

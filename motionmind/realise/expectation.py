@@ -1,0 +1,78 @@
+"""What walks through a corpus expect of a movement between two postures: where each joint is, and where the body faces.
+
+The search takes it as its guide, before any path is known; the motion takes it again, of walks near the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.corpus.corpus import Corpus
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.learned.carriage import Carriage
+from motionmind.realise.headings import turn_with_walks
+from motionmind.realise.mean_walk import mean_walk
+from motionmind.realise.stops import Stop, moments_rates
+
+
+class Expectation(NamedTuple):
+    """What walks expect at T moves and midway between them: the half steps.
+
+    Attributes:
+        half_steps: times [2 T + 1], seconds.
+        poses: orientations of the joints [2 T + 1, J, 4], without the body's turning where facing is free.
+        headings: where the body faces [2 T + 1], radians.
+        moments: probabilities of the corpus's moments [2 T + 1, N].
+        moves: probabilities of the corpus's moves in each half step [2 T, M].
+        trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1.
+    """
+
+    half_steps: Floats
+    poses: Floats
+    headings: Floats
+    moments: Floats
+    moves: Floats
+    trust: Floats
+
+    def chains(self, corpus: Corpus, at: Floats) -> Floats:
+        """Return orientations of the chains [K, L, 4] at some times [K]: a C2 curve through those of the half steps."""
+        out = rotation_spline(self.half_steps, self.poses, at)
+        if corpus.facing == "free":
+            turn = rot.about_vertical(natural_spline(self.half_steps, self.headings, at))
+            out = np.concatenate([out, turn[:, None]], axis=1)
+        return out
+
+
+def expect(
+    corpus: Corpus, carriage: Carriage, stops: Mapping[int, Stop], half_steps: Floats, path: Floats | None = None
+) -> Expectation:
+    """Return what walks through a corpus expect between the stops.
+
+    Args:
+        corpus: the movement that was learned from.
+        carriage: how its bodies hold themselves, travel and stand.
+        stops: what is passed exactly, by the number of moves that lead there; increasing, with the first and the last.
+        half_steps: times of the moves and midway between them [2 T + 1], seconds.
+        path: orientations of the joints at the moves that walks are to be near to [T + 1, J, 4]; None for all walks.
+    """
+    moving = any(stop.rates is not None for stop in stops.values())
+    rates = moments_rates(corpus, carriage) if moving else None
+    walk = mean_walk(corpus.skeleton, carriage, rates, stops, half_steps, path)
+    # Each half step leads to the middle of a move or from there.
+    known = len(carriage.turn)
+    moves = walk.moments[:-1, -known:] + walk.moments[1:, -known:]
+    moves /= moves.sum(axis=1, keepdims=True)
+    if corpus.facing == "free":
+        first, *_, last = stops.values()
+        ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
+        facing = {move: stop.chains[-1] for move, stop in stops.items()}
+        turn, spread = moves @ carriage.turn, moves @ carriage.turn**2
+        headings = turn_with_walks(turn, spread, half_steps, facing, (ends[0], ends[1]))
+    else:
+        headings = rot.heading(walk.poses[:, 0])
+    return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust)

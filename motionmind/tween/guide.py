@@ -1,0 +1,80 @@
+"""The guide: what a path pays for departing from the movement that walks through the corpus expect.
+
+A likeliest path of chains that each know their last state alone is not the likeliest movement: on its own clock every
+joint freezes and rushes. The walks know whole limbs and bodies. For T moves from A to B they expect an orientation
+m_j(t) of each chain at each move (`motionmind.realise.expectation`), and a state x_j(t) pays
+
+    kappa (seconds of a move / 0.2) (angle(x_j(t), m_j(t)) / tolerance_j)^2   nats,
+
+the -log of a Gaussian about the walks' mean but for a constant. So likelihoods of the chains, coordination and walks
+multiply. The time of a move makes the whole independent of the corpus's rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.motion import Posture, Velocity
+from motionmind.geometry import rotations as rot
+from motionmind.learned.model import LearnedCorpus
+from motionmind.realise.expectation import expect
+from motionmind.realise.stops import stop_at
+from motionmind.realise.timeline import usual
+
+MOVE = 0.2  # seconds of a move that pays kappa for a tolerance's departure
+
+
+def make_guide(
+    learned: LearnedCorpus,
+    ends: tuple[Posture, Posture],
+    velocities: tuple[Velocity | None, Velocity | None],
+    kappa: float,
+    duration: float | None,
+    rows: Ints,
+) -> Callable[[int], Floats]:
+    """Return the guide of a search from one posture to another, as `motionmind.search.problem.Problem` takes it.
+
+    It depends on both ends and on the number of moves, not on pins, vias or other wishes: answers that differ in these
+    are judged by one energy.
+
+    Args:
+        learned: the corpus.
+        ends: postures A and B on its skeleton.
+        velocities: those of the ends; None where unknown.
+        kappa: nats for a chain that is off by its tolerance for 0.2 s.
+        duration: seconds of the whole; None for moves of the corpus's usual length.
+        rows: the row of the grammar's states that each row of the searched model is at [G].
+    """
+    space, seconds = learned.space, usual(learned.grammar.transitions)
+    stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
+
+    def costs(moves: int) -> Floats:
+        length = moves * seconds if duration is None else duration
+        walked = max(1, round(length / seconds))
+        half_steps = np.linspace(0.0, length, 2 * walked + 1)
+        expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
+        chains = expected.chains(learned.corpus, np.linspace(0.0, length, moves + 1)[1:-1])
+        price = kappa * length / moves / MOVE
+        return departures(chains, space.centres, space.starts, price / np.radians(space.tolerances) ** 2)[:, rows]
+
+    return costs
+
+
+def departures(expected: Floats, centres: Floats, starts: Ints, prices: Sequence[float] | Floats) -> Floats:
+    """Return the price of the squared angle between each state and what is expected of its chain [K, G].
+
+    Args:
+        expected: orientations of the chains [K, L, 4].
+        centres: orientations of the states, chain after chain [G, 4].
+        starts: first row of each chain's states [L + 1].
+        prices: nats a squared radian for each chain [L].
+    """
+    out = np.empty((len(expected), len(centres)))
+    for chain, price in enumerate(prices):
+        rows = slice(starts[chain], starts[chain + 1])
+        cosine = np.abs(expected[:, chain] @ centres[rows].T)
+        out[:, rows] = price * (2.0 * np.arccos(np.minimum(cosine, 1.0))) ** 2
+    return out
