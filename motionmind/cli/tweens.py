@@ -52,13 +52,13 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     "--before",
     section=Section.MOTION,
     metavar="FRAMES",
-    help="Leave A as fast as these frames arrive there: FILE@FIRST..LAST, or all of FILE. The last of them is A.",
+    help="Leave A with the velocity of these frames, of which the last is A: FILE@FIRST..LAST, or all of FILE.",
 )
 @option(
     "--after",
     section=Section.MOTION,
     metavar="FRAMES",
-    help="Arrive at B as fast as these frames leave it, given as for --before. The first of them is B.",
+    help="Arrive at B with the velocity of these frames, of which the first is B, given as for --before.",
 )
 @searching
 @HOME
@@ -77,8 +77,8 @@ def tween(
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
 
-    A and B are files of one posture, or frames of clips, counted from 0: clip.bvh@240. How fast the body moves there is
-    open, unless --before and --after say so, or a ~, as in clip.bvh@240~: as fast as the clip does at that frame.
+    A and B are files of one posture, or frames of clips, counted from 0: clip.bvh@240. The body may have any velocity
+    there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's.
 
     Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
     130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from motionmind.errors import MotionMindError
 
+_FRAME = r"-?\d{1,9}"  # a number with more digits is a slip of the keyboard
+
 
 class NamedPosture(NamedTuple):
     """A posture as a command names it.
@@ -157,7 +159,7 @@ def parse_posture(word: str) -> NamedPosture:
 
     A file that has the whole name goes first, since a file's name may hold @, too.
     """
-    found = re.fullmatch(r"(.+?)(?:@(-?\d+))?(~?)", word, re.ASCII | re.DOTALL)
+    found = re.fullmatch(rf"(.+?)(?:@({_FRAME}))?(~?)", word, re.ASCII | re.DOTALL)
     if found is None or _exists(word):
         return NamedPosture(word, Path(word), None, is_moving=False)
     file, frame, tilde = found.groups()
@@ -170,7 +172,7 @@ def parse_frames(word: str) -> NamedFrames:
     Raises:
         MotionMindError: the word names neither a file nor frames of one.
     """
-    found = re.fullmatch(r"(.+)@(-?\d+)\.\.(-?\d+)", word, re.ASCII | re.DOTALL)
+    found = re.fullmatch(rf"(.+)@({_FRAME})\.\.({_FRAME})", word, re.ASCII | re.DOTALL)
     if found and not _exists(word):
         return NamedFrames(Path(found[1]), int(found[2]), int(found[3]))
     if "@" in Path(word).name and not _exists(word):
@@ -194,7 +196,7 @@ def parse_vias(words: Sequence[str]) -> list[tuple[NamedPosture, int | None]]:
     vias: list[tuple[NamedPosture, int | None]] = []
     for word in words:
         name, _, move = word.rpartition("@")
-        has_place = bool(name) and (not move or move.isdecimal()) and not _exists(word)
+        has_place = bool(name and re.fullmatch(r"\d{0,9}", move, re.ASCII)) and not _exists(word)
         posture = parse_posture(name if has_place else word)
         if posture.is_moving or (posture.frame is not None and not has_place):
             raise MotionMindError(

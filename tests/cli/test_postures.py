@@ -190,6 +190,8 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..9"], r"has one frame, which shows no velocity"),
         (["clip.bvh@0", "B.json", "--via", "clip.bvh@15"], r"clip\.bvh: 37 frames, where one posture was expected"),
         (["clip.bvh@0", "B.json", "--via", "clip.bvh@15~"], r"--via clip\.bvh@15~: give a posture and its move"),
+        (["clip.bvh@" + "9" * 5000, "B.json"], r"cannot be used|suffix"),
+        (["clip.bvh@3", "B.json", "--via", "B.json@" + "9" * 5000], r"cannot be used|suffix"),
         (["A" * 5000 + "@3", "B.json"], r"cannot be used|cannot be read"),
     ],
 )
