@@ -7,14 +7,14 @@ products that the model's definition prints, not from the search's trellis.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go
 from motionmind.search.solve import Certificate, Watch, solve
@@ -97,21 +97,32 @@ class Toy:
     def rules(self, shortest: int, longest: int, node_budget: int = 100_000, sweeps: int = 60) -> Rules:
         return Rules(self.wait, self.per_move, shortest, longest, node_budget, sweeps)
 
-    def problem(self, rules: Rules, vias: Sequence[Via] = (), **changes: Any) -> Problem:
+    def problem(
+        self, rules: Rules, vias: Sequence[Via] = (), guide: Callable[[int], Floats] | None = None, **changes: Any
+    ) -> Problem:
         """The problem from start to goal; `changes` are made to the model, such as in what is allowed."""
-        return Problem(self.model()._replace(**changes), *self.ends(), rules, vias)
+        return Problem(self.model()._replace(**changes), *self.ends(), rules, vias, guide)
 
-    def cost(self, path: Int32s) -> float:
-        """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule."""
+    def cost(self, path: Int32s, guide: Floats | None = None) -> float:
+        """Cost of a path of states [T + 1, L], summed as it is defined; infinite where it breaks a rule.
+
+        `guide` [T - 1, G] is what states cost besides on the way.
+        """
         if tuple(path[0]) != self.start or tuple(path[-1]) != self.goal:
             return np.inf
         total = self.per_move * (len(path) - 1)
+        if guide is not None:
+            total += sum(guide[t, self.rows(states)].sum() for t, states in enumerate(path[1:-1]))
         for before, after in pairwise(path):
             for chain, parent in enumerate(self.parents):
                 total += self.moves(chain)[before[chain], after[chain]]
                 if parent >= 0:
                     total += self.coupling(chain)[after[parent], after[chain]]
         return float(total)
+
+    def rows(self, states: Ints | Int32s) -> Ints:
+        """Rows of the model that hold states [..., L] of all chains."""
+        return np.concatenate([[0], np.cumsum(self.sizes)])[:-1] + states
 
     def joint_states(self) -> Ints:
         """All states of the whole body [product of sizes, L]."""
@@ -211,6 +222,36 @@ def random_toy(
         wait=float(draw(1.5, 1)[0]),
         per_move=float(draw(1.0, 1)[0]),
     )
+
+
+def best(
+    toy: Toy, moves: Sequence[int], allowed: Bools, vias: Sequence[Via], guide: Callable[[int], Floats] | None = None
+) -> float:
+    """Least cost over all joint states, for numbers of moves, with `allowed` [G] on the way and vias passed in order.
+
+    value[k, n]: of the ways so far to joint state n, past k vias; no two are passed at once, nor at either end.
+    """
+    joint = toy.joint_states()
+    move, stand = toy._tables()
+    rows = toy.rows(joint)
+    inner = np.where(allowed[rows].all(axis=1), 0.0, np.inf)
+    at_goal = (joint == toy.goal).all(axis=1)
+    least = np.inf
+    for last in moves:
+        value = np.full((len(vias) + 1, len(joint)), np.inf)
+        value[0] = np.where((joint == toy.start).all(axis=1), 0.0, np.inf)
+        for t in range(1, last + 1):
+            value = (value[:, :, None] + move).min(axis=1) + stand
+            if t < last:
+                value += inner
+                if guide is not None:
+                    value += guide(last)[t - 1][rows].sum(axis=1)
+                for k in range(len(vias), 0, -1):
+                    if vias[k - 1].move in (None, t):
+                        here = (joint == vias[k - 1].states).all(axis=1)
+                        value[k, here] = np.minimum(value[k, here], value[k - 1, here])
+        least = min(least, value[-1, at_goal][0] + toy.per_move * last)
+    return least
 
 
 def noisy_messages(trellis: Trellis, seed: int, noise: float) -> Messages:

@@ -3,12 +3,13 @@
 A chain walks on one joint's joint graph (or on the facing's). For T moves there is a variable (t, chain) for
 t = 0 .. T, whose domain holds the states that lie on some walk of exactly T moves from the chain's start to its goal.
 The chain's edges couple consecutive variables (an absent edge is forbidden); at every t >= 1 the tree couples each
-chain to its parent. The search knows nothing else about bodies.
+chain to its parent. A guide may add costs of states that depend on the move, for a path of a given number of moves.
+The search knows nothing else about bodies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -102,6 +103,9 @@ class Problem:
         goal: places to arrive at [L].
         rules: numbers of moves, their costs, and the effort allowed.
         vias: states to pass through, in this order; they divide the path into segments.
+        guide: returns, for a path of T moves, the cost of being in each state after moves 1 to T - 1, nats [T - 1, G];
+            finite, of either sign. It says where to be when, not how many moves to make: `solve` compares numbers of
+            moves by what paths cost without it.
     """
 
     model: Model
@@ -109,6 +113,7 @@ class Problem:
     goal: Ints
     rules: Rules
     vias: Sequence[Via] = ()
+    guide: Callable[[int], Floats] | None = None
 
     @property
     def stops(self) -> list[Ints]:
@@ -118,6 +123,24 @@ class Problem:
     def model_with_waits(self) -> Model:
         """Return the model in which chains may wait at the goal, by `with_waits`."""
         return with_waits(self.model, self.goal, self.rules.wait)
+
+    def timed_costs(self, moves: int) -> Floats | None:
+        """Return the guide's costs for a path of T moves, 0 at both ends, nats [T + 1, G]; None without a guide.
+
+        Raises:
+            ValueError: the guide returned costs of another shape, or costs that are not finite.
+        """
+        if self.guide is None:
+            return None
+        out = np.zeros((moves + 1, self.model.starts[-1]))
+        if moves > 1:
+            costs = self.guide(moves)
+            if costs.shape != out[1:-1].shape:
+                raise ValueError(f"the guide of {moves} moves has the shape {costs.shape}, not {out[1:-1].shape}")
+            if not np.isfinite(costs).all():
+                raise ValueError(f"the guide of {moves} moves has costs that are not finite")
+            out[1:-1] = costs
+        return out
 
 
 def with_waits(model: Model, goal: Ints, wait: float) -> Model:
@@ -157,11 +180,11 @@ def places(model: Model, path: Int32s) -> Int32s:
     return np.asarray(model.place[model.starts[:-1] + path])
 
 
-@jit
-def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
+def costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats | None = None) -> Floats:
     """Compute the least cost of each chain on its own from each state to the goal, by number of moves.
 
-        V[0, s at goal] = 0,   V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + V[k - 1, s']
+        V[0, s at goal] = 0
+        V[k, s] = min over edges s -> s' of  cost(s, s') + alone(s') + timed[T - k + 1, s'] + V[k - 1, s']
 
     over the states s' that are allowed on the way, and with the last move over those at the goal. Summed over chains V
     bounds the cost of exactly k moves from below, since each coupling counts once, at the least it can cost its chain.
@@ -170,10 +193,18 @@ def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
         model: the costs, waits included.
         goal: places to arrive at [L].
         moves: greatest number of moves T.
+        timed: further costs of being in each state after each move, of a path that arrives after move T, nats
+            [T + 1, G]; None for none.
 
     Returns:
         V, nats [T + 1, G]; infinite where no walk of exactly k moves exists.
     """
+    return _costs_to_go(model, goal, moves, np.zeros((0, 0)) if timed is None else timed)
+
+
+@jit
+def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats) -> Floats:
+    """Compute as `costs_to_go` does; `timed` has no rows where it holds no costs."""
     value = np.full((moves + 1, model.starts[-1]), np.inf)
     for chain in range(len(model.parents)):
         first, last = model.starts[chain], model.starts[chain + 1]
@@ -181,11 +212,14 @@ def costs_to_go(model: Model, goal: Ints, moves: int) -> Floats:
             if model.place[row] == goal[chain]:
                 value[0, row] = 0.0
         for k in range(1, moves + 1):
+            arrived = value[k - 1, first:last] + model.alone[first:last]
+            if len(timed) > 0:
+                arrived += timed[moves - k + 1, first:last]
             for row in range(first, last):
                 best = np.inf
                 for e in range(model.indptr[row], model.indptr[row + 1]):
-                    target = first + model.targets[e]
-                    if k == 1 or model.allowed[target]:
-                        best = min(best, model.costs[e] + model.alone[target] + value[k - 1, target])
+                    target = model.targets[e]
+                    if k == 1 or model.allowed[first + target]:
+                        best = min(best, model.costs[e] + arrived[target])
                 value[k, row] = best
     return value

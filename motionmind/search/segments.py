@@ -1,24 +1,37 @@
 """Bounds and best paths of a path's segments, from stop to stop, put together to those of the whole.
 
-All chains are known at every stop, so what a segment costs depends on its own moves alone. A path of N moves in K
-segments costs the sum over k of what segment k costs in n_k moves, with n_1 + ... + n_K = N. The least costs over all
-splits are min-plus convolutions.
+All chains are known at every stop, so what a segment costs depends on its own moves alone: on their number, and, where
+costs depend on the move, on its first move as well. A whole path is then a path through a small graph, whose nodes are
+(stop, move at which it is passed) and whose edges are segments. What the best whole path costs through each edge comes
+from the least costs from the start to each node, and from each node to the end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Floats, States
 
 
+class Piece(NamedTuple):
+    """A segment in a number of moves, from its first move on; where costs do not depend on the move, that is 0."""
+
+    segment: int
+    first: int
+    moves: int
+
+
 class Segments:
-    """Bounds and best paths of K segments at each number of moves up to N; costs in nats.
+    """Bounds and best paths of K segments in each number of moves up to N; costs in nats.
+
+    Tables are [K, F, N + 1], by segment, first move and number of moves. F is N + 1, or 1 if the first move makes no
+    difference.
 
     Attributes:
-        lower: no path of segment k with n moves costs less [K, N + 1].
+        lower: no path of segment k that begins at a move and has n moves costs less [K, F, N + 1].
         best: least cost of a whole path that is known; infinite before there is one.
     """
 
@@ -26,74 +39,92 @@ class Segments:
         """Begin with bounds, and no paths.
 
         Args:
-            lower: the bounds [K, N + 1], infinite where a segment cannot have as many moves.
+            lower: the bounds [K, F, N + 1], infinite where a segment cannot have as many moves.
             shortest: least number of moves of the whole; N is the greatest.
             at: the moves at which the K - 1 vias are passed, None for any.
         """
         self.lower, self.best = lower, np.inf
-        moves = np.arange(lower.shape[1])
-        self._total = np.where(moves >= shortest, 0.0, np.inf)
-        self._at = [np.zeros(len(moves)) if move is None else np.where(moves == move, 0.0, np.inf) for move in at]
+        moves = np.arange(lower.shape[2])
+        self._open = [np.where(moves == 0, 0.0, np.inf)]  # 0 at the moves at which each stop may be passed
+        self._open += [np.zeros(len(moves)) if move is None else np.where(moves == move, 0.0, np.inf) for move in at]
+        self._open.append(np.where(moves >= shortest, 0.0, np.inf))
         self._cost = np.full_like(lower, np.inf)
-        self._paths: dict[tuple[int, int], States] = {}
+        self._paths: dict[Piece, States] = {}
         self._unseen = np.isfinite(lower)
+
+    @property
+    def moves(self) -> int:
+        """The number of moves of the best path."""
+        return int(self._so_far(self._cost)[-1].argmin())
 
     def lower_bound(self) -> float:
         """Return a lower bound on the cost of every whole path, in nats."""
-        return min(float((self.lower + self._others(self.lower)).min()), self.best)
+        return min(float(self._so_far(self.lower)[-1].min()), self.best)
 
-    def most_promising(self) -> tuple[int, int, float, float]:
-        """Return the unseen segment and number of moves that may be part of the cheapest path.
+    def lower_bound_elsewhere(self) -> float:
+        """Return a lower bound on the cost of every whole path of another number of moves than the best's, in nats."""
+        return float(np.delete(self._so_far(self.lower)[-1], self.moves).min(initial=np.inf))
 
-        With them come the least that such a path may cost, and the cost below which the segment improves on its own
-        best and on the best whole path, in nats.
+    def most_promising(self) -> tuple[Piece, float, float]:
+        """Return the unseen piece that may be part of the cheapest path.
+
+        With it come the least that such a path may cost, and the cost below which the piece improves on its own best
+        and on the best whole path, in nats.
         """
         others = self._others(self.lower)
         through = np.where(self._unseen, self.lower + others, np.inf)
-        segment, moves = map(int, np.unravel_index(through.argmin(), through.shape))
-        below = min(self.best - float(others[segment, moves]), float(self._cost[segment, moves]))
-        return segment, moves, float(through[segment, moves]), below
+        piece = Piece(*map(int, np.unravel_index(through.argmin(), through.shape)))
+        return piece, float(through[piece]), min(self.best - float(others[piece]), float(self._cost[piece]))
 
-    def reopen(self, left: Iterable[tuple[int, int]]) -> None:
-        """Mark just these segments and numbers of moves as unseen."""
+    def reopen(self, left: Iterable[Piece]) -> None:
+        """Mark just these pieces as unseen."""
         self._unseen[:] = False
-        for segment, moves in left:
-            self._unseen[segment, moves] = True
+        for piece in left:
+            self._unseen[piece] = True
 
-    def update(self, segment: int, moves: int, lower: float, cost: float, path: States) -> None:
-        """Take in a segment's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen."""
-        self._unseen[segment, moves] = False
-        self.lower[segment, moves] = max(self.lower[segment, moves], lower)
-        if len(path) > 0 and cost < self._cost[segment, moves]:
-            self._cost[segment, moves], self._paths[segment, moves] = cost, path
-            self.best = min(self.best, float((self._cost + self._others(self._cost)).min()))
+    def update(self, piece: Piece, lower: float, cost: float, path: States) -> None:
+        """Take in a piece's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen."""
+        self._unseen[piece] = False
+        self.lower[piece] = max(self.lower[piece], lower)
+        if len(path) > 0 and cost < self._cost[piece]:
+            self._cost[piece], self._paths[piece] = cost, path
+            self.best = min(self.best, float(self._so_far(self._cost)[-1].min()))
 
     def path(self) -> tuple[States, tuple[int, ...]]:
         """Return the best path [N + 1, L], and the moves at which it passes its vias."""
-        cost, pieces = self._cost.copy(), []
-        for segment in range(len(cost)):
-            moves = int((cost + self._others(cost))[segment].argmin())
-            cost[segment, np.arange(cost.shape[1]) != moves] = np.inf
-            pieces.append(self._paths[segment, moves])
-        stops = np.cumsum([len(piece) - 1 for piece in pieces[:-1]])
-        return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])]), tuple(map(int, stops))
+        pieces, stops = [], []
+        so_far = self._so_far(self._cost)
+        last = int(so_far[-1].argmin())
+        for segment in range(len(self._cost) - 1, -1, -1):
+            stops.append(last)
+            firsts = np.arange(last + 1)
+            rows = firsts % self._cost.shape[1]
+            first = int((so_far[segment][: last + 1] + self._cost[segment, rows, last - firsts]).argmin())
+            pieces.append(self._paths[Piece(segment, int(rows[first]), last - first)])
+            last = first
+        pieces.reverse()
+        return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])]), tuple(reversed(stops[1:]))
 
-    def _others(self, table: Floats) -> Floats:
-        """Return the least cost of all other segments together, by the segment's number of moves [K, N + 1]."""
-        before = [np.where(np.arange(table.shape[1]) == 0, 0.0, np.inf)]
-        for costs, at in zip(table[:-1], self._at, strict=True):
-            before.append(_min_plus(before[-1], costs) + at)
-        after, out = self._total, np.empty_like(table)
-        for segment in range(len(table) - 1, -1, -1):
-            out[segment] = _min_plus(before[segment], after[::-1])[::-1]
-            if segment:
-                after = _min_plus(table[segment], after[::-1])[::-1] + self._at[segment - 1]
+    def _so_far(self, table: Floats) -> list[Floats]:
+        """Return the least cost from the start to each of the K + 1 stops, by the move it is passed at [N + 1]."""
+        out = [self._open[0]]
+        for costs, passing in zip(table, self._open[1:], strict=True):
+            least = np.full(len(passing), np.inf)
+            for first in np.flatnonzero(np.isfinite(out[-1])):
+                rest = least[first:]
+                np.minimum(rest, out[-1][first] + costs[first % len(costs), : len(rest)], out=rest)
+            out.append(least + passing)
         return out
 
-
-def _min_plus(a: Floats, b: Floats) -> Floats:
-    """Return the min-plus convolution c[n] = min over m of a[m] + b[n - m]."""
-    out = np.full(len(a), np.inf)
-    for m in np.flatnonzero(np.isfinite(a)):
-        np.minimum(out[m:], a[m] + b[: len(b) - m], out=out[m:])
-    return out
+    def _others(self, table: Floats) -> Floats:
+        """Return the least cost of all other segments together, for each piece [K, F, N + 1]."""
+        so_far, to_go, out = self._so_far(table), self._open[-1], np.full_like(table, np.inf)
+        for segment in range(len(table) - 1, -1, -1):
+            costs, other, least = table[segment], out[segment], np.full(len(to_go), np.inf)
+            for first in np.flatnonzero(np.isfinite(so_far[segment])):
+                row, rest = first % len(costs), to_go[first:]
+                mine = other[row, : len(rest)]
+                np.minimum(mine, so_far[segment][first] + rest, out=mine)
+                least[first] = (costs[row, : len(rest)] + rest).min()
+            to_go = least + self._open[segment]
+        return out

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Int32s, Ints
 from motionmind.errors import InfeasibleError
 from motionmind.search import astar, pair_chains, trws
 from motionmind.search.attention import Attention, Clock
 from motionmind.search.costs import path_cost
 from motionmind.search.pair_chain_tables import PairChains, count_pairs
+from motionmind.search.pieces import Pieces
 from motionmind.search.polish import polish
-from motionmind.search.problem import Model, Problem, costs_to_go
-from motionmind.search.segments import Segments
-from motionmind.search.trellis import Trellis, build_trellis
+from motionmind.search.problem import Problem, Rules
+from motionmind.search.segments import Piece, Segments
+from motionmind.search.trellis import Trellis
 from motionmind.search.trws import Messages
 
 SWEEPS_AT_ONCE = 2  # few, since pruning pays at once: 2 is fastest of 1 to 8 on real ballet
@@ -51,6 +52,25 @@ class Progress(NamedTuple):
 Watch = Callable[[Progress], bool | None]
 
 
+class LengthChoice(NamedTuple):
+    """The choice of a number of moves, by what paths cost without the guide.
+
+    Attributes:
+        moves: the number of moves of the cheapest path known without the guide.
+        cost: its cost, nats.
+        lower_bound: no path costs less than this without the guide, nats.
+        lower_bound_elsewhere: no path of another number of moves does, nats; the choice is proven where this is no less
+            than `cost`, to 1e-6 nats.
+        expansions: nodes that A* expanded for the choice.
+    """
+
+    moves: int
+    cost: float
+    lower_bound: float
+    lower_bound_elsewhere: float
+    expansions: int
+
+
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """The best path found, and how close to optimal it provably is.
@@ -65,6 +85,7 @@ class Certificate:
         peak_nodes: the greatest number of nodes held at once.
         seconds: time spent on "problem", "bound" and "search"; a measurement, and no part of the proof.
         passed: the moves at which the path passes its vias [K].
+        length: how its number of moves was chosen, where a guide led the search; None where the number was given.
     """
 
     path: Int32s
@@ -75,6 +96,7 @@ class Certificate:
     peak_nodes: int
     seconds: dict[str, float]
     passed: tuple[int, ...] = ()
+    length: LengthChoice | None = None
 
 
 def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
@@ -86,124 +108,132 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
     Vias divide the path into segments of at least one move. Then the numbers of moves are those of a segment, each
     bounded below what the best path leaves when the other segments cost as little as is proven.
 
+    A guide says how to move in a number of moves, not how many to make. So where the rules leave a choice the number
+    of moves is that of the cheapest path without the guide, and the certificate is that of the guided problem in it.
+
     Args:
         problem: what to solve.
         watch: called with the progress between pieces of work; if it returns True the search ends as soon as any path
-            is known, with what is proven by then.
+            is known, with what is proven by then. While the number of moves is chosen, costs are those without a guide.
 
     Raises:
         InfeasibleError: no path satisfies the problem.
-        ValueError: a chain has too many states.
+        ValueError: a chain has too many states, or the guide has costs that the problem cannot take.
     """
     states = int(np.diff(problem.model.starts).max())
     if states > MOST_STATES_OF_CHAIN:
         raise ValueError(f"a chain has {states} states; the search takes up to {MOST_STATES_OF_CHAIN}")
-    solver = _Solver(problem, watch)
-    solver.search(solver.bound())
-    return solver.certificate()
+    solver, rules, length = _Solver(watch), problem.rules, None
+    if problem.guide is not None and rules.shortest < rules.longest:
+        solver.start(replace(problem, guide=None))
+        length = solver.choose_length()
+        problem = replace(problem, rules=replace(rules, shortest=length.moves, longest=length.moves))
+    solver.start(problem)
+    solver.run()
+    return solver.certificate(length)
 
 
 def feasible(problem: Problem) -> bool:
-    """Return whether any path satisfies the problem."""
-    return bool(np.isfinite(_divide(problem)[2].lower_bound()))
-
-
-def _divide(problem: Problem) -> tuple[Model, list[Floats], Segments]:
-    """Return the model with waits, the costs to go to each stop but the first, and bounds on the segments between."""
-    rules, stops, model = problem.rules, problem.stops, problem.model_with_waits()
-    to_go = [costs_to_go(model, stop, rules.longest) for stop in stops[1:]]
-    lower = _separate_costs(problem, model, to_go)
-    return model, to_go, Segments(lower, rules.shortest, [via.move for via in problem.vias])
-
-
-def _separate_costs(problem: Problem, model: Model, to_go: list[Floats]) -> Floats:
-    """Return the least cost of each of K segments, its chains on their own, by number of moves [K, longest + 1], nats.
-
-    It is finite exactly where the segment can have as many moves.
-    """
-    rules, stops = problem.rules, problem.stops
-    moves = np.arange(rules.longest + 1)
-    out = np.array(
-        [
-            costs[:, model.starts[:-1] + stop].sum(axis=1) + rules.per_move * moves
-            for stop, costs in zip(stops[:-1], to_go, strict=True)
-        ]
-    )
-    if len(out) > 1:
-        out[:, 0] = np.inf
-    if not all(model.allowed[model.starts[:-1] + stop].all() for stop in stops[1:-1]):
-        out[:] = np.inf
-    return out
+    """Return whether any path satisfies the problem; a guide forbids none."""
+    return bool(np.isfinite(Pieces(replace(problem, guide=None)).segments().lower_bound()))
 
 
 class _Solver:
-    """The state of one search: first `bound`, then `search`, then `certificate`."""
+    """The state of one search: `start` a problem, then `choose_length` or `run`, then ask for the `certificate`."""
 
-    def __init__(self, problem: Problem, watch: Watch | None) -> None:
-        self.problem, self.rules = problem, problem.rules
-        self.expansions = self.peak_nodes = 0
+    rules: Rules
+    pieces: Pieces
+    segments: Segments
+    expansions: int
+    peak_nodes: int
+
+    def __init__(self, watch: Watch | None) -> None:
         self.clock = Clock("problem", "bound", "search")
-        self.model, self.to_go, self.segments = _divide(problem)
         self.attention = Attention(None if watch is None else lambda: bool(watch(self.progress())))
+
+    def start(self, problem: Problem) -> None:
+        """Begin with a problem."""
+        self.rules, self.expansions, self.peak_nodes = problem.rules, 0, 0
+        self.pieces = Pieces(problem)
+        self.segments = self.pieces.segments()
         self.clock.lap("problem")
 
     def progress(self) -> Progress:
         return Progress(self.segments.best, self.segments.lower_bound(), self.expansions)
 
-    def bound(self) -> dict[tuple[int, int], tuple[Trellis, PairChains]]:
-        """Bound segments, each in a number of moves, and find paths; return those left for A*."""
-        left: dict[tuple[int, int], tuple[Trellis, PairChains]] = {}
+    def run(self) -> None:
+        """Search until the best path is proven, the budget spent, or the search is to end."""
+        self._search(self._bound(lambda: False), lambda: False)
+
+    def choose_length(self) -> LengthChoice:
+        """Search until the number of moves of the best path is proven, and return it."""
+        self._search(self._bound(self._length_is_proven), self._length_is_proven)
+        cost, lower_bound = self._result()
+        segments = self.segments
+        return LengthChoice(segments.moves, cost, lower_bound, segments.lower_bound_elsewhere(), self.expansions)
+
+    def _length_is_proven(self) -> bool:
+        return np.isfinite(self.segments.best) and self.segments.lower_bound_elsewhere() > self.segments.best - PROVEN
+
+    def _bound(self, enough: Callable[[], bool]) -> dict[Piece, tuple[Trellis, PairChains]]:
+        """Bound pieces, and find paths; return those left for A*."""
+        left: dict[Piece, tuple[Trellis, PairChains]] = {}
         kept = 0  # pairs in them
         while True:
-            segment, moves, least, below = self.segments.most_promising()
-            if not least < self.segments.best - PROVEN or (self.attention.ends() and np.isfinite(self.segments.best)):
+            piece, least, below = self.segments.most_promising()
+            if not least < self.segments.best - PROVEN or enough():
                 return left
-            toll, start = self.rules.per_move * moves, self.problem.stops[segment]
-            trellis = build_trellis(self.model, start, moves, self.to_go[segment], below - toll)
+            if self.attention.ends() and np.isfinite(self.segments.best):
+                return left
+            toll = self.rules.per_move * piece.moves
+            trellis = self.pieces.trellis(piece, below - toll)
             state = _Bounded(trellis, below - toll)
             self.clock.lap("problem")
             messages = _tighten_by_messages(state, self.rules.sweeps, self.attention)
             if (
                 not (state.closed or self.attention.ends())
-                and len(start) > 1
+                and trellis.chains > 1
                 and count_pairs(state.trellis) <= MOST_PAIRS
             ):
                 tables = _tighten_by_pair_chains(state, pair_chains.build(state.trellis, messages), self.attention)
                 if not state.closed and kept + len(tables.pair_cost) <= MOST_PAIRS:
-                    left[segment, moves] = state.trellis, tables
+                    left[piece] = state.trellis, tables
                     kept += len(tables.pair_cost)
-            self.segments.update(segment, moves, state.lower_bound + toll, state.cost + toll, state.states)
+            self.segments.update(piece, state.lower_bound + toll, state.cost + toll, state.states)
             self.clock.lap("bound")
 
-    def search(self, left: dict[tuple[int, int], tuple[Trellis, PairChains]]) -> None:
-        """Search by A* what is left, until the best path is proven, the budget spent, or the search is to end."""
+    def _search(self, left: dict[Piece, tuple[Trellis, PairChains]], enough: Callable[[], bool]) -> None:
+        """Search by A* what is left."""
         self.segments.reopen(left)
         while True:
-            segment, moves, least, below = self.segments.most_promising()
-            if not least < self.segments.best - PROVEN or self.attention.ends():
+            piece, least, below = self.segments.most_promising()
+            if not least < self.segments.best - PROVEN or enough() or self.attention.ends():
                 return
-            toll, budget = self.rules.per_move * moves, self.rules.node_budget - self.expansions
-            trellis, tables = left.pop((segment, moves))
+            toll, budget = self.rules.per_move * piece.moves, self.rules.node_budget - self.expansions
+            trellis, tables = left.pop(piece)
             found = _search(trellis, tables, below - toll, self.rules.node_budget, budget, self.attention)
-            self.segments.update(segment, moves, found.lower_bound + toll, found.cost + toll, found.states)
+            self.segments.update(piece, found.lower_bound + toll, found.cost + toll, found.states)
             self.expansions += found.expansions
             self.peak_nodes = max(self.peak_nodes, found.peak_nodes)
             self.clock.lap("search")
 
-    def certificate(self) -> Certificate:
+    def certificate(self, length: LengthChoice | None) -> Certificate:
         """Return what was found and proven."""
-        cost = self.segments.best
-        if not np.isfinite(cost):
-            raise InfeasibleError("no path satisfies the problem")
-        lower_bound, (path, passed) = self.segments.lower_bound(), self.segments.path()
+        (cost, lower_bound), (path, passed) = self._result(), self.segments.path()
         status: Status = "bounded"
         if cost - lower_bound <= PROVEN:
             status = "optimal"
         elif self.attention.ended[0]:
             status = "interrupted"
         return Certificate(
-            path, cost, lower_bound, status, self.expansions, self.peak_nodes, self.clock.seconds, passed
+            path, cost, lower_bound, status, self.expansions, self.peak_nodes, self.clock.seconds, passed, length
         )
+
+    def _result(self) -> tuple[float, float]:
+        """Return the best cost and the lower bound on all, in nats."""
+        if not np.isfinite(self.segments.best):
+            raise InfeasibleError("no path satisfies the problem")
+        return self.segments.best, self.segments.lower_bound()
 
 
 class _Bounded:

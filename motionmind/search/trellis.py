@@ -61,15 +61,18 @@ def segment_trellises(problem: Problem, moves: Sequence[int]) -> list[Trellis]:
     Returns:
         K trellises.
     """
-    model, segments = problem.model_with_waits(), zip(pairwise(problem.stops), pairwise(moves), strict=True)
-    return [
-        build_trellis(model, leaving, last - first, costs_to_go(model, arriving, last - first), np.inf)
-        for (leaving, arriving), (first, last) in segments
-    ]
+    model, timed = problem.model_with_waits(), problem.timed_costs(moves[-1])
+    out = []
+    for (leaving, arriving), (first, last) in zip(pairwise(problem.stops), pairwise(moves), strict=True):
+        here = None if timed is None else timed[first : last + 1]
+        to_go = costs_to_go(model, arriving, last - first, here)
+        out.append(build_trellis(model, leaving, last - first, to_go, np.inf, here))
+    return out
 
 
-@jit
-def build_trellis(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> Trellis:
+def build_trellis(
+    model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats | None = None
+) -> Trellis:
     """Build the trellis of exactly `moves` moves from a start to a goal.
 
     A state is in a domain if it is allowed there, some walk of exactly T moves passes through it then, and the cheapest
@@ -79,20 +82,12 @@ def build_trellis(model: Model, start: Ints, moves: int, to_go: Floats, below: f
         model: the costs, waits included.
         start: states to start from [L].
         moves: number of moves T.
-        to_go: `costs_to_go` to the goal, for at least T moves, nats [T + 1 or more, G].
+        to_go: `costs_to_go` to the goal, for at least T moves and with the same timed costs, nats [T + 1 or more, G].
         below: cost of a path already known, nats, or infinity.
+        timed: further costs of being in each state after each move, nats [T + 1, G]; None for none. At the start
+            nothing is paid.
     """
-    chains = len(model.parents)
-    dom_ptr, dom, place = _domains(model, start, moves, to_go, below)
-    row_ptr, row_to, row_cost = _edges(model, dom_ptr, dom, place)
-    up_ptr, col_ptr, col_to, col_cost = _couplings(model, dom_ptr, dom, place)
-    unary = np.zeros(len(dom))
-    for i in range(chains, (moves + 1) * chains):
-        for p in range(dom_ptr[i], dom_ptr[i + 1]):
-            unary[p] = model.unary[model.starts[i % chains] + dom[p]]
-    return Trellis(
-        chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
-    )
+    return _build(model, start, moves, to_go, below, np.zeros((0, 0)) if timed is None else timed)
 
 
 @jit
@@ -177,7 +172,24 @@ def coupling_rows(trellis: Trellis, kept: Bools) -> Ints:
 
 
 @jit
-def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
+def _build(model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats) -> Trellis:
+    """Build as `build_trellis` does; `timed` has no rows where it holds no costs."""
+    chains = len(model.parents)
+    dom_ptr, dom, place = _domains(model, start, moves, to_go, below, timed)
+    row_ptr, row_to, row_cost = _edges(model, dom_ptr, dom, place)
+    up_ptr, col_ptr, col_to, col_cost = _couplings(model, dom_ptr, dom, place)
+    unary = np.zeros(len(dom))
+    for i in range(chains, (moves + 1) * chains):
+        for p in range(dom_ptr[i], dom_ptr[i + 1]):
+            row = model.starts[i % chains] + dom[p]
+            unary[p] = model.unary[row] + (timed[i // chains, row] if len(timed) > 0 else 0.0)
+    return Trellis(
+        chains, moves, model.parents, dom_ptr, dom, unary, row_ptr, row_to, row_cost, up_ptr, col_ptr, col_to, col_cost
+    )
+
+
+@jit
+def _costs_so_far(model: Model, start: Ints, moves: int, timed: Floats) -> Floats:
     """Return the least cost of exactly t moves from a chain's start to each state, the chain on its own [T + 1, G]."""
     value = np.full((moves + 1, model.starts[-1]), np.inf)
     for chain in range(len(model.parents)):
@@ -190,14 +202,18 @@ def _costs_so_far(model: Model, start: Ints, moves: int) -> Floats:
                         target = first + model.targets[e]
                         cost = value[t, row] + model.costs[e] + model.alone[target]
                         value[t + 1, target] = min(value[t + 1, target], cost)
+            if len(timed) > 0:
+                value[t + 1, first:last] += timed[t + 1, first:last]
     return value
 
 
 @jit
-def _domains(model: Model, start: Ints, moves: int, to_go: Floats, below: float) -> tuple[Ints, Int32s, Int32s]:
+def _domains(
+    model: Model, start: Ints, moves: int, to_go: Floats, below: float, timed: Floats
+) -> tuple[Ints, Int32s, Int32s]:
     """Return `dom_ptr`, `dom`, and the position of each state at each move [T + 1, G], -1 where it has none."""
     chains, rows = len(model.parents), model.starts[-1]
-    so_far = _costs_so_far(model, start, moves)
+    so_far = _costs_so_far(model, start, moves, timed)
     spare = below
     for chain in range(chains):
         spare -= to_go[moves, model.starts[chain] + start[chain]]

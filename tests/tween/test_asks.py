@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -16,7 +15,7 @@ import pytest
 from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toys import Toy, evaluate, random_toy, solution, trellis_of
+from toys import Toy, best, evaluate, random_toy, solution, trellis_of
 
 from motionmind._typing import Bools, Int32s
 from motionmind.body.motion import Posture
@@ -40,32 +39,6 @@ POSTURES = bundled("corpora") / "ballet" / "postures"
 
 
 # --- brute force ------------------------------------------------------------------------------------------------------
-
-
-def best(toy: Toy, moves: Sequence[int], allowed: Bools, vias: Sequence[Via]) -> float:
-    """Least cost over all joint states, for numbers of moves, with `allowed` [G] on the way and vias passed in order.
-
-    value[k, n]: of the ways so far to joint state n, past k vias; no two are passed at once, nor at either end.
-    """
-    joint = toy.joint_states()
-    move, stand = toy._tables()
-    starts = np.concatenate([[0], np.cumsum(toy.sizes)])[:-1]
-    inner = np.where(allowed[starts + joint].all(axis=1), 0.0, np.inf)
-    at_goal = (joint == toy.goal).all(axis=1)
-    least = np.inf
-    for last in moves:
-        value = np.full((len(vias) + 1, len(joint)), np.inf)
-        value[0] = np.where((joint == toy.start).all(axis=1), 0.0, np.inf)
-        for t in range(1, last + 1):
-            value = (value[:, :, None] + move).min(axis=1) + stand
-            if t < last:
-                value += inner
-                for k in range(len(vias), 0, -1):
-                    if vias[k - 1].move in (None, t):
-                        here = (joint == vias[k - 1].states).all(axis=1)
-                        value[k, here] = np.minimum(value[k, here], value[k - 1, here])
-        least = min(least, value[-1, at_goal][0] + toy.per_move * last)
-    return least
 
 
 def keeps(toy: Toy, path: Int32s, allowed: Bools, found: Certificate, vias: list[Via]) -> bool:
