@@ -134,7 +134,8 @@ def _search_lines(result: Tween) -> list[tuple[str, str]]:
 
 def _distance_lines(result: Tween) -> list[tuple[str, str]]:
     """Describe how far from states A, B, the postures passed and the motion are: headings, each with a line."""
-    stops = [("A", "", result.snap_degrees[0]), ("B", "", result.snap_degrees[1])]
+    ends = zip("AB", (result.before, result.after), result.snap_degrees, strict=True)
+    stops = [(end, "" if seconds is None else "moving, ", row) for end, seconds, row in ends]
     for number, (move, row) in enumerate(zip(result.passed, result.via_degrees, strict=True), start=1):
         stops.insert(number, (f"via {number}", f"at move {move}, ", row))
     lines = []

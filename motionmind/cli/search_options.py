@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args
 import click
 
 from motionmind.cli.options import Section, given_option, option
+from motionmind.cli.postures import read_still
 from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
@@ -49,7 +50,8 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         _THROUGH,
-        "Pass through the posture in FILE at move N, or at any move; repeat for several, in order.",
+        "Pass through the posture in FILE at move N, or at any move; FILE@FRAME@N and FILE@FRAME@ take a frame of a "
+        "clip. Repeat for several, in order.",
         str,
         "FILE[@N]",
         multiple=True,
@@ -209,12 +211,10 @@ def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         MotionMindError: a value cannot be used, or a posture cannot be read.
     """
-    from motionmind.formats import read_posture
-
     context = click.get_current_context()
     if given_option(context, ["memory"]) and given_option(context, ["node_budget"]):
         raise MotionMindError("--memory and --node-budget both limit the number of nodes; give one of them")
-    stops = [(read_posture(path), move) for path, move in parse_vias(options["via"])]
+    stops = [(read_still(posture), move) for posture, move in parse_vias(options["via"])]
     return {
         **options,
         "pin": parse_pins(options["pin"]),
@@ -226,4 +226,4 @@ def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def via_files(options: Mapping[str, Any]) -> list[Any]:
     """Return the paths of the postures to pass through."""
-    return [path for path, _ in parse_vias(options["via"])]
+    return [posture.file for posture, _ in parse_vias(options["via"])]

@@ -108,7 +108,7 @@ def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
         if not 0 <= frame < length:
             raise MotionMindError(f"{clip}: frames are 0 to {length - 1}, there is no frame {given}")
     if last < first:
-        raise MotionMindError(f"{clip}: --to {end} lies before --from {start}")
+        raise MotionMindError(f"{clip}: the last frame, {end}, lies before the first, {start}")
     return range(first, last + 1)
 
 

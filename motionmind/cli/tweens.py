@@ -15,9 +15,11 @@ import click
 
 from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, numbered, write
 from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, option
+from motionmind.cli.postures import read_end
 from motionmind.cli.printing import Interruption, announce_compilation, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import COUNT, FILE
+from motionmind.cli.words import parse_frames, parse_posture
 from motionmind.errors import NoPathError
 from motionmind.render import PICTURES
 
@@ -33,8 +35,8 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
     "--corpus ballet -o tween.bvh"
 )
-@click.argument("a", type=FILE)
-@click.argument("b", type=FILE)
+@click.argument("a")
+@click.argument("b")
 @CORPUS
 @option("-o", "--output", section=Section.OUTPUT, type=FILE, help=f"Write {OUTPUTS}.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
@@ -46,20 +48,37 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     metavar="K",
     help="Find K tweens that differ; write out-1.json, out-2.json, ...",
 )
+@option(
+    "--before",
+    section=Section.MOTION,
+    metavar="FRAMES",
+    help="Leave A with the velocity of these frames, of which the last is A: FILE@FIRST..LAST, or all of FILE.",
+)
+@option(
+    "--after",
+    section=Section.MOTION,
+    metavar="FRAMES",
+    help="Arrive at B with the velocity of these frames, of which the first is B, given as for --before.",
+)
 @searching
 @HOME
 def tween(
-    a: Path,
-    b: Path,
+    a: str,
+    b: str,
     corpus: str,
     output: Path | None,
     report: Path | None,
     problem: Path | None,
     home: Path | None,
     alternatives: int | None,
+    before: str | None,
+    after: str | None,
     **options: Any,
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
+
+    A and B are files of one posture, or frames of clips, counted from 0: clip.bvh@240. The body may have any velocity
+    there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's.
 
     Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
     130. Exit code 3 means that nothing joins A and B under the given rules; --report then holds the diagnosis.
@@ -68,19 +87,21 @@ def tween(
         raise click.UsageError("--problem writes a search of joints that move on their own; leave out --posturewise")
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
-    from motionmind.formats import read_posture
     from motionmind.tween.engine import Engine
 
+    named = parse_posture(a), parse_posture(b)
+    around = tuple(parse_frames(word) if word else None for word in (before, after))
     outputs = _Outputs(output, report, problem, alternatives)
-    outputs.check([a, b, *via_files(options)])
+    outputs.check([*(one.file for one in (*named, *around) if one), *via_files(options)])
     request = request_options(options)
     if alternatives and request["follow"] is None:
         request["follow"] = True  # means of walks would all be alike
     engine = Engine.load(corpus, home)
-    ends = read_posture(a), read_posture(b)
+    start, request["before"] = read_end(named[0], around[0], "before")
+    end, request["after"] = read_end(named[1], around[1], "after")
     announce_compilation()
     with _diagnosing(outputs), Interruption() as interruption:
-        results = _find_tweens(engine, ends, request, outputs.count, interruption)
+        results = _find_tweens(engine, (start, end), request, outputs.count, interruption)
     files = outputs.write(results)
     if outputs.is_report_printed:
         reports = [result.report() for result in results]

@@ -99,7 +99,7 @@ class Tween:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """What was asked as plain values for JSON: see `TweenRequest.plain`, and `before` and `after`."""
+        """The request as plain values for JSON (see `TweenRequest.plain`), with `before` and `after`."""
         return self.request.plain(len(self.joints)) | {"before": self.before, "after": self.after}
 
     def report(self) -> dict[str, Any]:

@@ -27,6 +27,12 @@ ALONE = 1.0  # seconds that the only posture of a piece lasts
 _VERTICAL = np.array([0.0, 1.0, 0.0])
 _FLOOR = np.array([1.0, 0.0, 1.0])
 
+_LEAD = 0.2  # seconds of the piece's movement on either side of a transition
+# Seconds between frames beyond which they do not show how fast the piece passes one of them. Nearer keyframes do: the
+# piece goes in a straight line from one to the next, so that is its velocity. Of a second between two positions nobody
+# knows how it is spent, often mostly at rest.
+_FARTHEST = 0.5 + 1e-6
+
 
 class Arrangement(NamedTuple):
     """A piece's postures in another order.
@@ -129,6 +135,28 @@ class Piece:
         """Return postures i and k for a movement from one to the other: both above the origin and, if the facing is
         free, both facing +Z."""
         return self._at_origin(i), self._at_origin(k)
+
+    def around(self, i: int, k: int) -> tuple[Motion | None, Motion | None]:
+        """Return how the piece moves up to posture i and from posture k on, each placed as in `ends`.
+
+        Each lasts a fifth of a second, or until the next frame if that is later; None where the piece has no frame, or
+        none within half a second.
+        """
+        times, begin, end = self.motion.times, int(self.frames[i]), int(self.frames[k])
+        first = min(int(np.searchsorted(times, times[begin] - _LEAD - _ROUNDING)), begin - 1)
+        last = max(int(np.searchsorted(times, times[end] + _LEAD + _ROUNDING)), end + 2) - 1
+        leads = first >= 0 and times[begin] - times[begin - 1] <= _FARTHEST
+        follows = last < len(times) and times[end + 1] - times[end] <= _FARTHEST
+        return (
+            self._stretch_at_origin(first, begin + 1, i) if leads else None,
+            self._stretch_at_origin(end, last + 1, k) if follows else None,
+        )
+
+    def _stretch_at_origin(self, first: int, stop: int, posture: int) -> Motion:
+        """Return the frames from `first` to before `stop`, placed as `_at_origin` places a posture among them."""
+        own, place = self.motion.slice(first, stop), _Placement(-self._headings[posture], np.zeros(3))
+        root = place.move(own.root - self.motion.root[self.frames[posture]] * _FLOOR)
+        return replace(own, rotations=rot.normalise(place.turn(own.rotations)), root=root)
 
     def _at_origin(self, posture: int) -> Posture:
         own = self.motion.posture(int(self.frames[posture]))

@@ -267,6 +267,8 @@ def judge_and_smooth(
 ) -> tuple[Transition, ...]:
     """Judge the transitions between pairs of a piece's postures, and find movement for those that are abrupt.
 
+    It begins and ends as fast as the piece moves there, where the piece shows it (`Piece.around`).
+
     Args:
         piece: the piece.
         pairs: numbers of two postures each, (from, to).
@@ -296,10 +298,12 @@ def judge_and_smooth(
             on_progress(done, len(pending))
         transition = transitions[number]
         a, b = piece.ends(transition.start, transition.end)
+        before, after = piece.around(transition.start, transition.end)
+        given = {"before": before, "after": after, "watch": watching if watch else None, **options}
         tweens: list[Tween] = []
         try:
             for _ in range(1 if posturewise else alternatives):
-                tweens.append(engine.tween(a, b, **options, unlike=tweens, watch=watching if watch else None))
+                tweens.append(engine.tween(a, b, **given, unlike=tweens))
                 if ended:
                     break
         except NoPathError as error:

@@ -345,7 +345,7 @@ BAD = [
     ("tween missing.json B.json --corpus ballet", r"missing\.json: rotations: no left_hip"),
     ("tween A.json binary.json --corpus ballet", r"binary\.json:1: not valid JSON"),
     ("tween A.json empty.bvh --corpus ballet", r"empty\.bvh:1: not a BVH file"),
-    ("tween A.json folder --corpus ballet", r"'folder' is a directory"),
+    ("tween A.json folder --corpus ballet", r"folder: suffix '' is unknown"),
     ("tween A.json nowhere.json --corpus ballet", r"nowhere\.json: cannot be read: there is no such file"),
     ("tween A.json clip.bvh --corpus ballet", r"clip\.bvh: \d+ frames, where one posture was expected"),
     ("tween stranger.bvh B.json --corpus ballet", r"posture A is on another skeleton than corpus 'ballet': "),

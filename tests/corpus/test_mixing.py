@@ -440,6 +440,22 @@ def test_how_long_a_move_takes_and_where_it_leads_is_weighed_alike(home: Home) -
     np.testing.assert_allclose(engine.carriage.weights, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 0.25, 0.25])
 
 
+def test_the_movement_of_a_mix_goes_the_way_of_the_corpus_that_weighs_more(home: Home) -> None:
+    """Both corpora lean the pole by the same steps; one leans the flag to one side, the other to the other."""
+    pole, aside = [0, 1, 2, 1, 0], [0, 2, 0, 2, 0]
+    home.keep("other", [walk("left", pole, [-flag for flag in aside])])
+    leans = []
+    for weight in (0.01, 0.2, 1.0, 5.0, 100.0):
+        engine = home.mix("mixed", [walk("right", pole, aside)], {"other": weight})
+        a, b = (walk("ends", [0, 2], [0, 0]).posture(end) for end in (0, 1))
+        tween = engine.tween(a, b, moves=2, follow=False)
+        middle = tween.motion.at(tween.motion.insertions[0].times).rotations[1, 1]
+        leans.append(math.degrees(float(rot.log(middle)[2])) / STEP)
+    assert np.all(np.diff(leans) < -0.1)
+    np.testing.assert_allclose(leans, -np.array(leans)[::-1], atol=0.02)  # what one gains the other loses
+    assert leans[0] > 1.0
+
+
 def test_how_joints_stand_together_is_weighed_alike(home: Home) -> None:
     weight, called = 0.3, {}
     one, two = ([0, 1, 1, 0], [0, 0, 1, 1]), ([0, 1, 0], [1, 1, 2])

@@ -462,6 +462,45 @@ def assert_same(motion: Motion, again: Motion) -> None:
     np.testing.assert_allclose(there[:, count:][:, order][:, leaf], here[:, count:][:, leaf], atol=1e-6)
 
 
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_every_rotation_order_is_read_and_read_back(tmp_path: Path, order: str) -> None:
+    """Positions of all joints and tips are those of matrices, which are SciPy's, before and after writing."""
+    rng = np.random.default_rng(0)
+    turns = " ".join(f"{letter}rotation" for letter in order)
+    hierarchy = f"""HIERARCHY
+    ROOT base {{ OFFSET 1 2 3 CHANNELS 6 Xposition Yposition Zposition {turns}
+      JOINT upper {{ OFFSET 0 5 1 CHANNELS 3 {turns}
+        JOINT fore {{ OFFSET 2 0 -4 CHANNELS 3 {turns}
+          End Site {{ OFFSET 3 1 2 }} }} }}
+      JOINT side {{ OFFSET -3 1 0 CHANNELS 3 {turns}
+        End Site {{ OFFSET -1 -2 5 }} }} }}
+    """
+    angles = rng.uniform(-180.0, 180.0, (30, 4, 3))
+    angles[:6, :, 1] = [[90.0], [-90.0], [89.9999], [-89.9999], [120.0], [-175.0]]  # locked, nearly so, and beyond
+    rows = np.concatenate([rng.normal(size=(30, 3)), angles.reshape(30, 12)], axis=1)
+    numbers = "\n".join(" ".join(f"{number:.9f}" for number in row) for row in rows)
+    source = write(tmp_path, f"{hierarchy}MOTION\nFrames: 30\nFrame Time: 0.02\n{numbers}\n")
+    motion = read_bvh(source, unit=1.0)
+    for joint, name in enumerate(motion.skeleton.names):
+        at = ["base", "upper", "fore", "side"].index(name)
+        expected = Rotation.from_euler(order, angles[:, at], degrees=True).as_quat()
+        assert rot.angle(motion.rotations[:, joint], expected).max() < 1e-7
+    joints, ends = oracle(source, list(range(30)))
+    write_bvh(tmp_path / "again.bvh", motion, unit=1.0)
+    again = read_bvh(tmp_path / "again.bvh", unit=1.0)
+    for found in (motion, again):
+        assert set(joints) == set(found.skeleton.names)
+        for name, places in joints.items():
+            np.testing.assert_allclose(positions(found)[name], places, atol=1e-5)
+        for name, places in ends.items():
+            np.testing.assert_allclose(tips(found)[name], places, atol=1e-5)
+    written, written_ends = oracle(tmp_path / "again.bvh", list(range(30)))
+    for name, places in joints.items():
+        np.testing.assert_allclose(written[name], places, atol=1e-5)
+    for name, places in ends.items():
+        np.testing.assert_allclose(written_ends[name], places, atol=1e-5)
+
+
 @pytest.mark.parametrize("unit", ["cm", "m", "mm", "in", "cmu", 3.0])
 def test_read_back(tmp_path: Path, unit: str | float) -> None:
     motion = wandering(human23(), 40, seed=1)

@@ -18,7 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from motionmind.body.motion import Insertion, Motion
+from motionmind.body.mirror import find_sides, mirrored
+from motionmind.body.motion import Insertion, Motion, Velocity
 from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats import lossy_fields, read_motion, write_motion
@@ -375,6 +376,81 @@ def test_insertions_lead_from_posture_to_posture(smoothed: Variation) -> None:
             np.testing.assert_allclose(way.root[end], motion.root[frame] * [0, 1, 0], atol=1e-9)
     kept = ~motion.inserted()
     assert kept.sum() == len(frames)
+
+
+# --- the movement at the ends of an insertion ------------------------------------------------------------------------
+
+
+def velocities(piece: Piece, i: int, k: int) -> tuple[Velocity, Velocity]:
+    """The velocities with which a piece arrives at posture i and leaves posture k, as insertions are given them."""
+    before, after = piece.around(i, k)
+    assert before is not None
+    assert after is not None
+    return Velocity.at_end(before), Velocity.at_start(after)
+
+
+@given(i=st.integers(1, 107), k=st.integers(1, 107), facing=st.sampled_from(["free", "stage"]))
+def test_an_insertion_is_given_the_pieces_velocity_in_the_bodys_heading(
+    kata: Piece, i: int, k: int, facing: str
+) -> None:
+    piece = Piece(kata.motion, kata.frames, facing)  # type: ignore[arg-type]
+    own, ends = piece.motion, piece.ends(i, k)
+    leaving, arriving = velocities(piece, i, k)
+    expected = Velocity.at_end(own.slice(0, i + 1)), Velocity.at_start(own.slice(k, len(own)))
+    for found, wanted, posture in ((leaving, expected[0], i), (arriving, expected[1], k)):
+        np.testing.assert_allclose(found.rotations, wanted.rotations, atol=1e-9)
+        turned = 0.0 if facing == "stage" else -float(rot.heading(own.rotations[posture, 0]))
+        np.testing.assert_allclose(found.root, Rotation.from_rotvec([0.0, turned, 0.0]).apply(wanted.root), atol=1e-9)
+    for movement, frame, end in zip(piece.around(i, k), (-1, 0), ends, strict=True):
+        assert movement is not None
+        np.testing.assert_allclose(movement.rotations[frame], end.rotations, atol=1e-12)
+        np.testing.assert_allclose(movement.root[frame], end.root, atol=1e-12)
+
+
+def test_a_piece_run_backwards_or_in_a_mirror_gives_velocities_reversed_or_mirrored(recording: Motion) -> None:
+    piece, last = Piece.of(recording, rate=5.0), len(Piece.of(recording, rate=5.0)) - 1
+    own = piece.motion
+    times = own.times[-1] - own.times[::-1]
+    backwards = replace(own, rotations=own.rotations[::-1], root=own.root[::-1], times=times)
+    leaving, arriving = velocities(piece, 2, 4)
+    assert np.abs(leaving.rotations).max() > 0.1
+    reversed_piece = Piece(backwards, len(own) - 1 - piece.frames[::-1])
+    for found, wanted in zip(velocities(reversed_piece, last - 4, last - 2), (arriving, leaving), strict=True):
+        np.testing.assert_allclose(found.rotations, -wanted.rotations, atol=1e-9)
+        np.testing.assert_allclose(found.root, -wanted.root, atol=1e-9)
+    partners = find_sides(own.skeleton).partners
+    for found, wanted in zip(velocities(Piece(mirrored(own), piece.frames), 2, 4), (leaving, arriving), strict=True):
+        np.testing.assert_allclose(found.rotations, wanted.rotations[partners] * [1.0, -1.0, -1.0], atol=1e-9)
+        np.testing.assert_allclose(found.root, wanted.root * [-1.0, 1.0, 1.0], atol=1e-9)
+
+
+def test_frames_between_postures_show_how_the_piece_moves(recording: Motion) -> None:
+    piece = Piece.of(recording, rate=2.0)
+    before, after = piece.around(1, 1)
+    assert before is not None
+    assert after is not None
+    np.testing.assert_allclose(before.times, piece.motion.times[9:16])  # a fifth of a second, up to frame 15
+    np.testing.assert_allclose(after.times, piece.motion.times[15:22])
+
+
+def test_where_the_piece_shows_no_velocity_none_is_given(kata: Piece) -> None:
+    last = len(kata) - 1
+    assert kata.around(0, last) == (None, None)
+    slow = Piece(replace(kata.motion, times=0.1 + 0.5 * np.arange(last + 1)), kata.frames)  # steps are half a second,
+    assert all(all(slow.around(i, i)) for i in range(1, last))  # but for rounding
+    slower = replace(kata.motion, times=0.6 * np.arange(last + 1))
+    assert Piece(slower, kata.frames).around(5, 9) == (None, None)
+
+
+def test_every_insertion_is_given_the_movement_around_it(smoothed: Variation, kata: Piece, karate: Engine) -> None:
+    searched = [seam for seam in smoothed.seams if seam.insertion]
+    assert len(searched) > 5
+    for variation in (smoothed, smoothed.discard(searched[0].number).smooth(karate, alternatives=1, novelty=0.5)):
+        for seam in variation.seams:
+            if seam.insertion and seam.transition:
+                before, after = kata.around(seam.start, seam.end)
+                seconds = [None if one is None else one.times[-1] - one.times[0] for one in (before, after)]
+                assert [seam.transition.options["before"], seam.transition.options["after"]] == seconds
 
 
 def test_no_step_is_longer_than_the_pieces_or_an_insertions(smoothed: Variation) -> None:

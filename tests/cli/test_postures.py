@@ -1,0 +1,224 @@
+"""Postures and frames that the command line names: FILE, FILE@FRAME, FILE@FRAME~, FILE@FIRST..LAST."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bundled_clips import BALLET, ballet_clip
+from command_line import Run
+
+from motionmind.body.motion import Motion
+from motionmind.cli.postures import read_end, read_still
+from motionmind.cli.words import NamedFrames, parse_frames, parse_posture, parse_vias
+from motionmind.errors import MotionMindError
+from motionmind.formats import read_motion, write_motion, write_posture
+from motionmind.geometry import rotations as rot
+
+FIFTH = BALLET / "postures" / "fifth.json"
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def clip(fps: float = 30.0) -> Motion:
+    return ballet_clip("jump").resample(fps)
+
+
+def tween(run: Run, *words: object) -> Any:
+    return run("tween", *words, "--corpus", "ballet", "--report", "-")
+
+
+# --- what is named ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ("A.json", ("A.json", None, False)),
+        ("clip.bvh@240", ("clip.bvh", 240, False)),
+        ("clip.bvh@-1", ("clip.bvh", -1, False)),
+        ("clip.bvh@0~", ("clip.bvh", 0, True)),
+        ("b@home/clip.bvh@7", ("b@home/clip.bvh", 7, False)),
+        ("b@home/A.json", ("b@home/A.json", None, False)),
+        ("clip.bvh@3@4", ("clip.bvh@3", 4, False)),
+        ("A.json~", ("A.json", None, True)),
+        ("@3", ("@3", None, False)),
+    ],
+)
+def test_a_posture_is_a_file_or_a_frame_of_one(word: str, expected: tuple[str, int | None, bool]) -> None:
+    found = parse_posture(word)
+    assert (str(found.file), found.frame, found.is_moving) == expected
+
+
+def test_a_file_of_the_whole_name_goes_first() -> None:
+    for name in ("take@3.bvh", "jump.bvh@3", "jump.bvh@1..4", "A.json~"):
+        Path(name).touch()
+    assert parse_posture("jump.bvh@3").file == Path("jump.bvh@3")
+    assert parse_posture("A.json~").file == Path("A.json~")
+    assert parse_posture("take@3.bvh@8") == ("take@3.bvh@8", Path("take@3.bvh"), 8, False)
+    assert parse_frames("jump.bvh@1..4") == NamedFrames(Path("jump.bvh@1..4"), 0, -1)
+    assert parse_frames("take@3.bvh") == NamedFrames(Path("take@3.bvh"), 0, -1)
+    assert parse_vias(["jump.bvh@3"])[0][0].file == Path("jump.bvh@3")
+    assert parse_vias(["jump.bvh@3@3"]) == [(parse_posture("jump.bvh@3"), 3)]
+
+
+@pytest.mark.parametrize(
+    ("word", "file", "frame", "move"),
+    [
+        ("C.json", "C.json", None, None),
+        ("C.json@3", "C.json", None, 3),
+        ("C.json@", "C.json", None, None),
+        ("clip.bvh@150@3", "clip.bvh", 150, 3),
+        ("clip.bvh@150@", "clip.bvh", 150, None),
+        ("clip.bvh@-1@2", "clip.bvh", -1, 2),
+    ],
+)
+def test_what_is_passed_names_its_move_last(word: str, file: str, frame: int | None, move: int | None) -> None:
+    ((posture, at),) = parse_vias([word])
+    assert (str(posture.file), posture.frame, at) == (file, frame, move)
+
+
+@pytest.mark.parametrize("word", ["clip.bvh@150~", "clip.bvh@150~@3", "clip.bvh@-1", "C.json~"])
+def test_what_is_passed_is_told_from_a_frame_and_stands_still(word: str) -> None:
+    with pytest.raises(MotionMindError, match=r"give a posture and its move, as C.json@3 or clip.bvh@150@3"):
+        parse_vias([word])
+
+
+def test_frames_are_a_range_or_a_whole_file() -> None:
+    assert parse_frames("clip.bvh@230..240") == NamedFrames(Path("clip.bvh"), 230, 240)
+    assert parse_frames("clip.bvh@-11..-1") == NamedFrames(Path("clip.bvh"), -11, -1)
+    assert parse_frames("lead.json") == NamedFrames(Path("lead.json"), 0, -1)
+    for word in ("clip.bvh@230", "clip.bvh@230..", "clip.bvh@240~"):
+        with pytest.raises(MotionMindError, match=r"give a file, or frames of one such as clip.bvh@230..240"):
+            parse_frames(word)
+
+
+# --- what is read -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["clip.bvh", "clip.json", "clip.npz", "clip.txt"])
+def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: str) -> None:
+    write_motion(name, clip())
+    whole = read_motion(name)
+    for frame in (0, 7, -2):
+        found = read_still(parse_posture(f"{name}@{frame}"))
+        np.testing.assert_array_equal(found.rotations, whole.posture(frame).rotations)
+        np.testing.assert_array_equal(found.root, whole.posture(frame).root)
+    a, before = read_end(parse_posture(f"{name}@9~"), None, "before")
+    b, after = read_end(parse_posture(f"{name}@9~"), None, "after")
+    assert before is not None
+    assert after is not None
+    around = 0 if name.endswith(".txt") else 6  # 0.2 s; the papers' notation has a posture a second, and one suffices
+    np.testing.assert_array_equal(before.times, whole.times[9 - max(around, 1) : 10])
+    np.testing.assert_array_equal(after.times, whole.times[9 : 10 + max(around, 1)])
+    for posture, neighbour in ((a, before.posture(-1)), (b, after.posture(0))):
+        np.testing.assert_array_equal(posture.rotations, whole.rotations[9])
+        np.testing.assert_array_equal(neighbour.rotations, whole.rotations[9])
+
+
+def test_movement_next_to_the_ends_of_a_clip_is_what_there_is() -> None:
+    write_motion("clip.json", clip())
+    last = len(clip()) - 1
+    _, before = read_end(parse_posture("clip.json@2~"), None, "before")
+    _, after = read_end(parse_posture("clip.json@-2~"), None, "after")
+    assert before is not None
+    assert after is not None
+    assert (len(before), len(after)) == (3, 2)
+    assert after.times[-1] == clip().times[last]
+
+
+def test_the_movement_around_a_frame_is_that_of_the_frames_named() -> None:
+    write_motion("clip.json", clip())
+    named, frames = parse_posture("clip.json@9"), parse_frames("clip.json@3..9")
+    _, before = read_end(named, frames, "before")
+    assert before is not None
+    np.testing.assert_allclose(before.times, clip().times[3:10], atol=1e-9)
+    _, beside = read_end(named, None, "before")
+    assert beside is None
+
+
+# --- on the command line ----------------------------------------------------------------------------------------------
+
+
+def test_a_tween_begins_and_ends_as_fast_as_the_clip(run: Run) -> None:
+    write_motion("clip.bvh", clip())
+    by_tilde = tween(run, "clip.bvh@10~", "clip.bvh@30~").json["asked"]
+    assert (by_tilde["before"], by_tilde["after"]) == (pytest.approx(0.2, abs=1e-4), pytest.approx(0.2, abs=1e-4))
+    frames = ("--before", "clip.bvh@7..10", "--after", "clip.bvh@30..31")
+    by_frames = tween(run, "clip.bvh@10", "clip.bvh@30", *frames).json["asked"]
+    assert (by_frames["before"], by_frames["after"]) == (pytest.approx(0.1, abs=1e-4), pytest.approx(1 / 30, abs=1e-4))
+    alone = tween(run, "clip.bvh@10", FIFTH).json["asked"]
+    assert (alone["before"], alone["after"]) == (None, None)
+    ran = run("tween", "clip.bvh@10~", FIFTH, "--corpus", "ballet", "-o", "out.json")
+    assert ["moving, " in line for line in ran.out.splitlines() if line[0] in "AB"] == [True, False]
+    assert rot.angle(read_motion("out.json").rotations[0], read_motion("clip.bvh").rotations[10]).max() < 1e-6
+
+
+def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
+    write_motion("clip.bvh", clip())
+    assert tween(run, "clip.bvh@0", FIFTH, "--via", "clip.bvh@15@4").json["asked"]["via"] == [4]
+    assert tween(run, "clip.bvh@0", FIFTH, "--via", "clip.bvh@15@").json["asked"]["via"] == [None]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["clip.bvh@99", "B.json"], r"clip\.bvh: frames are 0 to 36, there is no frame 99"),
+        (["clip.bvh@-99~", "B.json"], r"clip\.bvh: frames are 0 to 36, there is no frame -99"),
+        (["clip.bvh", "B.json"], r"clip\.bvh: 37 frames, where one posture was expected; say which frame"),
+        (["clip.bvh@0~", "B.json"], r"clip\.bvh@0~: nothing comes before frame 0 of clip\.bvh; leave out ~"),
+        (["B.json", "clip.bvh@-1~"], r"clip\.bvh@-1~: nothing comes after frame 36 of clip\.bvh; leave out ~"),
+        (["B.json~", "clip.bvh@3"], r"B\.json~: B\.json holds one posture, no movement around it; leave out ~"),
+        (["B.json@0~", "clip.bvh@3"], r"B\.json@0~: B\.json holds one posture, no movement around it; leave out ~"),
+        (["clip.bvh~", "B.json"], r"clip\.bvh~: say which frame, from 0 to 36, as clip\.bvh@0~"),
+        (["no.bvh@3", "B.json"], r"no\.bvh: cannot be read: there is no such file or folder"),
+        (["clip.bvh@3x", "B.json"], r"suffix '\.bvh@3x' is unknown"),
+        (["clip.bvh@9~", "B.json", "--before", "clip.bvh@3..9"], r"clip\.bvh@9~: ~ takes .* and so does --before"),
+        (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..99"], r"clip\.bvh: frames are 0 to 36, .* no frame 99"),
+        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..3"], r"the last frame, 3, lies before the first, 9"),
+        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9"], r"give a file, or frames of one such as"),
+        (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..30"], r"before A does not end in A: \w+ is [\d.]+ degrees"),
+        (["B.json", "clip.bvh@9", "--after", "clip.bvh@3..9"], r"after B does not begin in B: \w+ is [\d.]+ degrees"),
+        (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..9"], r"has one frame, which shows no velocity"),
+        (["clip.bvh@0", "B.json", "--via", "clip.bvh@15"], r"clip\.bvh: 37 frames, where one posture was expected"),
+        (["clip.bvh@0", "B.json", "--via", "clip.bvh@15~"], r"--via clip\.bvh@15~: give a posture and its move"),
+        (["clip.bvh@" + "9" * 5000, "B.json"], r"cannot be used|suffix"),
+        (["clip.bvh@3", "B.json", "--via", "B.json@" + "9" * 5000], r"cannot be used|suffix"),
+        (["A" * 5000 + "@3", "B.json"], r"cannot be used|cannot be read"),
+    ],
+)
+def test_what_cannot_be_is_said_in_one_line(run: Run, words: Sequence[str], message: str) -> None:
+    write_motion("clip.bvh", clip())
+    write_posture("B.json", clip().posture(30))
+    ran = tween(run, *words)
+    assert ran.code == 2
+    assert ran.out == ""
+    (line,) = (line for line in ran.err.splitlines() if not line.startswith("note: clip.bvh: one unit taken as"))
+    assert re.search(message, line), line
+
+
+def test_a_clip_that_is_read_is_not_written_over(run: Run) -> None:
+    write_motion("clip.bvh", clip())
+    write_motion("lead.bvh", clip().slice(0, 10))
+    for words in (
+        ("clip.bvh@9", FIFTH, "-o", "clip.bvh"),
+        ("clip.bvh@9", FIFTH, "--before", "lead.bvh", "-o", "lead.bvh"),
+    ):
+        ran = run("tween", *words, "--corpus", "ballet")
+        assert ran.code == 2
+        assert "cannot be written: it is read from" in ran.err
+
+
+def test_a_clip_on_another_rig_is_retargeted_with_its_movement(run: Run) -> None:
+    body = clip().skeleton
+    shifted = replace(clip(), root=clip().root + np.array([1.0, 0.0, 0.0]))
+    write_motion("clip.bvh", replace(shifted, skeleton=replace(body, offsets=body.offsets * 1.1)))
+    assert tween(run, "clip.bvh@10~", "clip.bvh@30~").code == 0
