@@ -144,10 +144,9 @@ def _distance_lines(result: Tween) -> list[tuple[str, str]]:
         mean, most = f"{row.mean():.1f} degrees per joint", f"{row[worst]:.1f} ({result.joints[worst]})"
         lines.append((stop, f"{where}{mean} from the corpus's states, at most {most}"))
     if result.moves > 1:
-        kind = "follows the path" if result.asked["follow"] else "mean of the corpus's walks"
-        off = result.path_degrees[1:-1]
+        off, share = result.path_degrees[1:-1], result.followed[1:-1].mean()
         degrees = f"{off.mean():.1f} degrees per joint from the path's states, at most {off.max():.1f}"
-        lines.append(("motion", f"{kind}: {degrees}"))
+        lines.append(("motion", f"{degrees}; within their tolerance in {share:.0%} of joints and moves"))
     return lines
 
 

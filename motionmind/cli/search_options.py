@@ -172,12 +172,13 @@ SEARCH_OPTIONS = (
         advanced=True,
     ),
     SearchOption(
-        "follow",
-        "--follow/--mean",
-        _MOTION,
-        "Follow the states of the path, or take the mean of the corpus's walks  [default: --mean if only a length is "
-        "asked for, else --follow]",
-        bool,
+        "guide",
+        "--guide",
+        _WEIGH,
+        "Charge N nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s.",
+        NATS,
+        "N",
+        advanced=True,
     ),
     SearchOption("fps", "--fps", _MOTION, "Set the motion's frames per second.", RATE, advanced=True),
 )

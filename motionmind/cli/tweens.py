@@ -94,8 +94,6 @@ def tween(
     outputs = _Outputs(output, report, problem, alternatives)
     outputs.check([*(one.file for one in (*named, *around) if one), *via_files(options)])
     request = request_options(options)
-    if alternatives and request["follow"] is None:
-        request["follow"] = True  # means of walks would all be alike
     engine = Engine.load(corpus, home)
     start, request["before"] = read_end(named[0], around[0], "before")
     end, request["after"] = read_end(named[1], around[1], "after")

@@ -15,7 +15,11 @@ RUN = 0.7  # seconds for which a body that turns goes on turning
 
 
 def turn_with_walks(
-    turn: Floats, spread: Floats, half_steps: Floats, facing: Mapping[int, Floats], rates: tuple[float | None, float | None]
+    turn: Floats,
+    spread: Floats,
+    half_steps: Floats,
+    facing: Mapping[int, Floats],
+    rates: tuple[float | None, float | None],
 ) -> Floats:
     """Return headings [2 T + 1], unwrapped, of a body that turns as the walks do and meets the given facings.
 

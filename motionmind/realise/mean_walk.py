@@ -54,11 +54,11 @@ def mean_walk(
 ) -> MeanWalk:
     """Return the mean over walks from each stop to the next, and how likely each of the corpus's moments is.
 
-    Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands, are those of walks of
-    the whole and of the part that carries it. The mean is taken as a departure from the minimal movement between the
-    stops, which shrinks as the corpus's postures are farther from them (`motionmind.realise.minimal`). It comes near
-    the stops but not to them: its offsets there are subtracted along the walk in proportion to time, and those of its
-    velocities as `departure` has it.
+    Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
+    are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
+    movement between the stops, which shrinks as the corpus's postures are farther from them
+    (`motionmind.realise.minimal`). It comes near the stops but not to them: its offsets there are subtracted along the
+    walk in proportion to time, and those of its velocities as `departure` has it.
 
     Args:
         skeleton: the body.

@@ -32,7 +32,7 @@ def realise(
     corpus: Corpus,
     grammar: Grammar,
     carriage: Carriage,
-    tolerances: Floats,
+    within: Floats,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
@@ -44,8 +44,8 @@ def realise(
     Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
     in the postures there. Between them the body is, at the times of the moves, at the mean of the walks that the corpus
     knows from `a` to `b` in that time and that count the more the nearer they are to the path
-    (`motionmind.realise.walks`); a C2 spline joins them. Where that leaves a chain farther from its state than its
-    tolerance, the movement is bent towards the state, smoothly. Fine detail of the corpus's recordings is added
+    (`motionmind.realise.walks`); a C2 spline joins them. Where that leaves a chain too far from its state, the movement
+    is bent towards it, smoothly. Fine detail of the corpus's recordings is added
     (`motionmind.realise.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
@@ -60,7 +60,7 @@ def realise(
         corpus: the movement that was learned from.
         grammar: what was learned of its states.
         carriage: how its bodies hold themselves, travel and stand.
-        tolerances: radians within which each chain is of its state at each move [L].
+        within: radians within which each chain is of its state at each move [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
@@ -79,7 +79,7 @@ def realise(
     stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage)
-    walk = _bend_to_states(walk, states, clock, stops, corpus, tolerances)
+    walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
     rotations = _with_rates(rotations, clock.frames, leaving, arriving)
@@ -125,9 +125,9 @@ def _bend_to_states(
     clock: Timeline,
     stops: Mapping[int, Stop],
     corpus: Corpus,
-    tolerances: Floats,
+    within: Floats,
 ) -> Expectation:
-    """Return a walk bent so that each chain is within its tolerance [L] of its state [T + 1, L, 4] at each move.
+    """Return a walk bent so that each chain is `within` radians [L] of its state [T + 1, L, 4] at each move.
 
     The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
     """
@@ -136,13 +136,13 @@ def _bend_to_states(
     poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
     missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
     far = np.linalg.norm(missing, axis=-1, keepdims=True)
-    bends = missing * np.maximum(1.0 - tolerances[:joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
+    bends = missing * np.maximum(1.0 - within[:joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
     poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
     headings = walk.headings
     if corpus.facing == "free":
         at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
         centres[~inner] = at_moves[~inner]
-        bent = correct_headings(at_moves, centres, float(tolerances[-1]))
+        bent = correct_headings(at_moves, centres, float(within[-1]))
         headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
     return walk._replace(poses=poses, headings=headings)
 
@@ -192,5 +192,5 @@ def _given_heights(postures: Mapping[int, Posture], walk: Expectation) -> dict[i
     first, *_ = postures.values()
     rotations = np.stack([posture.rotations for posture in postures.values()])
     roots = np.stack([posture.root for posture in postures.values()])
-    moves = [*postures][:-1] + [len(walk.half_steps) // 2]
+    moves = [*[*postures][:-1], len(walk.half_steps) // 2]
     return dict(zip(moves, lowest_height(first.skeleton, rotations, roots).tolist(), strict=True))

@@ -52,7 +52,8 @@ class Progress(NamedTuple):
 Watch = Callable[[Progress], bool | None]
 
 
-class LengthChoice(NamedTuple):
+@dataclass(frozen=True)
+class LengthChoice:
     """The choice of a number of moves, by what paths cost without the guide.
 
     Attributes:

@@ -18,12 +18,14 @@ from motionmind.search.problem import Problem, places
 
 @dataclass(frozen=True, eq=False)
 class CostBreakdown:
-    """The cost of a path of T moves of L chains, taken apart: moves, coordination and the price per move add up to it.
+    """The cost of a path of T moves of L chains, taken apart: all but `likelihood`, `degrees` and names add up to it.
 
     Attributes:
         moves: nats for each chain's move, bridge or wait [T, L].
         coordination: nats for the state that each chain arrives in, or the move that it makes, beside its parent's:
             lambda * -log P [T, L].
+        guide: nats for the state that each chain arrives in, for its departure from what walks expect; 0 in the last
+            move [T, L].
         per_move: tau, nats for each move.
         likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move [T, L].
         degrees: the angle between the two states [T, L].
@@ -32,6 +34,7 @@ class CostBreakdown:
 
     moves: Floats
     coordination: Floats
+    guide: Floats
     per_move: float
     likelihood: Floats
     degrees: Floats
@@ -40,7 +43,7 @@ class CostBreakdown:
     @property
     def total(self) -> float:
         """The cost of the path, nats."""
-        return float(self.moves.sum() + self.coordination.sum()) + self.per_move * len(self.moves)
+        return float(self.moves.sum() + self.coordination.sum() + self.guide.sum()) + self.per_move * len(self.moves)
 
 
 def break_down_cost(
@@ -65,7 +68,10 @@ def break_down_cost(
     at = places(problem.model, path)
     probability = np.exp(-graph.weights("conditional"))
     shape = (len(path) - 1, len(grammar.chains))
-    moves, together, likelihood = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    moves, together, likelihood, guide = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    timed = problem.timed_costs(len(path) - 1)
+    if timed is not None:
+        guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + path[1:], axis=1)
     for t, chain in np.ndindex(*shape):
         before, after, parent = int(path[t, chain]), int(path[t + 1, chain]), int(network.parents[chain])
         row = held.starts[chain] + before
@@ -78,7 +84,7 @@ def break_down_cost(
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
     names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)
-    return CostBreakdown(moves, together, problem.rules.per_move, likelihood, degrees, names)
+    return CostBreakdown(moves, together, guide, problem.rules.per_move, likelihood, degrees, names)
 
 
 @dataclass(frozen=True)

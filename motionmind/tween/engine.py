@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from motionmind._typing import Ints
+from motionmind._typing import Bools, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import InfeasibleError, NoPathError
@@ -19,7 +19,7 @@ from motionmind.realise.realise import realise
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
-from motionmind.tween.certificate import Bridge, break_down_cost, source_of, trace_path
+from motionmind.tween.certificate import Bridge, Source, break_down_cost, source_of, trace_path
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
@@ -27,6 +27,9 @@ from motionmind.tween.problem import shared_moves
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
+
+FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
+SAME_ANGLE = 1e-3  # degrees: a movement that was bent to within a tolerance is within it to this
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -128,19 +131,20 @@ class Engine(LearnedCorpus):
 
     def _realise(self, formulation: Formulation, certificate: Certificate) -> tuple[Motion, Ints]:
         """Return the motion of a path, and the corpus's moves whose fine detail it has."""
-        a, request = formulation.a, formulation.request
-        tolerances = np.radians(self.space.tolerances[: len(a.skeleton)])
+        request = formulation.request
         return realise(
             places(formulation.searched.model, certificate.path),
-            a,
+            formulation.a,
             formulation.b,
             self.corpus,
             self.grammar,
             self.carriage,
+            np.radians(self.space.tolerances * np.where(formulation.wished, 1.0, FREELY)),
             request.fps,
             request.duration,
             dict(zip(certificate.passed, formulation.through, strict=True)),
-            tolerances if request.follows_path else None,
+            formulation.leaving,
+            formulation.arriving,
         )
 
     def _account_for(
@@ -168,6 +172,8 @@ class Engine(LearnedCorpus):
         motion = _with_bridges(motion, bridges)
         moves = self.corpus.moves
         reached = self.corpus.to_chains(motion.at(motion.insertions[0].times).rotations)
+        path_degrees = self.space.distance(reached, path)
+        followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         return Tween(
             motion=motion,
             joints=self.corpus.chains,
@@ -181,9 +187,10 @@ class Engine(LearnedCorpus):
             shared=shared_moves(path, [other.path for other in request.unlike]),
             passed=certificate.passed,
             snap_degrees=formulation.snap_degrees[[0, -1]],
-            path_degrees=self.space.distance(reached, path),
+            path_degrees=path_degrees,
+            followed=followed,
             via_degrees=formulation.snap_degrees[1:-1],
-            sources=sources,
+            sources=_shown(sources, followed),
             detail=tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in detail),
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
@@ -191,6 +198,7 @@ class Engine(LearnedCorpus):
             seconds=seconds,
             search_problem=searched,
             request=request,
+            length=certificate.length,
             before=formulation.before,
             after=formulation.after,
         )
@@ -216,6 +224,15 @@ class Engine(LearnedCorpus):
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
         """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
+
+
+def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:
+    """Return the sources [T][L] of moves that are seen: the motion is near the states that they lead from and to."""
+    seen = followed[:-1] & followed[1:]
+    return tuple(
+        tuple(source if shown else None for source, shown in zip(row, shows, strict=True))
+        for row, shows in zip(sources, seen, strict=True)
+    )
 
 
 def _with_bridges(motion: Motion, bridges: tuple[Bridge, ...]) -> Motion:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.errors import MotionMindError, SkeletonError
@@ -25,6 +25,7 @@ from motionmind.retarget.retarget import to_human23
 from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
+from motionmind.tween.guide import make_guide
 from motionmind.tween.nearest_body import nearest_posture
 from motionmind.tween.problem import build_model, penalise
 from motionmind.tween.progression import lift_to_moves
@@ -74,6 +75,15 @@ class Formulation:
     problem: Problem
     searched: Problem
     coordination: Coordination
+
+    @property
+    def wished(self) -> Bools:
+        """Which chains the request asks something of, beside the ends and the length, so that it should be seen [L]."""
+        request, chains = self.request, self.problem.model.starts[:-1]
+        if request.unlike or request.sample or request.novelty or not request.kappa:
+            return np.ones(len(chains), dtype=np.bool_)
+        allowed = np.logical_and.reduce([constraint.allowed for constraint in self.constraints], axis=0)
+        return np.add.reduceat(~np.broadcast_to(allowed, self.problem.model.allowed.shape), chains) > 0
 
     @property
     def stays(self) -> bool:
@@ -131,6 +141,10 @@ def formulate(
     searched, coordination = problem, learned.grammar.coordination
     if by_moves:
         searched, coordination = _lifted(learned, problem, factor)
+    if request.kappa:
+        rows = problem.model.starts[:-1].repeat(np.diff(searched.model.starts)) + searched.model.place
+        guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows)
+        searched = replace(searched, guide=guide)
     return Formulation(
         a,
         b,

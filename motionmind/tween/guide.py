@@ -18,7 +18,6 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Posture, Velocity
-from motionmind.geometry import rotations as rot
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.expectation import expect
 from motionmind.realise.stops import stop_at

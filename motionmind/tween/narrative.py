@@ -26,7 +26,9 @@ class JointStep(msgspec.Struct, frozen=True):
         likelihood: P(state arrived in | state left), as the corpus counts it; 0 where it attests no such move.
         cost: nats for the move.
         coordination: nats for the state arrived in beside its parent's.
-        source: a place in the corpus that attests it, None where none does.
+        guide: nats for the departure of the state arrived in from what walks expect.
+        followed: whether the motion is within the tolerance of both states.
+        source: a place in the corpus that attests it; None where none does, or the motion does not follow.
     """
 
     joint: str
@@ -38,6 +40,8 @@ class JointStep(msgspec.Struct, frozen=True):
     likelihood: float
     cost: float
     coordination: float
+    guide: float
+    followed: bool
     source: Source | None
 
 
@@ -70,6 +74,7 @@ class Explanation(msgspec.Struct, frozen=True):
         seconds: length of the motion.
         moved: part of the cost for the joints' moves, nats.
         coordinated: part of the cost for how joints coordinate, nats.
+        guided: part of the cost for departures from what walks expect, nats.
         tolls: part of the cost for the number of moves, nats.
         moves: the moves.
 
@@ -88,6 +93,7 @@ class Explanation(msgspec.Struct, frozen=True):
     seconds: float
     moved: float
     coordinated: float
+    guided: float
     tolls: float
     moves: list[ExplainedMove]
 
@@ -116,7 +122,7 @@ def explain(tween: Tween | TweenReport) -> Explanation:
     moves = []
     for t in range(len(report.path) - 1):
         steps = [_step(report, t, j) for j in range(len(report.joints))]
-        cost = sum(step.cost + step.coordination for step in steps) + costs.per_move
+        cost = sum(step.cost + step.coordination + step.guide for step in steps) + costs.per_move
         moves.append(ExplainedMove(t + 1, report.times[t], report.times[t + 1], cost, steps))
     return Explanation(
         report.status,
@@ -126,6 +132,7 @@ def explain(tween: Tween | TweenReport) -> Explanation:
         report.times[-1] - report.times[0],
         sum(map(sum, costs.moves)),
         sum(map(sum, costs.coordination)),
+        sum(map(sum, costs.guide)),
         costs.per_move * len(moves),
         moves,
     )
@@ -146,6 +153,8 @@ def _step(report: TweenReport, t: int, j: int) -> JointStep:
         report.likelihood[t][j],
         report.costs.moves[t][j],
         report.costs.coordination[t][j],
+        report.costs.guide[t][j] if report.costs.guide else 0.0,
+        report.followed[t][j] and report.followed[t + 1][j] if report.followed else True,
         report.sources[t][j],
     )
 
@@ -158,7 +167,8 @@ def _lines(explanation: Explanation) -> Iterator[str]:
     )
     yield (
         f"{explanation.cost:.3f} nats: {explanation.moved:.3f} for the joints' moves, {explanation.coordinated:.3f} "
-        f"for their coordination, {explanation.tolls:.3f} for the number of moves"
+        f"for their coordination, {explanation.guided:.3f} for departures from the corpus's walks, "
+        f"{explanation.tolls:.3f} for the number of moves"
     )
     for move in explanation.moves:
         yield ""
@@ -193,13 +203,13 @@ def _joint_lines(move: ExplainedMove) -> Iterator[str]:
 def _likelihood(step: JointStep) -> str:
     """Return the likelihood and the cost of a move."""
     likely = f"{step.likelihood:.0%}" if step.likelihood >= 0.005 else f"{step.likelihood:.1g}"
-    return f"{likely if step.source else 'never seen'}, {step.cost:.2f} nats"
+    return f"{likely if step.likelihood else 'never seen'}, {step.cost:.2f} nats"
 
 
 def _place(step: JointStep) -> str:
     """Return the place where a move was recorded."""
     if step.source is None:
-        return "bridge"
+        return "bridge" if step.how == "bridge" else "wait" if step.how == "wait" else "the motion passes it by"
     return f"{_clip(step.source)}, posture {step.source.posture} ({step.source.seconds:.2f} s)"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
+from motionmind.search.solve import LengthChoice
 from motionmind.tween.certificate import Bridge, Source, Wait
 
 
@@ -22,11 +23,13 @@ class PassedPosture(msgspec.Struct, frozen=True):
 
 
 class ReportedCosts(msgspec.Struct, frozen=True):
-    """The cost taken apart, nats: of each joint's move [T][L], of its coordination [T][L], and of each move."""
+    """The cost taken apart, nats: of each joint's move [T][L], of its coordination [T][L], of each move, and of each
+    joint's departure from what walks expect [T][L]."""
 
     moves: list[list[float]]
     coordination: list[list[float]]
     per_move: float
+    guide: list[list[float]] = []
 
 
 class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -40,6 +43,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         lower_bound: no path that fulfils the request costs less, nats.
         gap: (cost - lower bound) / cost.
         moves: number of moves T.
+        length: how that number was chosen, by what paths cost without the guide; null where it was given.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         node_budget: number of nodes that it might hold.
@@ -53,7 +57,9 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         vias: postures to pass through.
         snap_degrees: angle of each joint to its state in A and in B.
         path_degrees: "mean" and "most" angle between the motion and the path's states on the way; empty without a way.
-        sources: a place in the corpus that attests each move of each joint, or null [T][L].
+        followed: whether the motion is within the tolerance of each joint's state at each move [T + 1][L].
+        sources: a place in the corpus that attests each move of each joint; null where none does, or the motion is not
+            within the tolerance of both of its states [T][L].
         detail: where the fine detail was recorded.
         times: of the moves [T + 1], seconds.
         names: of the states [T + 1][L].
@@ -78,6 +84,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     lower_bound: float
     gap: float
     moves: int = 0
+    length: LengthChoice | None = None
     expansions: int = 0
     peak_nodes: int = 0
     node_budget: int = 0
@@ -91,6 +98,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     vias: list[PassedPosture] = []
     snap_degrees: dict[str, dict[str, float]] = {}
     path_degrees: dict[str, float] = {}
+    followed: list[list[bool]] = []
     sources: list[list[Source | None]]
     detail: list[Source] = []
     times: list[float]
@@ -105,6 +113,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         tables: list[tuple[Sequence[Sequence[object]], int]] = [(self.path, moves + 1), (self.names, moves + 1)]
         costs = (self.costs.moves, self.costs.coordination)
         tables += [(table, moves) for table in (self.sources, self.degrees, self.likelihood, *costs)]
+        # Reports of 0.1 have neither.
+        tables += [(table, rows) for table, rows in ((self.costs.guide, moves), (self.followed, moves + 1)) if table]
         if any(len(table) != rows or any(len(row) != joints for row in table) for table, rows in tables):
             raise ValueError(f"its tables are not of {moves} moves of {joints} joints")
         if moves < 0 or len(self.times) != moves + 1:

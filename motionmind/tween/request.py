@@ -65,10 +65,9 @@ class TweenRequest:
         beta: nats for each move that a joint waits at its goal.
         tau: nats for each move.
         bridge_price: nats for each degree of an unattested move.
+        guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
+            leaves their guide out. A search of whole postures has none.
         fps: frames a second of the motion.
-        follow: keep the motion to the path, each joint in its state at each move (True), or let it be the mean of the
-            corpus's walks from A to B, which is nearer to held-out movement (False). None chooses the mean, unless more
-            than a length is asked of the path.
 
     Raises:
         MotionMindError: a value is out of its range, or two of them contradict each other.
@@ -103,8 +102,8 @@ class TweenRequest:
     beta: float = 1.0
     tau: float = 1.0
     bridge_price: float = 1.0
+    guide: float = 1.0
     fps: float = 30.0
-    follow: bool | None = None
 
     def __post_init__(self) -> None:
         # Copies, so that what is asked stays as it was when the caller's own lists change.
@@ -131,7 +130,7 @@ class TweenRequest:
             )
         if not 0.0 <= self.novelty <= 1.0:
             raise MotionMindError(f"novelty must be a number from 0 to 1, not {self.novelty}")
-        for name in ("lambda_", "beta", "tau", "bridge_price", "diversity"):
+        for name in ("lambda_", "beta", "tau", "bridge_price", "guide", "diversity"):
             nats = getattr(self, name)
             if not (math.isfinite(nats) and nats >= 0.0):
                 raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
@@ -179,12 +178,9 @@ class TweenRequest:
         return [given if isinstance(given, tuple) else (given, None) for given in self.via]
 
     @property
-    def follows_path(self) -> bool:
-        """Whether the motion keeps to the path: as asked, else where more than a length is asked of the path."""
-        if self.follow is not None:
-            return self.follow
-        constraints = (self.pin, self.hold, self.avoid, self.via, self.unlike, self.sample)
-        return any((*constraints, self.posturewise, self.novelty))
+    def kappa(self) -> float:
+        """Factor of the guide: as asked, or 0 where whole postures are searched."""
+        return 0.0 if self.posturewise else self.guide
 
     @property
     def coordination_factor(self) -> float:
@@ -205,9 +201,8 @@ class TweenRequest:
     def plain(self, chains: int) -> dict[str, Any]:
         """Return the request as plain values for JSON, as a report's `asked` has it.
 
-        What a default depends on is filled in: the node budget for a body of so many joint chains, and whether the
-        motion follows the path. Postures to pass through are given by their moves, tweens to differ from by their
-        number.
+        The node budget is filled in, for a body of so many joint chains. Postures to pass through are given by their
+        moves, tweens to differ from by their number.
         """
         values = {one.name.rstrip("_"): getattr(self, one.name) for one in fields(self)}
         return values | {
@@ -218,7 +213,6 @@ class TweenRequest:
             "via": [None if move is None else int(move) for _, move in self.vias],
             "unlike": len(self.unlike),
             "node_budget": self.nodes(chains),
-            "follow": self.follows_path,
         }
 
 

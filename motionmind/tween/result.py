@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from motionmind._typing import Floats, States
+from motionmind._typing import Bools, Floats, States
 from motionmind.body.motion import Motion
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Via
-from motionmind.search.solve import Status
+from motionmind.search.solve import LengthChoice, Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
@@ -35,8 +35,10 @@ class Tween:
         passed: the moves at which the path passes the postures to pass through [K].
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
+        followed: whether that angle is within the chain's tolerance [moves + 1, L].
         via_degrees: angle between the orientations of the postures to pass through and their states [K, L].
-        sources: for each move and chain, a place in the corpus that attests it; None where none does [moves][L].
+        sources: for each move and chain, a place in the corpus that attests it; None where none does, and where the
+            motion is not within the tolerance of the states that the move joins [moves][L].
         detail: where the motion's fine detail was recorded, a place for each even part of its time; empty where the
             corpus has none to give.
         expansions: nodes that A* expanded.
@@ -46,6 +48,7 @@ class Tween:
             to run.
         search_problem: the problem that was searched.
         request: what was asked.
+        length: how the number of moves was chosen; None where it was given, and without a guide.
         before: seconds of the movement that was given before A; None where A was given alone.
         after: seconds of the movement that was given after B; None where B was given alone.
 
@@ -70,6 +73,7 @@ class Tween:
     passed: tuple[int, ...]
     snap_degrees: Floats
     path_degrees: Floats
+    followed: Bools
     via_degrees: Floats
     sources: tuple[tuple[Source | None, ...], ...]
     detail: tuple[Source, ...]
@@ -79,6 +83,7 @@ class Tween:
     seconds: dict[str, float]
     search_problem: Problem
     request: TweenRequest
+    length: LengthChoice | None
     before: float | None
     after: float | None
 
@@ -129,6 +134,7 @@ def report_of(tween: Tween) -> TweenReport:
         lower_bound=tween.lower_bound,
         gap=tween.gap,
         moves=tween.moves,
+        length=tween.length,
         expansions=tween.expansions,
         peak_nodes=tween.peak_nodes,
         node_budget=tween.node_budget,
@@ -142,11 +148,12 @@ def report_of(tween: Tween) -> TweenReport:
         vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
         snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
         path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},
+        followed=tween.followed.tolist(),
         sources=[list(row) for row in tween.sources],
         detail=list(tween.detail),
         times=tween.motion.insertions[0].times.tolist(),
         names=[list(row) for row in costs.names],
         degrees=costs.degrees.tolist(),
         likelihood=costs.likelihood.tolist(),
-        costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move),
+        costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move, costs.guide.tolist()),
     )
