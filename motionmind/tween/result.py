@@ -46,8 +46,8 @@ class Tween:
             to run.
         search_problem: the problem that was searched.
         request: what was asked.
-        before: seconds of the movement that was given before A; None where A was given alone.
-        after: seconds of the movement that was given after B; None where B was given alone.
+        before: seconds of the movement before A that shows its velocity; None where A was given alone.
+        after: seconds of the movement after B that shows its velocity; None where B was given alone.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
