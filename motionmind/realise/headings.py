@@ -11,7 +11,7 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 from motionmind.realise.minimal import departure
 
-RUN = 0.7  # seconds for which a body that turns goes on turning
+RUN = 0.5  # seconds for which a body that turns goes on turning
 
 
 def turn_with_walks(

@@ -66,7 +66,8 @@ class Engine(LearnedCorpus):
             b: where the motion ends, exactly.
             request: what is asked beside the two postures; None asks for nothing more.
             before: frames that lead up to `a`, which shows how the body moves as it leaves: the last of them is `a`,
-                wherever it stands. None where it is not known.
+                wherever it stands. Frames beyond a flip, where a joint was recorded badly, do not count. None where it
+                is not known.
             after: frames that follow `b`, in the same way: the first of them is `b`.
             watch: called between pieces of work with the search's progress; where it returns True, the best path so
                 far is the answer, with what is proven by then.

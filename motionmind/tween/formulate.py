@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,7 +13,9 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
-from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.corpus.corpus import JointFlip
+from motionmind.corpus.gather import find_flips
+from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
@@ -45,8 +48,8 @@ class Formulation:
         b: posture B on the corpus's skeleton.
         leaving: the velocity with which the body leaves A, on the corpus's skeleton; None where it is not given.
         arriving: the velocity with which the body arrives at B, as `leaving`.
-        before: seconds of the movement that was given before A; None for none.
-        after: seconds of the movement that was given after B; None for none.
+        before: seconds of the movement before A that shows `leaving`; None for none.
+        after: seconds of the movement after B that shows `arriving`; None for none.
         through: postures to pass through on the corpus's skeleton, in order.
         request: what is asked.
         snap_degrees: angle between the orientations of A, the postures to pass through and B, and their states
@@ -111,8 +114,8 @@ def formulate(
     shortest, longest = _move_range(learned, request)
     rules = Rules(request.beta, request.tau, shortest, longest, request.nodes(len(learned.space)))
     a, b = _on_skeleton(learned, a, "posture A"), _on_skeleton(learned, b, "posture B")
-    leaving = None if before is None else _leaving(learned, a, before)
-    arriving = None if after is None else _arriving(learned, b, after)
+    before = None if before is None else _leading_to(learned, a, before)
+    after = None if after is None else _following(learned, b, after)
     vias = [(_on_skeleton(learned, via, f"via {n}"), move) for n, (via, move) in enumerate(request.vias, start=1)]
     through = tuple(via for via, _ in vias)
     joints = len(a.skeleton)
@@ -148,8 +151,8 @@ def formulate(
     return Formulation(
         a,
         b,
-        leaving,
-        arriving,
+        None if before is None else Velocity.at_end(before),
+        None if after is None else Velocity.at_start(after),
         _seconds(before),
         _seconds(after),
         through,
@@ -215,18 +218,37 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
     return replace(problem, model=lift_to_moves(held, network, factor), rules=rules), network
 
 
-def _leaving(learned: LearnedCorpus, a: Posture, before: Motion) -> Velocity:
-    """Return the velocity with which the movement before posture A, on the corpus's skeleton, ends there."""
+def _leading_to(learned: LearnedCorpus, a: Posture, before: Motion) -> Motion | None:
+    """Return the movement before posture A on the corpus's skeleton.
+
+    As in learning, a recording counts as cut where a joint flips. None, with a warning, if one does right before A.
+    """
     before = _on_skeleton(learned, before, "the movement before A")
     _check_posture(before.posture(-1), a, "the movement before A does not end in A")
-    return Velocity.at_end(before)
+    if flips := find_flips(before):
+        before = before.slice(flips[-1].frame, len(before))
+        if len(before) == 1:
+            _warn_of(flips[-1], "before A")
+            return None
+    return before
 
 
-def _arriving(learned: LearnedCorpus, b: Posture, after: Motion) -> Velocity:
-    """Return the velocity with which the movement after posture B, on the corpus's skeleton, begins there."""
+def _following(learned: LearnedCorpus, b: Posture, after: Motion) -> Motion | None:
+    """Return the movement after posture B on the corpus's skeleton, in the same way."""
     after = _on_skeleton(learned, after, "the movement after B")
     _check_posture(after.posture(0), b, "the movement after B does not begin in B")
-    return Velocity.at_start(after)
+    if flips := find_flips(after):
+        after = after.slice(0, flips[0].frame)
+        if len(after) == 1:
+            _warn_of(flips[0], "after B")
+            return None
+    return after
+
+
+def _warn_of(flip: JointFlip, which: str) -> None:
+    """Warn that a flip leaves nothing of the movement before A or after B."""
+    message = f"the movement {which} shows no velocity: {flip.joint} flips by {flip.degrees:.0f} degrees in a frame"
+    warnings.warn(message, MotionMindWarning, stacklevel=5)
 
 
 def _seconds(motion: Motion | None) -> float | None:

@@ -49,8 +49,8 @@ class Tween:
         search_problem: the problem that was searched.
         request: what was asked.
         length: how the number of moves was chosen; None where it was given, and without a guide.
-        before: seconds of the movement that was given before A; None where A was given alone.
-        after: seconds of the movement that was given after B; None where B was given alone.
+        before: seconds of the movement before A that shows its velocity; None where A was given alone.
+        after: seconds of the movement after B that shows its velocity; None where B was given alone.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")

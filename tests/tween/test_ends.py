@@ -11,7 +11,7 @@ from bundled_clips import ballet_clip
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
@@ -115,6 +115,35 @@ def test_one_frame_is_no_movement(ballet: Engine) -> None:
         ballet.tween(A, B, before=A.as_motion())
     with pytest.raises(MotionMindError, match="has one frame, which shows no velocity"):
         ballet.tween(A, B, after=B.as_motion())
+
+
+def flipped(motion: Motion, frames: slice) -> Motion:
+    """The motion as recorded with a fault: its left hip half a turn off in some frames."""
+    rotations, hip = motion.rotations.copy(), motion.skeleton.index("left_hip")
+    rotations[frames, hip] = rot.mul(rotations[frames, hip], rot.about_vertical(np.pi))
+    return replace(motion, rotations=rotations)
+
+
+def test_a_flip_of_the_recording_is_no_velocity(ballet: Engine) -> None:
+    """A velocity is that of the frames between it and the end; right at the end, there is none to be had."""
+    fine = CLIP.resample(120.0)
+    before, after = fine.slice(150, 161), fine.slice(400, 411)
+    a, b = before.posture(-1), after.posture(0)
+    found = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(0, 7)), flipped(after, slice(4, 11)))
+    for velocity, wanted in (
+        (found.leaving, Velocity.at_end(before.slice(7, 11))),
+        (found.arriving, Velocity.at_start(after.slice(0, 4))),
+    ):
+        assert velocity is not None
+        np.testing.assert_allclose(velocity.rotations, wanted.rotations, atol=1e-9)
+    with pytest.warns(
+        MotionMindWarning, match=r"before A shows no velocity: left_hip flips by 1\d\d degrees in a frame"
+    ):
+        alone = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(0, 10)), after)
+    assert (alone.leaving, alone.before) == (None, None)
+    assert alone.arriving is not None
+    with pytest.warns(MotionMindWarning, match="after B shows no velocity: left_hip flips"):
+        assert formulate(ballet, a, b, TweenRequest(), None, flipped(after, slice(1, 11))).arriving is None
 
 
 def test_movement_of_another_body_is_refused(ballet: Engine) -> None:
