@@ -116,6 +116,8 @@ def formulate(
     a, b = _on_skeleton(learned, a, "posture A"), _on_skeleton(learned, b, "posture B")
     before = None if before is None else _leading_to(learned, a, before)
     after = None if after is None else _following(learned, b, after)
+    leaving = None if before is None else Velocity.at_end(before)
+    arriving = None if after is None else Velocity.at_start(after)
     vias = [(_on_skeleton(learned, via, f"via {n}"), move) for n, (via, move) in enumerate(request.vias, start=1)]
     through = tuple(via for via, _ in vias)
     joints = len(a.skeleton)
@@ -151,8 +153,8 @@ def formulate(
     return Formulation(
         a,
         b,
-        None if before is None else Velocity.at_end(before),
-        None if after is None else Velocity.at_start(after),
+        leaving,
+        arriving,
         _seconds(before),
         _seconds(after),
         through,
