@@ -21,6 +21,7 @@ def set_on_floor(
     clearance: Floats,
     stands: Floats,
     loose: Bools,
+    fixed: Bools,
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
@@ -36,6 +37,7 @@ def set_on_floor(
         stands: how firmly each limb, and last the trunk, stands where it is low, at the half steps
             [2 T + 1, limbs + 1], from 0 to 1.
         loose: joints without limits [J].
+        fixed: joints that must not change for the feet's sake [J].
         low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
             with the first and the last.
         drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
@@ -53,7 +55,8 @@ def set_on_floor(
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends)
     fps = 1.0 / (times[1] - times[0])
-    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, fps * half_steps[given])
+    frames = fps * half_steps[given]
+    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fixed, fps, frames)
     root[0], root[-1] = ends
     return rotations, root
 

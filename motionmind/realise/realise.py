@@ -33,6 +33,7 @@ def realise(
     grammar: Grammar,
     carriage: Carriage,
     within: Floats,
+    fixed: Bools,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
@@ -49,9 +50,9 @@ def realise(
     (`motionmind.realise.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`). The lowest point stays as far above the
-    floor as in the corpus's postures; the floor is at 0, or lower under ends that are lower, or higher under ends
-    higher than the corpus knows of such postures.
+    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
+    lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
+    are lower, or higher under ends higher than the corpus knows of such postures.
 
     Args:
         path: states of the chains [T + 1, L].
@@ -60,7 +61,8 @@ def realise(
         corpus: the movement that was learned from.
         grammar: what was learned of its states.
         carriage: how its bodies hold themselves, travel and stand.
-        within: radians within which each chain is of its state at each move [L].
+        within: radians within which each chain is of its state at each move [L], before feet are planted.
+        fixed: chains that do not move for the feet's sake [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
@@ -95,6 +97,7 @@ def realise(
         size * (walk.moments @ carriage.clearance),
         walk.moments @ carriage.stands,
         carriage.loose,
+        fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
         _drift_with_rates(
             size * travel_along(walk.moves @ carriage.travel, walk.headings), walk.half_steps, leaving, arriving

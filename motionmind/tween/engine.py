@@ -141,6 +141,7 @@ class Engine(LearnedCorpus):
             self.grammar,
             self.carriage,
             np.radians(self.space.tolerances * np.where(formulation.wished, 1.0, FREELY)),
+            formulation.constrained,
             request.fps,
             request.duration,
             dict(zip(certificate.passed, formulation.through, strict=True)),

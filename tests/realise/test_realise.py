@@ -30,6 +30,7 @@ from motionmind.realise.timeline import durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 Z = np.array([0.0, 0.0, 1.0])
+FREE = np.zeros(24, dtype=np.bool_)  # no chain is fixed
 
 
 # --- durations and the root -------------------------------------------------------------------------------------------
@@ -256,7 +257,7 @@ def realised_path(
     known: Learned, path: Int32s, a: Posture, b: Posture, fps: float, within: float, **options: Any
 ) -> Motion:
     every = np.full(path.shape[1], within)
-    motion, _ = realise(path, a, b, known.corpus, known, known.carriage, every, fps, **options)  # type: ignore[arg-type]
+    motion, _ = realise(path, a, b, known.corpus, known, known.carriage, every, FREE[: len(every)], fps, **options)  # type: ignore[arg-type]
     return motion
 
 
