@@ -1,7 +1,9 @@
 """Memory-bounded A* over the variables of a trellis, one at a time (operator decomposition).
 
 A node fixes the variables up to one; its *frontier* is the last position chosen in each chain. The rest depends on
-nothing else, so nodes with the same variable and frontier are the same node. f grows by `heuristic.step`.
+nothing else, so nodes with the same variable and frontier are the same node. f is what the fixed variables cost plus
+the heuristic's bound on the rest, and grows by `heuristic.step`. Where the bound is tight some path has no growth at
+all; as the deeper of two nodes with the same f goes first, the search walks along it: one expansion a variable.
 
 When the node budget is full the worst leaves are forgotten, and the least f among a node's forgotten children is backed
 up into it; the node is opened again with that f, so nothing is lost from the proof. A quarter of the memory is

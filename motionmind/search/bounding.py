@@ -1,8 +1,8 @@
-"""Bound a trellis from both sides: what no path undercuts, and the best path found, until the two meet or stall.
+"""Bound a trellis from both sides, until the least that a path can cost meets the best path found, or hardly moves.
 
 Rounds of sweeps raise the lower bound; each also finds a path, which is polished, and removes from the trellis the
-positions that no path cheaper than the best known goes through. The best path itself stays: what is left, with the
-bound on the cost to go from each of its partial paths, is what A* then searches.
+positions that no path as cheap as the best goes through. This is what A* starts from: the last bound is its heuristic,
+the best path its incumbent, and what is left of the trellis, in which the best path stays, its problem.
 """
 
 from __future__ import annotations

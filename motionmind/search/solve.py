@@ -1,4 +1,4 @@
-"""Solve a problem over all numbers of moves, with a certificate of how close to optimal the path is."""
+"""Solve a problem over all numbers of moves by A*, with a certificate of how close to optimal the path is."""
 
 from __future__ import annotations
 
@@ -91,7 +91,8 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
     """Find the cheapest path over all numbers of moves, and prove how good it is.
 
     Numbers of moves are bounded in the order of what the chains cost on their own, as long as that is below the cost of
-    the best path found; those that this leaves undecided are searched by A*. The least of all bounds is what is proven.
+    the best path found. A* then searches those that this leaves undecided, and in any case that of the best path; what
+    it returns is the answer, unless its nodes run out before. The least of all bounds is what is proven.
 
     Vias divide the path into segments of at least one move. Then the numbers of moves are those of a segment, each
     bounded below what the best path leaves when the other segments cost as little as is proven.
@@ -202,7 +203,8 @@ class _Solver:
         self.segments.reopen()
         while True:
             piece, least, below = self.segments.most_promising()
-            if not least < self.segments.best - PROVEN or enough() or self.attention.ends():
+            spent = self.expansions >= self.rules.node_budget
+            if not least < self.segments.best - PROVEN or enough() or spent or self.attention.ends():
                 return
             self._search_piece(piece, below)
 
