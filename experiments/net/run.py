@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
-from experiments.material import FPS, RECORDED, movement, recorded, without
+from experiments.material import FPS, TOLD_APART, movement, recorded, without
 from motionmind import Skeleton
 from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_named as anatomy
@@ -85,7 +85,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
 @lru_cache(maxsize=1)
 def style_classifier(data: str | None, name: str) -> StyleClassifier:
     """Fit the classifier that tells the corpus from others."""
-    names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
+    names = [name, *recorded(data, *(other for other in TOLD_APART if other != name))] if name in TOLD_APART else []
     return fit_style_classifier(
         {
             one: {seq: [piece.rotations for piece in pieces] for seq, pieces in movement(data, one, FRAMES).items()}
