@@ -17,6 +17,7 @@ from experiments.inbetween.tables import chart, tell
 from experiments.material import FPS, RECORDED, families, learned, movement, recorded, take_of
 from motionmind import Engine, Motion, NoPathError, TweenRequest
 from motionmind._typing import Floats
+from motionmind.corpus.corpus import Corpus
 from motionmind.metrics import (
     StyleClassifier,
     angular_jerk,
@@ -81,7 +82,7 @@ def work(
 ) -> list[Row]:
     """Fill the windows of one family of takes with what was learned without it, and measure each method's results."""
     lesson = lesson_of(data, tuple(teachers), tuple(takes))
-    keep_apart(lesson.engine, takes)
+    keep_apart(lesson.engine.corpus, takes)
     own = teachers == [name]
     out = []
     for seconds in gaps:
@@ -182,9 +183,9 @@ def lesson_of(data: str | None, names: tuple[str, ...], left_out: tuple[str, ...
     return Lesson(learned(data, names, left_out), pieces)
 
 
-def keep_apart(engine: Engine, takes: Sequence[str]) -> None:
-    """Raise ValueError if an engine has seen one of the takes, or its mirror image, or it backwards."""
-    if known := {take_of(clip.name) for clip in engine.corpus.clips} & set(takes):
+def keep_apart(corpus: Corpus, takes: Sequence[str]) -> None:
+    """Raise ValueError if a corpus holds one of the takes, or its mirror image, or it backwards."""
+    if known := {take_of(clip.name) for clip in corpus.clips} & set(takes):
         raise ValueError(f"what is held out was learned from: {', '.join(sorted(known))}")
 
 
