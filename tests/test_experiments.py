@@ -393,3 +393,56 @@ def test_in_betweening_is_measured_on_what_is_bundled(tmp_path: Path) -> None:
         if row["kind"] == "slerp":
             assert row["l2q"] == pytest.approx(row["slerp"])
     assert "The worst: heian" in (tmp_path / "README.md").read_text()
+
+
+# --- variety ----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_cut_from_an_example_covers_it_and_has_no_variety() -> None:
+    from experiments.material import movement
+    from experiments.variety.measures import coverage, distances, global_diversity, local_diversity
+    from motionmind.geometry import rotations as rot
+
+    whole = next(iter(movement(None, "karate", 60).values()))[0].rotations[:160]
+    same = distances(whole, whole)
+    assert coverage(same, 0.01) == 1.0
+    assert local_diversity(same) == pytest.approx(0.0, abs=1e-6)
+    swapped = distances(np.concatenate([whole[100:], whole[:100]]), whole)
+    assert global_diversity(swapped) == pytest.approx(0.0, abs=1e-6)
+    assert local_diversity(swapped) > 0.001  # the windows across the cut
+    assert coverage(distances(whole[:80], whole), 0.01) == pytest.approx(50 / 130, abs=0.02)
+    turned = whole.copy()
+    turned[:, 0] = rot.mul(rot.about_vertical(1.0), turned[:, 0])
+    assert distances(turned, whole).diagonal().max() < 1e-6
+    far = distances(np.tile(rot.IDENTITY, (60, 23, 1)), whole)
+    assert far.min() > 2.0
+    assert coverage(far) == 0.0
+
+
+def test_the_best_patches_of_an_example_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments.variety import measures
+
+    monkeypatch.setattr(measures, "WINDOW", 2)
+    off = np.random.default_rng(0).uniform(size=(6, 4))
+
+    def cheapest(start: int) -> float:
+        if start == len(off):
+            return 0.0
+        return min(
+            (
+                sum(off[start + k, at + k] for k in range(size)) + cheapest(start + size)
+                for size in range(2, len(off) - start + 1)
+                for at in range(off.shape[1] - size + 1)
+            ),
+            default=np.inf,
+        )
+
+    assert measures.global_diversity(off) == pytest.approx(cheapest(0) / len(off))
+
+
+def test_variety_is_measured_on_what_is_bundled(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    rows = answer("variety", Setting(quick=True, data=None), Here(), tmp_path)
+    assert [row["kind"] for row in rows] == ["vary", "GenMM"]
+    assert all(0.0 <= row["closely"] <= row["coverage"] <= 1.0 for row in rows)
