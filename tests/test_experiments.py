@@ -380,6 +380,15 @@ def test_gains_are_of_sums_and_their_interval_is_over_families() -> None:
     assert same["least"] == pytest.approx(same["most"]) == pytest.approx(0.25)
 
 
+def test_windows_that_do_not_overlap_are_counted() -> None:
+    from experiments.inbetween.run import disjoint
+
+    starts = range(0, 30, 6)
+    assert disjoint([(0, start) for start in starts], 18) == 2
+    assert disjoint([(piece, start) for start in starts for piece in (0, 1)], 12) == 6
+    assert disjoint([(0, 0), (0, 150)], 18) == 2
+
+
 def test_in_betweening_is_measured_on_what_is_bundled(tmp_path: Path) -> None:
     from experiments.harness import Setting, answer
     from experiments.inbetween import run

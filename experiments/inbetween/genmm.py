@@ -68,19 +68,22 @@ def synthesise(
         begun: what to begin with, at the finest scale [T, F].
         patches: of the examples at a time scale [P, PATCH F].
         at: the scales, coarse to fine.
-        fix: sets what is given in a movement at any scale.
+        fix: sets what is given in a movement at any scale, before each step.
     """
     made = begun
     for scale in at:
-        made = fix(_resized(made, max(round(scale * len(begun)), PATCH)))
+        made = _resized(made, max(round(scale * len(begun)), PATCH))
         known = patches(scale)
         for _ in range(STEPS):
-            made = fix(_matched(made, known))
+            made = _matched(fix(made), known)
     return made
 
 
 def between(ends: Ends, patches: Callable[[float], Floats]) -> Made:
-    """Return movement from A to B: both are set again after each step, and it begins as SLERP between them."""
+    """Return movement from A to B: both are set before each step, and it begins as SLERP between them.
+
+    What it is off A and B after the last step is distributed along it in proportion to time.
+    """
     begun = described(*slerp(ends))
     given = begun[[0, -1], :-3]  # not the turn and the velocity, which a posture does not tell
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -39,6 +39,7 @@ TUNED_ON = ("cmu-05",)  # constants are chosen on its windows alone, and must se
 GAPS = (0.6, 1.2, 2.0, 4.0)  # seconds
 STRIDE = 6  # frames from one window to the next, 0.2 s
 FOREIGN_STRIDE = 18  # frames, where other dancers are learned from
+MOVING_EVERY = 2  # of the windows, where frames beyond their ends are known
 PAST = 9  # frames before A that are known, where A moves; LaFAN1's ten with A itself
 LONGEST = 60  # moves
 BUDGET = 2_000
@@ -77,6 +78,17 @@ def windows_of(
     ]
 
 
+def disjoint(places: Iterable[tuple[int, int]], frames: int) -> int:
+    """Return how many windows of so many frames do not overlap, at most; of each its piece and its start."""
+    ends: dict[int, int] = {}
+    count = 0
+    for piece, start in sorted(places):
+        if start >= ends.get(piece, 0):
+            ends[piece] = start + frames
+            count += 1
+    return count
+
+
 def work(
     data: str | None, name: str, takes: list[str], gaps: list[float], teachers: list[str], stride: int
 ) -> list[Row]:
@@ -92,25 +104,24 @@ def work(
         who = judge(data, name, frames)
         for take in dict.fromkeys(take for take, _, _ in places):
             pieces = movement(data, name, frames)[take]
-            disjoint = sum((len(piece) - 1) // frames for piece in pieces)
+            apart = disjoint([(number, start) for at, number, start in places if at == take], frames)
             for given in GIVEN if own else GIVEN[:1]:
-                windows = [
-                    Window(pieces[number], start, frames)
-                    for at, number, start in places
-                    if at == take and (given == GIVEN[0] or PAST <= start < len(pieces[number]) - frames - PAST)
-                ]
+                windows = [Window(pieces[number], start, frames) for at, number, start in places if at == take]
+                if given != GIVEN[0]:
+                    windows = [window for window in windows[::MOVING_EVERY] if window.surrounded]
                 truth = Ruled([window.real for window in windows], ruler) if windows else None
                 for kind, way in ways(lesson, given, own, seconds).items():
                     if truth is not None and (found := tried(windows, way, given)):
                         out.append(
                             {
                                 "corpus": name,
+                                "tuned": int(name in TUNED_ON),
                                 "teachers": "+".join(teachers),
                                 "given": given,
                                 "family": takes[0],
                                 "take": take,
                                 "seconds": seconds,
-                                "disjoint": disjoint,
+                                "disjoint": apart,
                                 "kind": kind,
                             }
                             | truth.measured(found)
@@ -133,32 +144,36 @@ class Lesson:
 
     engine: Engine
     pieces: list[Motion]
+    _known: dict[tuple[str, float], Any] = field(default_factory=dict)
 
-    @lru_cache(maxsize=4)  # noqa: B019 - lessons are few, and last as long as their job
     def segments(self, frames: int) -> Segments:
-        return Segments(self.pieces, frames)
+        return self._once("segments", frames, lambda: Segments(self.pieces, frames))
 
-    @lru_cache(maxsize=16)  # noqa: B019
     def patches(self, scale: float) -> Floats:
-        return self._examples.patches(scale)
+        examples = self._once("examples", 1.0, lambda: Examples.of(self.pieces))
+        return self._once("patches", scale, lambda: examples.patches(scale))
 
-    @cached_property
-    def _examples(self) -> Examples:
-        return Examples.of(self.pieces)
-
-    @lru_cache(maxsize=4)  # noqa: B019
     def ruler(self, frames: int) -> Ruler:
         """The units of measures: how the movement's own windows, half their length apart, vary."""
-        parts = [
-            piece.slice(start, start + frames + 1)
-            for piece in self.pieces
-            for start in range(0, len(piece) - frames, frames // 2)
-        ]
-        rotations, root = np.stack([part.rotations for part in parts]), np.stack([part.root for part in parts])
-        _, places = seen(parts[0].skeleton, rotations, root, rotations, root)
-        jerk = angular_jerk(rotations, FPS).mean(axis=(1, 2))
-        # A coordinate that hardly changes, as across the hips of a body seen from its root, counts as a millimetre.
-        return Ruler(np.maximum(position_spread(places), 1e-3), *np.quantile(jerk, USUAL))
+        return self._once("ruler", frames, lambda: ruler_of(self.pieces, frames))
+
+    def _once(self, what: str, size: float, make: Callable[[], Any]) -> Any:
+        if (what, size) not in self._known:
+            self._known[what, size] = make()
+        return self._known[what, size]
+
+
+def ruler_of(pieces: Sequence[Motion], frames: int) -> Ruler:
+    parts = [
+        piece.slice(start, start + frames + 1)
+        for piece in pieces
+        for start in range(0, len(piece) - frames, frames // 2)
+    ]
+    rotations, root = np.stack([part.rotations for part in parts]), np.stack([part.root for part in parts])
+    _, places = seen(parts[0].skeleton, rotations, root, rotations, root)
+    jerk = angular_jerk(rotations, FPS).mean(axis=(1, 2))
+    # A coordinate that hardly changes, as across the hips of a body seen from its root, counts as a millimetre.
+    return Ruler(np.maximum(position_spread(places), 1e-3), *np.quantile(jerk, USUAL))
 
 
 @dataclass(frozen=True)
@@ -225,6 +240,11 @@ class Window:
     def real(self) -> Motion:
         return self.piece.slice(self.start, self.start + self.frames + 1)
 
+    @property
+    def surrounded(self) -> bool:
+        """Whether there are frames enough before and after it."""
+        return PAST <= self.start < len(self.piece) - self.frames - PAST
+
     @cached_property
     def floor(self) -> float:
         return find_floor(self.piece.skeleton, self.piece.rotations, self.piece.root)
@@ -259,7 +279,7 @@ def ways(lesson: Lesson, given: str, own: bool, seconds: float) -> dict[str, Way
     if given == GIVEN[0] and own:
         bodies = {"moves": (1, LONGEST), "posturewise": True}
         out["whole bodies"] = lambda window, ends: tween(lesson.engine, ends, seconds, **bodies)
-        if "guide" in (field.name for field in fields(TweenRequest)):
+        if "guide" in (one.name for one in fields(TweenRequest)):
             out["no guide"] = lambda window, ends: tween(lesson.engine, ends, seconds, guide=0.0)
     out["motionmind"] = lambda window, ends: tween(lesson.engine, ends, seconds)
     return out

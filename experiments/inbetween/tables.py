@@ -10,6 +10,18 @@ from experiments.charts import Panel, svg
 from experiments.harness import Row, markdown
 from motionmind._typing import Floats
 
+KINDS = (
+    "danced",
+    "slerp",
+    "spline",
+    "hermite",
+    "nearest segment",
+    "mean of eight",
+    "GenMM",
+    "whole bodies",
+    "no guide",
+    "motionmind",
+)
 SHOWN = "motionmind"  # whose results are listed take by take
 DRAWS = 4_000  # of families, for an interval
 MEANS = ("l2q", "l2p", "jerk", "usual", "skating", "slide", "taken", "off_path", "followed")
@@ -21,9 +33,9 @@ def chart(rows: list[Row]) -> str:
     for name in _each(rows, "corpus"):
         panel = Panel(f"{name}: L2Q below SLERP's, %", "seconds between A and B", "", log=True)
         mine = [row for row in rows if row["corpus"] == name and _usual(row)]
-        for kind in _each(mine, "kind"):
-            if kind not in ("danced", "slerp"):
-                points = [together(group) for group in _groups([r for r in mine if r["kind"] == kind], "seconds")]
+        for kind in KINDS[2:]:
+            if found := [row for row in mine if row["kind"] == kind]:
+                points = [together(group) for group in _groups(found, "seconds")]
                 panel.series[kind] = [(row["seconds"], 100.0 * row["gain"]) for row in points]
         panels.append(panel)
     return svg(panels, columns=2)
@@ -40,7 +52,7 @@ def tell(rows: list[Row]) -> str:
     if foreign:
         parts += ["### The same as at first, learned from the other dancers alone", _gains(foreign)]
     for name in _each(usual, "corpus"):
-        parts += [f"### {name}", _measures([row for row in usual if row["corpus"] == name])]
+        parts += [f"### {name}: all measures", _measures([row for row in usual if row["corpus"] == name])]
         parts += [_takes([row for row in usual if row["corpus"] == name and row["kind"] == SHOWN])]
     return "\n\n".join(parts)
 
@@ -77,7 +89,7 @@ def _mean(values: Sequence[float], weights: Floats) -> float:
 
 def _gains(rows: list[Row]) -> str:
     """A row for each dancer, what is given and method, a column for each gap."""
-    columns: dict[str, Callable[[Row], object]] = {"": lambda r: r["corpus"]}
+    columns: dict[str, Callable[[Row], object]] = {"": _dancer}
     if len(_each(rows, "given")) > 1:
         columns["given"] = lambda r: r["given"]
     columns |= {" ": lambda r: r["kind"]}
@@ -99,7 +111,7 @@ def _interval(row: Row | None) -> str:
 
 def _windows(rows: list[Row]) -> str:
     """A row for each dancer: how many takes, families, windows and disjoint windows there are at each gap."""
-    columns: dict[str, Callable[[Row], object]] = {"": lambda r: r["corpus"]}
+    columns: dict[str, Callable[[Row], object]] = {"": _dancer}
     for gap in _each(rows, "seconds"):
         columns[f"{gap:g} s"] = lambda r, gap=gap: r["found"].get(gap, "")
     lines = []
@@ -154,6 +166,10 @@ def _gain(row: Row) -> float:
     return 1.0 - float(row["l2q"]) / float(row["slerp"])
 
 
+def _dancer(row: Row) -> str:
+    return f"{row['corpus']}, where constants were chosen" if row["tuned"] else str(row["corpus"])
+
+
 def _usual(row: Row) -> bool:
     return bool(row["given"] == "two postures" and row["teachers"] == row["corpus"])
 
@@ -163,9 +179,17 @@ def _each(rows: Sequence[Row], key: str) -> list[object]:
 
 
 def _groups(rows: Sequence[Row], *keys: str) -> list[list[Row]]:
-    """Group rows that have the same values of some keys, in the order of their first; gaps in order of length."""
+    """Group rows that have the same values of some keys, in the order of their first; gaps and kinds in their own."""
     out: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
         out.setdefault(tuple(row[key] for key in keys), []).append(row)
     found = list(out.values())
-    return sorted(found, key=lambda group: group[0]["seconds"]) if keys[0] == "seconds" else found
+    for key in reversed(keys):
+        if key == "seconds":
+            found.sort(key=lambda group: group[0]["seconds"])
+        elif key == "kind":
+            found.sort(key=lambda group: KINDS.index(group[0]["kind"]))
+        else:
+            order = _each(rows, key)
+            found.sort(key=lambda group, key=key, order=order: order.index(group[0][key]))
+    return found
