@@ -252,14 +252,16 @@ def test_no_family_is_learned_from_that_is_held_out(shared_data: Path) -> None:
 
 
 def test_a_held_out_take_is_found_however_it_was_learned() -> None:
+    from dataclasses import replace
+
     from experiments.inbetween.run import keep_apart
     from experiments.material import corpus
     from motionmind.corpus.gather import gather
 
     whole = corpus(None, "karate")
     held, *clips = (whole.recording(clip).slice(0, 40) for clip in whole.clips)
-    twice = [held, held]
-    for more, options in (([held], {"mirror": True}), ([held], {"reverse": 1.0}), (twice, {})):
+    part, copy = replace(held, name=f"{held.name}.2"), replace(held, name=f"{held.name} (2)")
+    for more, options in (([held], {"mirror": True}), ([held], {"reverse": 1.0}), ([part], {}), ([copy], {})):
         with pytest.raises(ValueError, match=held.name):
             keep_apart(gather("rest", clips + more, rate=5, flips="keep", **options), [held.name])
     mixed = gather("mixed", clips, rate=5, mix=[(gather("other", [held], rate=5, mirror=True), 0.5)])
