@@ -104,6 +104,18 @@ def test_a_name_that_is_no_question_is_refused() -> None:
     assert "no question 'weather'" in done.stderr
 
 
+def test_tuning_does_not_write_where_results_are_reported() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", "inbetween", "--tuning"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "--tuning needs --out" in done.stderr
+
+
 # --- what bodies cannot do, and what is awkward -----------------------------------------------------------------------
 
 
@@ -233,7 +245,8 @@ def test_takes_of_a_phrase_are_held_out_together(shared_data: Path) -> None:
 
 
 def test_no_family_is_learned_from_that_is_held_out(shared_data: Path) -> None:
-    from experiments.inbetween.run import DANCERS, jobs, keep_apart, lesson_of
+    from experiments.harness import Setting
+    from experiments.inbetween.run import DANCERS, TUNED_ON, jobs, keep_apart, lesson_of
     from experiments.material import families
 
     for name, data in (("karate", None), ("cmu-05", str(shared_data))):
@@ -245,10 +258,10 @@ def test_no_family_is_learned_from_that_is_held_out(shared_data: Path) -> None:
             assert {clip.name.split(".")[0] for clip in lesson.engine.corpus.clips} == others
             with pytest.raises(ValueError, match="held out"):
                 keep_apart(lesson.engine.corpus, [min(others)])
-    from experiments.harness import Setting
-
     for job in jobs(Setting(quick=False, data=shared_data)):
         assert job["teachers"] in ([job["name"]], [name for name in DANCERS if name != job["name"]])
+    tuning = jobs(Setting(quick=False, data=shared_data, tuning=True))
+    assert {job["name"] for job in tuning} == set(TUNED_ON) < set(DANCERS)
 
 
 def test_a_held_out_take_is_found_however_it_was_learned() -> None:
