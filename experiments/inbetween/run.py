@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
@@ -290,9 +289,13 @@ def tween(engine: Engine, ends: Ends, seconds: float, **options: Any) -> tuple[M
 
     The path is of the usual number of moves or, if there is none, of as few as it needs.
     """
-    if "before" in inspect.signature(Engine.tween).parameters:
-        options |= {"before": ends.before, "after": ends.after}
-    options = {"duration": seconds, "node_budget": BUDGET, "fps": FPS} | options
+    options = {
+        "duration": seconds,
+        "node_budget": BUDGET,
+        "fps": FPS,
+        "before": ends.before,
+        "after": ends.after,
+    } | options
     try:
         found = engine.tween(ends.a, ends.b, **options)
     except NoPathError:
