@@ -43,6 +43,7 @@ PAST = 9  # frames before A that are known, where A moves; LaFAN1's ten with A i
 LONGEST = 60  # moves
 BUDGET = 2_000
 USUAL = (0.05, 0.95)  # quantiles of the jerk of movement that is learned from
+INNER = np.s_[:, 1:-1]  # the frames of windows that are not given
 GIVEN = ("two postures", "past frames", "moving ends")
 
 
@@ -99,7 +100,6 @@ def work(
     for seconds in gaps:
         frames = round(seconds * FPS)
         places = windows_of(data, name, takes, frames, stride)
-        ruler = lesson.ruler(frames)
         who = judge(data, name, frames)
         for take in dict.fromkeys(take for take, _, _ in places):
             pieces = movement(data, name, frames)[take]
@@ -108,24 +108,24 @@ def work(
                 windows = [Window(pieces[number], start, frames) for at, number, start in places if at == take]
                 if given != GIVEN[0]:
                     windows = [window for window in windows[::MOVING_EVERY] if window.surrounded]
-                truth = Ruled([window.real for window in windows], ruler) if windows else None
+                if not windows:
+                    continue
+                truth = Ruled(windows, lesson.ruler(frames))
+                about = {
+                    "corpus": name,
+                    "tuned": int(name in TUNED_ON),
+                    "teachers": "+".join(teachers),
+                    "given": given,
+                    "family": takes[0],
+                    "take": take,
+                    "seconds": seconds,
+                    "disjoint": apart,
+                }
                 for kind, way in ways(lesson, given, own, seconds).items():
-                    if truth is not None and (found := tried(windows, way, given)):
-                        out.append(
-                            {
-                                "corpus": name,
-                                "tuned": int(name in TUNED_ON),
-                                "teachers": "+".join(teachers),
-                                "given": given,
-                                "family": takes[0],
-                                "take": take,
-                                "seconds": seconds,
-                                "disjoint": apart,
-                                "kind": kind,
-                            }
-                            | truth.measured(found)
-                            | taken(who, found, name, takes[0], frames)
-                        )
+                    if found := tried(windows, way, given):
+                        accepted = [who.takes(made[0][:frames], name, takes[0]) for _, made, _ in found]
+                        measured = truth.measured(found) | {"taken": np.mean(accepted)}
+                        out.append(about | {"kind": kind} | measured)
     return out
 
 
@@ -325,32 +325,32 @@ def tried(windows: Sequence[Window], way: Way, given: str) -> list[tuple[Window,
 class Ruled:
     """The truth in windows, to measure by."""
 
-    def __init__(self, real: Sequence[Motion], ruler: Ruler) -> None:
-        self._ruler, self._skeleton = ruler, real[0].skeleton
-        self._rotations = np.stack([one.rotations for one in real])
-        self._root = np.stack([one.root for one in real])
-        self._row = {id(one): row for row, one in enumerate(real)}
+    def __init__(self, windows: Sequence[Window], ruler: Ruler) -> None:
+        self._ruler, self._skeleton = ruler, windows[0].real.skeleton
+        self._row = {id(window): row for row, window in enumerate(windows)}
+        real = [window.real for window in windows]
+        self._real = np.stack([one.rotations for one in real]), np.stack([one.root for one in real])
+        self._turned, self._places = seen(self._skeleton, *self._real, *self._real)
+        straight, lines = zip(*(slerp(window.ends(GIVEN[0])) for window in windows), strict=True)
+        turned, _ = seen(self._skeleton, np.stack(straight), np.stack(lines), *self._real)
+        self._slerp = l2q(self._turned[INNER], turned[INNER])
 
     def measured(self, found: Sequence[tuple[Window, Made, dict[str, float]]]) -> Row:
         """Return the mean measures of what a method made, and SLERP's L2Q in the same windows."""
-        rows = [self._row[id(window.real)] for window, _, _ in found]
-        truth = self._rotations[rows], self._root[rows]
-        made = np.stack([one[0] for _, one, _ in found]), np.stack([one[1] for _, one, _ in found])
-        turned, places = seen(self._skeleton, *truth, *truth)
-        got, put = seen(self._skeleton, *made, *truth)
-        straight = [slerp(window.ends(GIVEN[0])) for window, _, _ in found]
-        base, _ = seen(self._skeleton, np.stack([q for q, _ in straight]), truth[1], *truth)
-        inner = np.s_[:, 1:-1]
-        jerk = angular_jerk(made[0], FPS).mean(axis=(1, 2))
-        feet = [(self._skeleton, rotations, root, window.floor) for window, (rotations, root), _ in found]
+        rows = [self._row[id(window)] for window, _, _ in found]
+        truth, places = self._turned[rows][INNER], self._places[rows][INNER]
+        rotations, root = np.stack([one for _, (one, _), _ in found]), np.stack([one for _, (_, one), _ in found])
+        turned, put = seen(self._skeleton, rotations, root, *(one[rows] for one in self._real))
+        jerk = angular_jerk(rotations, FPS).mean(axis=(1, 2))
+        feet = [(self._skeleton, *made, window.floor) for window, made, _ in found]
         paths = [path for _, _, path in found if path]
         return {
             "windows": len(found),
-            "l2q": l2q(turned[inner], got[inner]).mean(),
-            "slerp": l2q(turned[inner], base[inner]).mean(),
-            "l2p": l2p(places[inner], put[inner], self._ruler.spread).mean(),
-            "npss": npss(turned[inner], got[inner]),
-            "power": power(turned[inner]),
+            "l2q": l2q(truth, turned[INNER]).mean(),
+            "slerp": self._slerp[rows].mean(),
+            "l2p": l2p(places, put[INNER], self._ruler.spread).mean(),
+            "npss": npss(truth, turned[INNER]),
+            "power": power(truth),
             "jerk": jerk.mean(),
             "usual": np.mean((jerk >= self._ruler.low) & (jerk <= self._ruler.high)),
             "skating": np.mean([skating(*foot) for foot in feet]),
@@ -358,13 +358,6 @@ class Ruled:
             "off_path": np.mean([path["off_path"] for path in paths]) if paths else np.nan,
             "followed": np.mean([path["followed"] for path in paths]) if paths else np.nan,
         }
-
-
-def taken(
-    who: StyleClassifier, found: Sequence[tuple[Window, Made, dict[str, float]]], name: str, family: str, frames: int
-) -> Row:
-    """Return the share of what a method made that is taken for the dancer's."""
-    return {"taken": np.mean([who.takes(rotations[:frames], name, family) for _, (rotations, _), _ in found])}
 
 
 def power(rotations: Floats) -> float:
