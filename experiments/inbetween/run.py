@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -14,7 +14,7 @@ from experiments.inbetween.genmm import Examples, between
 from experiments.inbetween.rivals import Ends, Made, Segments, at_rest, hermite, slerp
 from experiments.inbetween.tables import chart, tell
 from experiments.material import FPS, RECORDED, families, learned, movement, recorded, take_of
-from motionmind import Engine, Motion, NoPathError, TweenRequest
+from motionmind import Engine, Motion, NoPathError
 from motionmind._typing import Floats
 from motionmind.corpus.corpus import Corpus
 from motionmind.metrics import (
@@ -34,7 +34,7 @@ from motionmind.metrics import (
 __all__ = ["chart", "jobs", "tell", "work"]
 
 DANCERS = ("cmu-05", "indian", "cmu-16", "cmu-135")
-TUNED_ON = ("cmu-05",)  # constants are chosen on its windows alone, and must serve all
+TUNED_ON = ("cmu-05",)  # constants are chosen on its windows alone (--tuning --out FOLDER), and must serve all
 GAPS = (0.6, 1.2, 2.0, 4.0)  # seconds
 STRIDE = 6  # frames from one window to the next, 0.2 s
 FOREIGN_STRIDE = 18  # frames, where other dancers are learned from
@@ -278,8 +278,7 @@ def ways(lesson: Lesson, given: str, own: bool, seconds: float) -> dict[str, Way
     if given == GIVEN[0] and own:
         bodies = {"moves": (1, LONGEST), "posturewise": True}
         out["whole bodies"] = lambda window, ends: tween(lesson.engine, ends, seconds, **bodies)
-        if "guide" in (one.name for one in fields(TweenRequest)):
-            out["no guide"] = lambda window, ends: tween(lesson.engine, ends, seconds, guide=0.0)
+        out["no guide"] = lambda window, ends: tween(lesson.engine, ends, seconds, guide=0.0)
     out["motionmind"] = lambda window, ends: tween(lesson.engine, ends, seconds)
     return out
 
