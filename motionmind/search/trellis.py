@@ -103,6 +103,23 @@ def correction(trellis: Trellis, u: int, x: int) -> float:
     return float(trellis.col_cost[low]) if low < trellis.col_ptr[u + 1] and trellis.col_to[low] == x else 0.0
 
 
+def states_of(trellis: Trellis, chosen: Ints) -> Int32s:
+    """Return the states [T + 1, L] of a path of positions [n]."""
+    return trellis.dom[chosen].reshape(trellis.moves + 1, trellis.chains)
+
+
+@jit
+def locate(trellis: Trellis, states: Int32s) -> Ints:
+    """Return the positions [n] of a path of states [T + 1, L]; -1 for a state that is not in its domain."""
+    out = np.full(len(trellis.dom_ptr) - 1, -1, np.int64)
+    for i in range(len(out)):
+        state = states[i // trellis.chains, i % trellis.chains]
+        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+            if trellis.dom[p] == state:
+                out[i] = p
+    return out
+
+
 @jit
 def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     """Return which positions [P] a path cheaper than `below` may go through, each leading on and led to.
