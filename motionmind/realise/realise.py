@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -84,7 +84,7 @@ def realise(
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
-    rotations = _with_rates(rotations, clock.frames, leaving, arriving)
+    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     rotations = _limit(rotations, postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -170,14 +170,21 @@ def _add_detail(
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 
-def _with_rates(rotations: Floats, times: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
-    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities."""
+def _with_rates(
+    rotations: Floats, clock: Timeline, stops: Sequence[int], leaving: Velocity | None, arriving: Velocity | None
+) -> Floats:
+    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities.
+
+    They do not change at the moves of the `stops` nor between those on the way.
+    """
+    times = clock.frames
     turned = rot.log(rot.inv_mul(rotations[[0, -2]], rotations[[1, -1]])) / (times[1] - times[0])
     first = None if leaving is None else leaving.rotations - turned[0]
     last = None if arriving is None else arriving.rotations - turned[1]
     if first is None and last is None:
         return rotations
-    return rot.mul(rotations, rot.exp(departure(times, first, last)))
+    until = clock.moves[stops[1]], clock.moves[stops[-2]]
+    return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
 
 
 def _drift_with_rates(drift: Floats, half_steps: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
