@@ -15,7 +15,7 @@ from motionmind.geometry import rotations as rot
 LASTS = 0.45  # seconds for which a velocity at an end is felt at most
 FAR = 0.85  # how far the corpus may be, as a share of the way to go, is 1 / FAR where walks are trusted by half
 SHARPLY = 4  # power by which trust falls beyond that
-NO_WAY = 1e-6  # radians a joint: nothing to go
+NO_WAY = 1e-3  # radians a joint: nothing to go, but for the rounding of files
 
 
 def departure(
