@@ -23,9 +23,7 @@ def facings(*degrees: float) -> dict[int, Floats]:
 
 @pytest.mark.parametrize("rates", [(None, None), (0.0, 0.0), (0.7, None), (-0.7, 0.7), (2.0, -3.0)])
 @pytest.mark.parametrize(("a", "b", "turn"), [(170, -170, 20), (-170, 170, -20), (10, 100, 90), (0, 179, 179)])
-def test_a_body_turns_the_near_way(
-    a: float, b: float, turn: float, rates: tuple[float | None, float | None]
-) -> None:
+def test_a_body_turns_the_near_way(a: float, b: float, turn: float, rates: tuple[float | None, float | None]) -> None:
     found = turn_with_walks(*STILL, TIMES, facings(a, b), rates)
     assert found[0] == pytest.approx(np.radians(a))
     assert np.degrees(found[-1] - found[0]) == pytest.approx(turn)
