@@ -30,7 +30,7 @@ from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
 FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
-SAME_ANGLE = 0.02  # degrees: a movement that was bent to within a tolerance is within it to this
+SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -95,7 +95,7 @@ def test_the_guide_is_about_what_walks_expect(engine: Engine) -> None:
         rows = slice(starts[chain], starts[chain + 1])
         angles = rot.angle(chains[:, chain, None], engine.space.centres[rows])
         width = np.maximum(angles.min(axis=1, keepdims=True), tolerance)
-        np.testing.assert_allclose(found[:, rows], 0.7 * seconds / MOVE * (angles / width) ** 2, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(found[:, rows], 0.7 * seconds / MOVE * (angles / width) ** 2, rtol=1e-5, atol=1e-5)
 
 
 def test_the_sum_over_moves_does_not_depend_on_their_length(engine: Engine) -> None:
