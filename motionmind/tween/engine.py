@@ -28,7 +28,6 @@ from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
-FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
 SAME_ANGLE = 1e-3  # degrees: a movement that was bent to within a tolerance is within it to this
 
 if TYPE_CHECKING:
@@ -140,7 +139,8 @@ class Engine(LearnedCorpus):
             self.corpus,
             self.grammar,
             self.carriage,
-            np.radians(self.space.tolerances * np.where(formulation.wished, 1.0, FREELY)),
+            np.radians(self.space.tolerances),
+            formulation.wished,
             request.fps,
             request.duration,
             dict(zip(certificate.passed, formulation.through, strict=True)),
