@@ -72,7 +72,7 @@ def expect(
         ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
         turn, spread = moves @ carriage.turn, moves @ carriage.turn**2
-        headings = turn_with_walks(turn, spread, half_steps, facing, (ends[0], ends[1]))
+        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]))
     else:
         headings = rot.heading(walk.poses[:, 0])
     return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust)

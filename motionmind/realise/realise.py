@@ -24,6 +24,8 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, timeline
 
+FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
+
 
 def realise(
     path: Int32s,
@@ -32,7 +34,8 @@ def realise(
     corpus: Corpus,
     grammar: Grammar,
     carriage: Carriage,
-    within: Floats,
+    tolerances: Floats,
+    wished: Bools,
     fixed: Bools,
     fps: float,
     length: float | None = None,
@@ -61,8 +64,9 @@ def realise(
         corpus: the movement that was learned from.
         grammar: what was learned of its states.
         carriage: how its bodies hold themselves, travel and stand.
-        within: radians within which each chain is of its state at each move [L], before feet are planted.
-        fixed: chains that do not move for the feet's sake [L].
+        tolerances: radians within which a state of each chain stands for an orientation [L].
+        wished: chains of which more is asked than that they go from `a` to `b` [L].
+        fixed: those of them that do not move for the feet's sake either [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
@@ -81,6 +85,7 @@ def realise(
     stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage)
+    within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
@@ -124,6 +129,29 @@ def _walk_near(
     return expect(corpus, carriage, stops, half_steps, path)
 
 
+def _bounds(
+    walk: Expectation,
+    path: Int32s,
+    clock: Timeline,
+    corpus: Corpus,
+    grammar: Grammar,
+    tolerances: Floats,
+    wished: Bools,
+) -> Floats:
+    """Return how far each chain may be off its state at each move [T + 1, L], radians.
+
+    It is the chain's tolerance where something is asked of it, and FREELY times as much elsewhere; and what the walk is
+    beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a movement.
+    """
+    chains, starts = walk.chains(corpus, clock.moves), grammar.transitions.starts
+    beyond = np.empty(path.shape)
+    for chain, tolerance in enumerate(tolerances):
+        centres = grammar.centres[starts[chain] : starts[chain + 1]]
+        nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
+        beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
+    return np.asarray(tolerances * np.where(wished, 1.0, FREELY) + beyond)
+
+
 def _bend_to_states(
     walk: Expectation,
     states: Floats,
@@ -132,7 +160,7 @@ def _bend_to_states(
     corpus: Corpus,
     within: Floats,
 ) -> Expectation:
-    """Return a walk bent so that each chain is `within` radians [L] of its state [T + 1, L, 4] at each move.
+    """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
 
     The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
     """
@@ -141,13 +169,13 @@ def _bend_to_states(
     poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
     missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
     far = np.linalg.norm(missing, axis=-1, keepdims=True)
-    bends = missing * np.maximum(1.0 - within[:joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
+    bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
     poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
     headings = walk.headings
     if corpus.facing == "free":
         at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
         centres[~inner] = at_moves[~inner]
-        bent = correct_headings(at_moves, centres, float(within[-1]))
+        bent = correct_headings(at_moves, centres, within[:, -1])
         headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
     return walk._replace(poses=poses, headings=headings)
 

@@ -29,7 +29,6 @@ from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
-FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
 SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
 
 if TYPE_CHECKING:
@@ -141,7 +140,8 @@ class Engine(LearnedCorpus):
             self.corpus,
             self.grammar,
             self.carriage,
-            np.radians(self.space.tolerances * np.where(formulation.wished, 1.0, FREELY)),
+            np.radians(self.space.tolerances),
+            formulation.wished,
             formulation.constrained,
             request.fps,
             request.duration,
