@@ -140,8 +140,9 @@ def _bounds(
 ) -> Floats:
     """Return how far each chain may be off its state at each move [T + 1, L], radians.
 
-    It is the chain's tolerance where something is asked of it, and FREELY times as much elsewhere; and what the walk is
-    beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a movement.
+    It is the chain's tolerance where something is asked of it. Elsewhere it is FREELY times as much, and what the walk
+    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
+    movement.
     """
     chains, starts = walk.chains(corpus, clock.moves), grammar.transitions.starts
     beyond = np.empty(path.shape)
@@ -149,7 +150,7 @@ def _bounds(
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
         nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
         beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
-    return np.asarray(tolerances * np.where(wished, 1.0, FREELY) + beyond)
+    return np.where(wished, tolerances, FREELY * tolerances + beyond)
 
 
 def _bend_to_states(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.realise.minimal import FAR, LASTS, NO_WAY, departure, minimal_movement, trust
+from motionmind.realise.minimal import FAR, LASTS, NO_WAY, SHARPLY, UNLIKE, departure, minimal_movement, trust
 
 SOON = 1e-6  # seconds
 
@@ -89,18 +89,24 @@ def test_a_body_that_turns_evenly_already_goes_on_so() -> None:
 
 
 def test_ends_in_the_corpus_are_trusted_and_far_ones_are_not() -> None:
-    for way in (0.01, 0.3, 2.0):
+    """Far in comparison with the way to go, or far altogether."""
+    for way in (0.01, 0.05, 0.3, 2.0):
         assert trust(np.zeros(2), way) == 1.0
-        assert trust(np.full(2, way / FAR), way) == pytest.approx(0.5)
+        assert trust(np.full(2, way / FAR), way) == pytest.approx(0.5 / (1.0 + (way / FAR / UNLIKE) ** SHARPLY))
         assert trust(np.full(2, 10.0 * way), way) < 1e-3
-        assert trust(np.full(2, 0.1 * way), way) > 0.999
+        assert trust(np.full(2, min(0.05 * way, 0.05)), way) > 0.999
         shares = [trust(np.array([0.0, far]), way) for far in np.linspace(0.0, 5.0 * way, 40)]
         assert np.all(np.diff(shares) < 0.0)
 
 
+def test_far_altogether_is_not_trusted_however_far_there_is_to_go() -> None:
+    assert trust(np.full(2, UNLIKE), 1e6) == pytest.approx(0.5)
+    assert trust(np.full(2, 4.0 * UNLIKE), 1e6) < 0.01
+
+
 def test_where_there_is_no_way_to_go_nothing_is_trusted() -> None:
     for nearest in (np.zeros(2), np.ones(2)):
-        for way in (0.0, NO_WAY):
+        for way in (0.0, 0.5 * NO_WAY):
             assert trust(nearest, way) == 0.0
 
 

@@ -30,7 +30,6 @@ from motionmind.realise.timeline import durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 Z = np.array([0.0, 0.0, 1.0])
-FREE = np.zeros(24, dtype=np.bool_)  # no chain is fixed
 
 
 # --- durations and the root -------------------------------------------------------------------------------------------
@@ -256,8 +255,9 @@ def realised(
 def realised_path(
     known: Learned, path: Int32s, a: Posture, b: Posture, fps: float, within: float, **options: Any
 ) -> Motion:
-    every = np.full(path.shape[1], within)
-    motion, _ = realise(path, a, b, known.corpus, known, known.carriage, every, FREE[: len(every)], fps, **options)  # type: ignore[arg-type]
+    tolerances, none = np.full(path.shape[1], within), np.zeros(path.shape[1], dtype=np.bool_)
+    learned = known.corpus, known, known.carriage
+    motion, _ = realise(path, a, b, *learned, tolerances, ~none, none, fps, **options)  # type: ignore[arg-type]
     return motion
 
 

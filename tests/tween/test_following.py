@@ -13,8 +13,8 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
-from motionmind.realise.realise import realise
-from motionmind.tween.engine import FREELY, SAME_ANGLE, Engine
+from motionmind.realise.realise import FREELY, realise
+from motionmind.tween.engine import SAME_ANGLE, Engine
 from motionmind.tween.result import Tween
 
 
@@ -127,15 +127,17 @@ def test_wishes_of_the_whole_path_are_seen_in_all_of_the_body_but_planted_legs(o
         assert tween.followed[1:-1, carried].all()
 
 
-def test_nothing_is_far_from_the_path_even_where_nothing_is_asked(ballet: Engine) -> None:
+def test_the_motion_is_seldom_far_from_the_path_even_where_nothing_is_asked(ballet: Engine) -> None:
+    """Only where the walks are far from all states; but it is not bound to the path as closely as where it is asked."""
     legs = ("hip", "knee", "ankle", "toes")
     carried = [k for k, joint in enumerate(ballet.corpus.chains) if not joint.endswith(legs)]
-    farthest = 0.0
+    shares = []
     for a, b in pairs(ballet, 8, seed=6):
         off = ballet.tween(a, b).path_degrees[1:-1, carried] / ballet.space.tolerances[carried]
-        assert off.max(initial=0.0) <= FREELY + 0.01
-        farthest = max(farthest, off.max(initial=0.0))
-    assert farthest > 1.0  # and it is not bound to it
+        shares.extend(off.ravel().tolist())
+    assert np.mean(np.array(shares) <= FREELY + 0.01) > 0.97
+    assert np.max(shares) < 3.0 * FREELY
+    assert np.mean(np.array(shares) > 1.02) > 0.05
 
 
 # --- the path leads ---------------------------------------------------------------------------------------------------
@@ -149,10 +151,10 @@ def test_other_states_on_the_way_are_another_motion(ballet: Engine) -> None:
         shuffled = tween.path.copy()
         for chain, size in enumerate(ballet.space.sizes):
             shuffled[1:-1, chain] = rng.integers(0, size, 5)
-        within = np.radians(FREELY * ballet.space.tolerances)
-        free = np.zeros(len(within), dtype=np.bool_)
+        tolerances = np.radians(ballet.space.tolerances)
+        none = np.zeros(len(tolerances), dtype=np.bool_)
         motions = [
-            realise(path, a, b, ballet.corpus, ballet.grammar, ballet.carriage, within, free, 30.0, 2.4)[0]
+            realise(path, a, b, ballet.corpus, ballet.grammar, ballet.carriage, tolerances, none, none, 30.0, 2.4)[0]
             for path in (tween.path, shuffled)
         ]
         apart = np.degrees(rot.angle(*(motion.rotations for motion in motions)))
