@@ -1,4 +1,4 @@
-"""What walks through a corpus expect of a movement between two postures: where each joint is, and where the body faces.
+"""The expectation of walks through a corpus, between two postures: where each joint is, and where the body faces.
 
 The search takes it as its guide, before any path is known; the motion takes it again, of walks near the path.
 """
@@ -21,7 +21,7 @@ from motionmind.realise.stops import Stop, moments_rates
 
 
 class Expectation(NamedTuple):
-    """What walks expect at T moves and midway between them: the half steps.
+    """The expectation of walks at T moves and midway between them: the half steps.
 
     Attributes:
         half_steps: times [2 T + 1], seconds.

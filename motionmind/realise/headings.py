@@ -54,7 +54,9 @@ def turn_with_walks(
     first, last = (
         None if rate is None else np.asarray(rate - step) for rate, step in zip(rates, steps[[0, -1]], strict=True)
     )
-    return np.asarray(out + departure(half_steps, first, last))
+    moves = [*facing]
+    until = half_steps[2 * moves[1]], half_steps[2 * moves[-2]]
+    return np.asarray(out + departure(half_steps, first, last, until))
 
 
 def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Floats:

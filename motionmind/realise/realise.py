@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -36,6 +36,7 @@ def realise(
     carriage: Carriage,
     tolerances: Floats,
     wished: Bools,
+    fixed: Bools,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
@@ -52,9 +53,9 @@ def realise(
     (`motionmind.realise.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`). The lowest point stays as far above the
-    floor as in the corpus's postures; the floor is at 0, or lower under ends that are lower, or higher under ends
-    higher than the corpus knows of such postures.
+    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
+    lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
+    are lower, or higher under ends higher than the corpus knows of such postures.
 
     Args:
         path: states of the chains [T + 1, L].
@@ -65,6 +66,7 @@ def realise(
         carriage: how its bodies hold themselves, travel and stand.
         tolerances: radians within which a state of each chain stands for an orientation [L].
         wished: chains of which more is asked than that they go from `a` to `b` [L].
+        fixed: those of them that do not move for the feet's sake either [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
@@ -87,7 +89,7 @@ def realise(
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
-    rotations = _with_rates(rotations, clock.frames, leaving, arriving)
+    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     rotations = _limit(rotations, postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -100,11 +102,11 @@ def realise(
         size * (walk.moments @ carriage.clearance),
         walk.moments @ carriage.stands,
         carriage.loose,
+        fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
-        _drift_with_rates(
-            size * travel_along(walk.moves @ carriage.travel, walk.headings), walk.half_steps, leaving, arriving
-        ),
+        size * travel_along(walk.moves @ carriage.travel, walk.headings),
         (a.root, b.root),
+        (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
     )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
@@ -137,8 +139,9 @@ def _bounds(
 ) -> Floats:
     """Return how far each chain may be off its state at each move [T + 1, L], radians.
 
-    It is the chain's tolerance where something is asked of it, and FREELY times as much elsewhere; and what the walk is
-    beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a movement.
+    It is the chain's tolerance where something is asked of it. Elsewhere it is FREELY times as much, and what the walk
+    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
+    movement.
     """
     chains, starts = walk.chains(corpus, clock.moves), grammar.transitions.starts
     beyond = np.empty(path.shape)
@@ -146,7 +149,7 @@ def _bounds(
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
         nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
         beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
-    return np.asarray(tolerances * np.where(wished, 1.0, FREELY) + beyond)
+    return np.where(wished, tolerances, FREELY * tolerances + beyond)
 
 
 def _bend_to_states(
@@ -195,24 +198,21 @@ def _add_detail(
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 
-def _with_rates(rotations: Floats, times: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
-    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities."""
+def _with_rates(
+    rotations: Floats, clock: Timeline, stops: Sequence[int], leaving: Velocity | None, arriving: Velocity | None
+) -> Floats:
+    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities.
+
+    They do not change at the moves of the `stops` nor between those on the way.
+    """
+    times = clock.frames
     turned = rot.log(rot.inv_mul(rotations[[0, -2]], rotations[[1, -1]])) / (times[1] - times[0])
     first = None if leaving is None else leaving.rotations - turned[0]
     last = None if arriving is None else arriving.rotations - turned[1]
     if first is None and last is None:
         return rotations
-    return rot.mul(rotations, rot.exp(departure(times, first, last)))
-
-
-def _drift_with_rates(drift: Floats, half_steps: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
-    """Return level displacements in each half step [2 T, 3], metres, that begin and end at the given velocities."""
-    level, seconds = np.array([1.0, 0.0, 1.0]), np.diff(half_steps)
-    first = None if leaving is None else level * leaving.root - drift[0] / seconds[0]
-    last = None if arriving is None else level * arriving.root - drift[-1] / seconds[-1]
-    if first is None and last is None:
-        return drift
-    return np.asarray(drift + np.diff(departure(half_steps, first, last), axis=0))
+    until = clock.moves[stops[1]], clock.moves[stops[-2]]
+    return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

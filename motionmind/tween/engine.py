@@ -13,6 +13,7 @@ from motionmind._typing import Bools, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import InfeasibleError, NoPathError
+from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import realise
@@ -28,7 +29,7 @@ from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
-SAME_ANGLE = 1e-3  # degrees: a movement that was bent to within a tolerance is within it to this
+SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -141,6 +142,7 @@ class Engine(LearnedCorpus):
             self.carriage,
             np.radians(self.space.tolerances),
             formulation.wished,
+            formulation.constrained,
             request.fps,
             request.duration,
             dict(zip(certificate.passed, formulation.through, strict=True)),
@@ -172,8 +174,9 @@ class Engine(LearnedCorpus):
         )
         motion = _with_bridges(motion, bridges)
         moves = self.corpus.moves
-        reached = self.corpus.to_chains(motion.at(motion.insertions[0].times).rotations)
-        path_degrees = self.space.distance(reached, path)
+        # A curve through the frames: a move may fall between two, and the arc between them is a chord.
+        reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
+        path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         return Tween(
             motion=motion,
