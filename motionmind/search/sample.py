@@ -23,7 +23,7 @@ from motionmind.jit import jit
 from motionmind.search.costs import coupling, edge_cost, path_cost
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Trellis, correction, segment_trellises
+from motionmind.search.trellis import Trellis, correction, positions, segment_trellises
 
 ROUNDS = 100  # each samples every chain and every moment once
 
@@ -43,11 +43,8 @@ def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certif
     path = certificate.path.copy()
     moves = [0, *certificate.passed, len(path) - 1]
     for trellis, (first, last) in zip(segment_trellises(problem, moves), pairwise(moves), strict=True):
-        segment, chosen = path[first + 1 : last + 1], trellis.dom_ptr[:-1].copy()
-        domains = [trellis.dom[slice(*span)] for span in pairwise(trellis.dom_ptr[trellis.chains :])]
-        chosen[trellis.chains :] += [
-            np.searchsorted(domain, s) for domain, s in zip(domains, segment.ravel(), strict=True)
-        ]
+        segment = path[first + 1 : last + 1]
+        chosen = positions(trellis, segment)
         cost += float(gibbs_sample(trellis, chosen, ROUNDS, rng))
         segment[:] = trellis.dom[chosen[trellis.chains :]].reshape(segment.shape)
     return replace(certificate, path=path, cost=cost + problem.rules.per_move * (len(path) - 1), status="sampled")

@@ -90,6 +90,14 @@ def build_trellis(
     return _build(model, start, moves, to_go, below, np.zeros((0, 0)) if timed is None else timed)
 
 
+def positions(trellis: Trellis, states: Int32s) -> Ints:
+    """Return the positions [n] of a path, given by its states after each move [T, L]; it starts where all do."""
+    out = trellis.dom_ptr[:-1].copy()
+    domains = [trellis.dom[slice(*span)] for span in pairwise(trellis.dom_ptr[trellis.chains :])]
+    out[trellis.chains :] += [np.searchsorted(domain, s) for domain, s in zip(domains, states.ravel(), strict=True)]
+    return out
+
+
 @jit
 def correction(trellis: Trellis, u: int, x: int) -> float:
     """Return the correction in nats of position `x` in coupling row `u`; 0 for a pair that is not listed."""
