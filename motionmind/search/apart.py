@@ -4,9 +4,9 @@ Two paths of T moves differ by the share of the (T - 1) L states on the way that
 paths ties all states of a path together, so it is relaxed: to agree with path k at a move costs mu_k nats for each
 chain that does, one more cost of states by their move, and what may agree is refunded. For mu >= 0
 
-    D(mu) = min over x of  E(x) + sum over k of mu_k (agree_k(x) - allowed_k)
+    D(mu) = min over x of  E(x) + sum over k of mu_k (agree_k(x) - allowed)
 
-is a lower bound on the cost of every path that agrees with each path k in `allowed_k` states at most. Any of these
+is a lower bound on the cost of every path that agrees with each path k in `allowed` states at most. Any of these
 that is met, or that a path met is improved to, is an upper bound. D is concave, and each path x bounds it from above by
 a linear function of mu; the mu where the least of those found so far is greatest is tried next.
 
@@ -17,7 +17,7 @@ method of Handler and Zang, "A dual algorithm for the constrained shortest path 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
@@ -34,8 +34,8 @@ from motionmind.search.solve import PROVEN, Certificate, Progress, Status, Watch
 from motionmind.search.trellis import Trellis, positions, segment_trellises
 
 ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three
-DEARER = 1.2 ** np.arange(1, 12)  # multiples of the prices at which a path is made to differ by enough
-CHANGED = np.array([0.0, 0.5, 1.0, 2.0])  # multiples of the prices at which it is improved
+DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
+CHANGED = (0.0, 0.5, 1.0, 2.0)  # multiples of the prices at which it is improved
 LEARNING_RATE = 4.0  # of the weights of earlier paths, while a path is sought that differs from all
 
 
@@ -116,7 +116,7 @@ class _Search:
         self._problem = replace(problem, rules=replace(problem.rules, node_budget=budget))
         self._earlier, self._watch = np.stack(earlier), watch
         self._on_the_way = max(moves - 1, 0) * chains  # states
-        self._allowed = np.full(len(earlier), np.floor((1.0 - share) * self._on_the_way + 1e-9))
+        self._allowed = float(np.floor((1.0 - share) * self._on_the_way + 1e-9))  # the margin is for rounding
         chain_of_row = np.repeat(np.arange(chains), np.diff(model.starts))
         self._agreeing = (self._earlier[:, :, chain_of_row] == model.place).astype(np.float64)  # [K, T + 1, G]
         self._agreeing[:, [0, -1]] = 0.0
@@ -132,7 +132,7 @@ class _Search:
         self._take(self._find_far(), prices)
         cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
         for _ in range(ROUNDS):
-            found, refund = self._solve(prices), float(prices @ self._allowed)
+            found, refund = self._solve(prices), float(prices.sum()) * self._allowed
             excess = self._excess(found.path)
             self._take(found, prices)
             self.lower_bound = min(max(self.lower_bound, found.lower_bound - refund), self.best.cost)
@@ -145,12 +145,12 @@ class _Search:
     def _excess(self, states: Int32s) -> Floats:
         """Return by how many states a path agrees too often with each earlier one [K]; negative where more may."""
         same = places(self._problem.model, states)[1:-1] == self._earlier[:, 1:-1]
-        return np.asarray(same.sum(axis=(1, 2)) - self._allowed)
+        return np.asarray(same.sum(axis=(1, 2)) - self._allowed, dtype=np.float64)
 
     def _solve(self, prices: Floats) -> Certificate:
         """Solve the problem with a price on agreement with each earlier path [K]."""
         timed = self._timed + np.tensordot(prices, self._agreeing, 1)
-        found = solve(replace(self._problem, guide=lambda _: timed[1:-1]), self._watching if self._watch else None)
+        found = solve(_guided(self._problem, timed), self._watching if self._watch else None)
         self.expansions += found.expansions
         self.peak_nodes = max(self.peak_nodes, found.peak_nodes)
         for part, seconds in found.seconds.items():
@@ -173,23 +173,23 @@ class _Search:
         free = {name: np.zeros_like(getattr(model, name)) for name in ("costs", "unary", "alone")}
         model = model._replace(parents=np.full_like(model.parents, -1), **free)
         rules = replace(rules, per_move=0.0, wait=rules.wait if np.isinf(rules.wait) else 0.0)
-        weights, most = np.full(len(self._earlier), 1.0 / len(self._earlier)), 1.0
+        alone = replace(self._problem, model=model, rules=rules)
+        weights, least = np.full(len(self._earlier), 1.0 / len(self._earlier)), 0.0
         for _ in range(ROUNDS):
-            timed = np.tensordot(weights, self._agreeing, 1)[1:-1]
-            found = solve(replace(self._problem, model=model, rules=rules, guide=lambda _, timed=timed: timed))
+            found = solve(_guided(alone, np.tensordot(weights, self._agreeing, 1)))
             excess = self._excess(found.path)
-            if np.all(excess <= 0.0):
+            if self._on_the_way > 0 and np.all(excess <= 0.0):
                 return found
-            most = min(most, 1.0 - found.lower_bound / self._on_the_way) if self._on_the_way else 0.0
-            if most * self._on_the_way < self._on_the_way - self._allowed[0] - 1e-9:
+            least = max(least, found.lower_bound)
+            if self._on_the_way == 0 or least > self._allowed + PROVEN:
                 break
             weights *= np.exp(LEARNING_RATE * excess / self._on_the_way)
             weights /= weights.sum()
-        raise TooAlikeError(most)
+        raise TooAlikeError(1.0 - least / self._on_the_way if self._on_the_way > 0 else 0.0)
 
     def _take(self, found: Certificate, prices: Floats) -> None:
         """Make a path differ by enough, and improve it; keep it if it is the best."""
-        problem, path = replace(self._problem, guide=lambda _: self._timed[1:-1]), found.path.copy()
+        problem, path = _guided(self._problem, self._timed), found.path.copy()
         stops, chains, cost = [0, *found.passed, len(path) - 1], path.shape[1], problem.rules.per_move * (len(path) - 1)
         excess = self._excess(path)
         for trellis, (first, last) in zip(segment_trellises(problem, stops), pairwise(stops), strict=True):
@@ -204,6 +204,11 @@ class _Search:
             path[first + 1 : last + 1] = trellis.dom[chosen[chains:]].reshape(-1, chains)
         if np.all(excess <= 0.0) and cost < self.best.cost:
             self.best = _Path(path, found.passed, cost)
+
+
+def _guided(problem: Problem, timed: Floats) -> Problem:
+    """Return the problem with other costs of being in each state after each move, nats [T + 1, G]."""
+    return replace(problem, guide=lambda _: timed[1:-1])
 
 
 def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, prices: Floats) -> float:
@@ -223,10 +228,11 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
     def excess(path: Ints) -> float:
         return float(np.maximum(agreeing[:, path].sum(axis=1) - allowed, 0.0).sum())
 
+    steps: list[tuple[Callable[[Trellis, Ints, int], None], int]]
     steps = [(minimise_chain, chain) for chain in range(trellis.chains)]
     steps += [(minimise_moment, t) for t in range(1, trellis.moves + 1)]
 
-    def replacements(factors: Floats) -> Iterator[Ints]:
+    def replacements(factors: Sequence[float]) -> Iterator[Ints]:
         for factor in factors:
             dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
             for minimise, which in steps:

@@ -284,8 +284,8 @@ def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
     count, moves = len(request.unlike), len(request.unlike[0].path) - 1
     others = "the earlier one" if count == 1 else f"each of {count} earlier ones"
     return NoPathError(
-        f"no path of {moves} move{'s' * (moves != 1)} was found that differs by {request.differ:.1%} from {others}; none "
-        f"can by more than {most:.1%}",
+        f"no path of {moves} move{'s' * (moves != 1)} was found that differs by {request.differ:.1%} from {others}; "
+        f"none can by more than {most:.1%}",
         {"differ": request.differ, "most": most},
     )
 

@@ -114,8 +114,8 @@ class Tween:
     def problem(self) -> str:
         """Return the problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`.
 
-        Postures to pass through are passed at the moves at which this tween passes them. That it is to differ from other
-        tweens is no part of what is written, so with `unlike` the optimum may be less.
+        Postures to pass through are passed at the moves at which this tween passes them. That it differs from other
+        tweens is no part of what is written: without that, an alternative's optimum may be less.
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
         return cfn(replace(self.search_problem, vias=tuple(vias)), self.moves, self.joints)
