@@ -197,7 +197,6 @@ class _Search:
             variable = np.repeat(np.arange(len(chosen)), np.diff(trellis.dom_ptr))
             rows = problem.model.starts[variable % chains] + trellis.dom
             agreeing = self._agreeing[:, first + variable // chains, rows]
-            agreeing[:, variable < chains] = 0.0  # the segment before has paid for it
             allowed = agreeing[:, chosen].sum(axis=1) - excess
             cost += _improve(trellis, chosen, agreeing, allowed, prices)
             excess = agreeing[:, chosen].sum(axis=1) - allowed

@@ -90,7 +90,6 @@ def test_the_report_repeats_every_field(ballet: Engine) -> None:
     assert asked.keys() == {field.name.rstrip("_") for field in fields(TweenRequest)} | {"before", "after"}
     assert (asked["duration"], asked["pin"], asked["memory"]) == (2.0, {"left_wrist": "B"}, 10**8)
     assert asked["node_budget"] == tween.node_budget > 0
-    assert asked["follow"] is True
 
 
 # --- the report ------------------------------------------------------------------------------------------------------
@@ -110,11 +109,11 @@ def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
     """They lack what came later, and may have what is gone."""
     old = ballet.tween(FIRST, PLIE).report()
     del old["asked"]["posturewise"]
-    for name in ("detail", "path_degrees", "vias", "shared"):
+    for name in ("detail", "path_degrees", "vias", "differs"):
         del old[name]
-    (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1}), "utf-8")
+    (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1, "shared": 0}), "utf-8")
     report = read_report(tmp_path / "old.json")
-    assert (report.cost, report.detail, report.shared) == (old["cost"], [], 0)
+    assert (report.cost, report.detail, report.differs) == (old["cost"], [], [])
 
 
 def test_a_motion_is_no_report(run: Run) -> None:
