@@ -1,4 +1,4 @@
-"""python -m experiments [NAME ...] [--quick] [--workers N] [--data FOLDER] [--out FOLDER]
+"""python -m experiments [NAME ...] [--quick] [--tuning] [--workers N] [--data FOLDER] [--out FOLDER]
 
 Without names it lists the questions; with --quick alone it tries all of those that it runs, in a few minutes, and
 writes nothing that stays. A whole run writes into the question's own folder. Recorded movement is looked for beside the
@@ -21,11 +21,14 @@ from experiments import harness
 @click.command(help=__doc__)
 @click.argument("names", nargs=-1)
 @click.option("--quick", is_flag=True, help="A trial of each, on bundled movement alone; all of them if none is named.")
+@click.option("--tuning", is_flag=True, help="On the movement on which constants are chosen, alone; needs --out.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @click.option("--data", type=click.Path(file_okay=False, path_type=Path), help="Folder of recorded movement.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Write into NAME in this folder.")
-def main(names: tuple[str, ...], quick: bool, workers: int, data: Path | None, out: Path | None) -> None:
+def main(names: tuple[str, ...], quick: bool, tuning: bool, workers: int, data: Path | None, out: Path | None) -> None:
     known = harness.questions()
+    if tuning and not (out or quick):
+        raise click.UsageError("--tuning needs --out: what is reported is found on other movement")
     if not names and not quick:
         listed(known)
         return
@@ -34,7 +37,7 @@ def main(names: tuple[str, ...], quick: bool, workers: int, data: Path | None, o
             f"there is no question {strange[0]!r} that is run from here; there are {', '.join(known)}"
         )
     recorded = data or harness.HERE.parent.parent / "shared" / "data"
-    setting = harness.Setting(quick, None if quick or not recorded.is_dir() else recorded)
+    setting = harness.Setting(quick, None if quick or not recorded.is_dir() else recorded, tuning)
     harness.single_threaded()
     with (
         tempfile.TemporaryDirectory() as trial,

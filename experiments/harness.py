@@ -32,10 +32,14 @@ BEGIN, END = "<!-- what was found: written by the run -->", "<!-- end of what wa
 
 @dataclass(frozen=True)
 class Setting:
-    """What jobs are made for: a trial run or a whole one, and where recorded movement lies, if it does."""
+    """What jobs are made for: a trial run or a whole one, and where recorded movement lies, if it does.
+
+    With `tuning`, a question uses only the movement on which constants are chosen.
+    """
 
     quick: bool
     data: Path | None
+    tuning: bool = False
 
 
 def questions() -> list[str]:

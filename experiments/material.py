@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,9 +15,31 @@ from motionmind import Engine, Motion, Posture, make_discretization, own_skeleto
 from motionmind._typing import Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
+from motionmind.metrics import find_floor
 from motionmind.metrics.measure import at_rate
 
-RECORDED = {"cmu-05": "*.bvh", "cmu-135": "*.amc", "bandai": "*.bvh"}  # with their T-poses as first frames
+RECORDED = {"cmu-05": "*.bvh", "cmu-135": "*.amc", "bandai": "*.bvh", "indian": "*.bvh", "cmu-16": "*.amc"}
+SKIP = {"indian": 30}  # frames that lead from an added T-pose into the movement; elsewhere it is the first alone
+LEVELLED = ("indian",)  # whose floor lies up to 17 cm below 0, in each clip elsewhere
+# Poser's names for joints, of which the list of known rigs has none.
+JOINTS = {
+    "indian": {"hip": "pelvis", "abdomen": "lumbar", "chest": "thorax", "neck": "cervical", "head": "atlantal"}
+    | {
+        f"{letter}{theirs}": f"{side}_{ours}"
+        for letter, side in (("l", "left"), ("r", "right"))
+        for theirs, ours in {
+            "Thigh": "hip",
+            "Shin": "knee",
+            "Foot": "ankle",
+            "Collar": "clavicle",
+            "Shldr": "shoulder",
+            "ForeArm": "elbow",
+            "Hand": "wrist",
+            "Mid1": "fingers",
+        }.items()
+    }
+}
+TOLD_APART = ("cmu-05", "cmu-135", "bandai")  # by style, where that is the question
 RATE = 5.0  # postures a second of what was recorded, to learn from
 FPS = 30  # frames a second, to look at
 
@@ -25,10 +49,21 @@ def recorded(data: str | Path | None, *names: str) -> list[str]:
     return [name for name in names if data and (Path(data) / name).is_dir()]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=6)
 def recordings(data: str, name: str) -> tuple[Motion, ...]:
-    """Whole clips as they were recorded, on human23."""
-    return tuple(own_skeleton(read_motion(path)) for path in sorted(Path(data, name).rglob(RECORDED[name])))
+    """Whole clips as they were recorded, on human23, without the T-pose that was added before them."""
+    clips = []
+    for path in sorted(Path(data, name).rglob(RECORDED[name])):
+        clip = own_skeleton(read_motion(path), JOINTS.get(name))
+        clip = clip.slice(SKIP.get(name, 1), len(clip))
+        clips.append(_levelled(clip) if name in LEVELLED else clip)
+    return tuple(clips)
+
+
+def _levelled(clip: Motion) -> Motion:
+    """A clip with its floor at 0."""
+    floor = find_floor(clip.skeleton, clip.rotations, clip.root)
+    return replace(clip, root=clip.root - np.array([0.0, floor, 0.0]))
 
 
 @lru_cache(maxsize=6)
@@ -36,7 +71,7 @@ def corpus(data: str | None, name: str) -> Corpus:
     """A bundled corpus, or a recorded one at 5 postures a second, facing free."""
     if name in RECORDED:
         assert data is not None
-        return gather(name, recordings(data, name), rate=RATE, skip=1)
+        return gather(name, recordings(data, name), rate=RATE)
     return Engine.load(name).corpus
 
 
@@ -60,33 +95,59 @@ def part(whole: Corpus, clips: Sequence[int], mirror: bool = False) -> Corpus:
     )
 
 
-@lru_cache(maxsize=6)
+@lru_cache(maxsize=24)
 def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]]:
     """The unbroken pieces of each sequence of a corpus that has one of more than so many frames, at 30 a second."""
     if name in RECORDED:
         assert data is not None
-        whole = gather(name, recordings(data, name), rate=FPS, skip=1)
+        whole = gather(name, recordings(data, name), rate=FPS)
         pieces = [whole.motion(clip) for clip in whole.clips]
     else:
         whole = corpus(data, name)
         pieces = [at_rate(whole.recording(clip)) for clip in whole.clips]
     out: dict[str, list[Motion]] = {}
     for piece in pieces:
-        out.setdefault(re.sub(r"\.\d+$", "", piece.name), []).append(piece)
+        out.setdefault(take_of(piece.name), []).append(piece)
     return {name: pieces for name, pieces in out.items() if any(len(piece) > frames for piece in pieces)}
 
 
+def take_of(name: str) -> str:
+    """The recording that a clip or piece is of: its name without the number of the part, or of the copy."""
+    return re.sub(r"(\.\d+| \(\d+\))+$", "", name)
+
+
+@lru_cache(maxsize=6)
+def families(data: str | None, name: str) -> tuple[tuple[str, ...], ...]:
+    """The recordings of a corpus, those of the same phrase together: what a held-out test leaves out at once."""
+    takes = list(movement(data, name, 1))
+    listed: list[list[str]] = []
+    for folder in (Path(data) if data else None, Path(__file__).parent):
+        path = folder / "takes.toml" if folder else None
+        if path and path.exists():
+            listed += tomllib.loads(path.read_text()).get(name, {}).get("families", [])
+    family = {take: tuple(together) for together in listed for take in together}
+    return tuple(dict.fromkeys(family.get(take, (take,)) for take in takes))
+
+
 def without(data: str | None, name: str, sequence: str) -> Engine:
-    """An engine that has not seen a sequence."""
-    if name in RECORDED:
+    """An engine that has seen neither a sequence nor others of the same phrase."""
+    return learned(data, (name,), next(family for family in families(data, name) if sequence in family))
+
+
+@lru_cache(maxsize=2)
+def learned(data: str | None, names: tuple[str, ...], left_out: tuple[str, ...]) -> Engine:
+    """An engine of the takes of corpora that are not left out."""
+    return Engine.learn(rest(data, names, left_out), make_discretization("codebook", 15.0))
+
+
+def rest(data: str | None, names: Sequence[str], left_out: Collection[str]) -> Corpus:
+    """The takes of corpora that are not left out, at 5 postures a second where they were recorded."""
+    if names[0] in RECORDED:
         assert data is not None
-        rest = gather(name, [clip for clip in recordings(data, name) if clip.name != sequence], rate=RATE, skip=1)
-        return Engine.learn(rest, make_discretization("codebook", 15.0))
-    whole = corpus(data, name)
-    return Engine.learn(
-        part(whole, [number for number, clip in enumerate(whole.clips) if clip.name != sequence]),
-        make_discretization("codebook", 15.0),
-    )
+        takes = [take for name in names for take in recordings(data, name) if take.name not in left_out]
+        return gather("+".join(names), takes, rate=RATE)
+    whole = corpus(data, names[0])
+    return part(whole, [number for number, clip in enumerate(whole.clips) if clip.name not in left_out])
 
 
 def posture(whole: Corpus, index: int) -> Posture:

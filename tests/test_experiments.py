@@ -104,6 +104,18 @@ def test_a_name_that_is_no_question_is_refused() -> None:
     assert "no question 'weather'" in done.stderr
 
 
+def test_tuning_does_not_write_where_results_are_reported() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", "inbetween", "--tuning"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "--tuning needs --out" in done.stderr
+
+
 # --- what bodies cannot do, and what is awkward -----------------------------------------------------------------------
 
 
@@ -216,3 +228,245 @@ def test_the_box_holds_films_that_say_nothing_and_answers_that_can_be_read(tmp_p
     assert made.sum() == 1
     with pytest.raises(SystemExit, match="two raters"):
         read(tmp_path / "key.json", answers[:1] * 2)
+
+
+# --- in-betweening ----------------------------------------------------------------------------------------------------
+
+
+def test_takes_of_a_phrase_are_held_out_together(shared_data: Path) -> None:
+    from experiments.material import families
+
+    data = str(shared_data)
+    assert ("05_18", "05_19", "05_20") in families(data, "cmu-05")
+    assert ("135_02", "135_03") in families(data, "cmu-135")
+    assert ("16_08", "16_57") in families(data, "cmu-16")
+    assert all(len(family) == 1 for family in families(data, "indian"))
+    assert sum(map(len, families(data, "cmu-16"))) == 58
+
+
+def test_no_family_is_learned_from_that_is_held_out(shared_data: Path) -> None:
+    from experiments.harness import Setting
+    from experiments.inbetween.run import DANCERS, TUNED_ON, jobs, keep_apart, lesson_of
+    from experiments.material import families
+
+    for name, data in (("karate", None), ("cmu-05", str(shared_data))):
+        for takes in families(data, name)[:3]:
+            lesson = lesson_of(data, (name,), takes)
+            keep_apart(lesson.engine.corpus, takes)
+            assert not {piece.name.split(".")[0] for piece in lesson.pieces} & set(takes)
+            others = {take for family in families(data, name) for take in family} - set(takes)
+            assert {clip.name.split(".")[0] for clip in lesson.engine.corpus.clips} == others
+            with pytest.raises(ValueError, match="held out"):
+                keep_apart(lesson.engine.corpus, [min(others)])
+    for job in jobs(Setting(quick=False, data=shared_data)):
+        assert job["teachers"] in ([job["name"]], [name for name in DANCERS if name != job["name"]])
+    tuning = jobs(Setting(quick=False, data=shared_data, tuning=True))
+    assert {job["name"] for job in tuning} == set(TUNED_ON) < set(DANCERS)
+
+
+def test_a_held_out_take_is_found_however_it_was_learned() -> None:
+    from dataclasses import replace
+
+    from experiments.inbetween.run import keep_apart
+    from experiments.material import corpus
+    from motionmind.corpus.gather import gather
+
+    whole = corpus(None, "karate")
+    held, *clips = (whole.recording(clip).slice(0, 40) for clip in whole.clips)
+    part, copy = replace(held, name=f"{held.name}.2"), replace(held, name=f"{held.name} (2)")
+    for more, options in (([held], {"mirror": True}), ([held], {"reverse": 1.0}), ([part], {}), ([copy], {})):
+        with pytest.raises(ValueError, match=held.name):
+            keep_apart(gather("rest", clips + more, rate=5, flips="keep", **options), [held.name])
+    mixed = gather("mixed", clips, rate=5, mix=[(gather("other", [held], rate=5, mirror=True), 0.5)])
+    with pytest.raises(ValueError, match=held.name):
+        keep_apart(mixed, [held.name])
+    keep_apart(gather("rest", clips, rate=5, mirror=True, reverse=1.0), [held.name])
+
+
+def ends_of(whole: Any, start: int, frames: int) -> Any:
+    from experiments.inbetween.rivals import Ends
+
+    end = start + frames
+    before, after = whole.slice(start - 3, start + 1), whole.slice(end, end + 4)
+    return Ends(whole.posture(start), whole.posture(end), frames, before, after)
+
+
+def test_every_way_leads_from_a_to_b_exactly() -> None:
+    from experiments.inbetween.genmm import Examples, between
+    from experiments.inbetween.rivals import Segments, at_rest, hermite, slerp
+    from experiments.material import movement
+    from motionmind.geometry import rotations as rot
+
+    one, two = (pieces[0] for pieces in list(movement(None, "karate", 60).values())[:2])
+    ends = ends_of(one, 100, 36)
+    segments, examples = Segments([two], 36), Examples.of([two])
+    for made in (
+        slerp(ends),
+        at_rest(ends),
+        hermite(ends),
+        segments.nearest(ends, 1),
+        segments.nearest(ends, 8),
+        between(ends, examples.patches),
+    ):
+        rotations, root = made
+        assert len(rotations) == len(root) == 37
+        for frame, posture in ((0, ends.a), (-1, ends.b)):
+            assert rot.angle(rotations[frame], posture.rotations).max() < 1e-7
+            assert root[frame] == pytest.approx(posture.root)
+
+
+def test_cubics_leave_and_arrive_as_the_body_moved() -> None:
+    from dataclasses import replace
+
+    from experiments.inbetween.rivals import hermite
+    from experiments.material import movement
+    from motionmind.geometry import rotations as rot
+
+    whole = next(iter(movement(None, "karate", 60).values()))[0]
+    ends = ends_of(whole, 79, 524)  # so long that a frame is as good as nothing; the body moves at both ends
+    for known in (ends, replace(ends, after=None)):
+        rotations, root = hermite(known)
+        turn = rot.log(rot.inv_mul(whole.rotations[78], whole.rotations[79]))
+        assert rot.log(rot.inv_mul(rotations[0], rotations[1])) == pytest.approx(turn, abs=0.02 * np.abs(turn).max())
+        step = whole.root[79] - whole.root[78]
+        assert root[1] - root[0] == pytest.approx(step, abs=0.02 * np.abs(step).max())
+    rotations, root = hermite(ends)
+    turn = rot.log(rot.inv_mul(whole.rotations[603], whole.rotations[604]))
+    assert rot.log(rot.inv_mul(rotations[-2], rotations[-1])) == pytest.approx(turn, abs=0.02 * np.abs(turn).max())
+
+
+def test_the_nearest_segment_is_the_window_itself_wherever_it_faces() -> None:
+    from dataclasses import replace
+
+    from experiments.inbetween.rivals import Segments
+    from experiments.material import movement
+    from motionmind.geometry import rotations as rot
+
+    whole = next(iter(movement(None, "karate", 60).values()))[0]
+    ends = ends_of(whole, 100, 36)
+    turn = rot.about_vertical(1.0)
+    elsewhere = whole.rotations.copy()
+    elsewhere[:, 0] = rot.mul(turn, elsewhere[:, 0])
+    turned = replace(whole, rotations=elsewhere, root=1.0 + rot.mul_vec(turn, whole.root))
+    rotations, root = Segments([turned], 36).nearest(ends, 1)
+    assert rot.angle(rotations, whole.rotations[100:137]).max() < 1e-6
+    assert root == pytest.approx(whole.root[100:137], abs=1e-6)
+
+
+def test_generative_motion_matching_keeps_what_is_made_of_the_examples() -> None:
+    from experiments.inbetween.genmm import Examples, described, freely, restored, synthesise
+    from experiments.material import movement
+    from motionmind.geometry import rotations as rot
+
+    whole = next(iter(movement(None, "karate", 60).values()))[0].slice(0, 150)
+    frames = described(whole.rotations, whole.root)
+    rotations, root = restored(frames, whole.rotations[0, 0], whole.root[0])
+    assert rot.angle(rotations, whole.rotations).max() < 1e-6
+    assert root == pytest.approx(whole.root, abs=1e-9)
+    examples = Examples.of([whole])
+    again = synthesise(frames, examples.patches, [1.0], lambda made: made)
+    assert again == pytest.approx(frames, abs=1e-5)
+    free, _ = freely(examples, 90, seed=1)
+    nearest = [rot.angle(one, whole.rotations).mean(axis=-1).min() for one in free[:, None]]
+    assert np.median(nearest) < np.radians(15.0)  # it is made of the examples, blended
+    assert not np.array_equal(free, freely(examples, 90, seed=2)[0])
+
+
+def test_gains_are_of_sums_and_their_interval_is_over_families() -> None:
+    from experiments.inbetween.tables import MEANS, together
+
+    def row(family: str, windows: int, l2q: float) -> dict[str, Any]:
+        return {
+            "family": family,
+            "windows": windows,
+            "npss": 1.0,
+            "power": 1.0,
+            "slerp": 2.0,
+            **dict.fromkeys(MEANS, 0.5),
+            "l2q": l2q,
+        }
+
+    rows = [row("a", 10, 1.0), row("b", 30, 1.5), row("b", 10, 1.5), row("c", 50, 1.8)]
+    found = together(rows)
+    assert found["gain"] == pytest.approx(1.0 - (10.0 + 60.0 + 90.0) / 200.0)
+    assert found["families"] == 3
+    assert 0.09 < found["least"] < found["gain"] < found["most"] < 0.51
+    same = together([row("a", 10, 1.5), row("b", 30, 1.5)])
+    assert same["least"] == pytest.approx(same["most"]) == pytest.approx(0.25)
+
+
+def test_windows_that_do_not_overlap_are_counted() -> None:
+    from experiments.inbetween.run import disjoint
+
+    starts = range(0, 30, 6)
+    assert disjoint([(0, start) for start in starts], 18) == 2
+    assert disjoint([(piece, start) for start in starts for piece in (0, 1)], 12) == 6
+    assert disjoint([(0, 0), (0, 150)], 18) == 2
+
+
+def test_in_betweening_is_measured_on_what_is_bundled(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+    from experiments.inbetween import run
+
+    rows = answer("inbetween", Setting(quick=True, data=None), Here(), tmp_path)
+    kinds = {row["kind"] for row in rows if row["given"] == run.GIVEN[0]}
+    assert {"danced", "slerp", "nearest segment", "mean of eight", "GenMM", "motionmind"} <= kinds
+    for row in rows:
+        if row["kind"] == "danced":
+            assert row["l2q"] == row["npss"] == row["l2p"] == 0.0
+        if row["kind"] == "slerp":
+            assert row["l2q"] == pytest.approx(row["slerp"])
+    assert "The worst: heian" in (tmp_path / "README.md").read_text()
+
+
+# --- variety ----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_cut_from_an_example_covers_it_and_has_no_variety() -> None:
+    from experiments.material import movement
+    from experiments.variety.measures import coverage, distances, global_diversity, local_diversity
+    from motionmind.geometry import rotations as rot
+
+    whole = next(iter(movement(None, "karate", 60).values()))[0].rotations[:160]
+    same = distances(whole, whole)
+    assert coverage(same, 0.01) == 1.0
+    assert local_diversity(same) == pytest.approx(0.0, abs=1e-6)
+    swapped = distances(np.concatenate([whole[100:], whole[:100]]), whole)
+    assert global_diversity(swapped) == pytest.approx(0.0, abs=1e-6)
+    assert local_diversity(swapped) > 0.001  # the windows across the cut
+    assert coverage(distances(whole[:80], whole), 0.01) == pytest.approx(50 / 130, abs=0.02)
+    turned = whole.copy()
+    turned[:, 0] = rot.mul(rot.about_vertical(1.0), turned[:, 0])
+    assert distances(turned, whole).diagonal().max() < 1e-6
+    far = distances(np.tile(rot.IDENTITY, (60, 23, 1)), whole)
+    assert far.min() > 2.0
+    assert coverage(far) == 0.0
+
+
+def test_the_best_patches_of_an_example_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    from experiments.variety import measures
+
+    monkeypatch.setattr(measures, "WINDOW", 2)
+    off = np.random.default_rng(0).uniform(size=(6, 4))
+
+    def cheapest(start: int) -> float:
+        if start == len(off):
+            return 0.0
+        return min(
+            (
+                sum(off[start + k, at + k] for k in range(size)) + cheapest(start + size)
+                for size in range(2, len(off) - start + 1)
+                for at in range(off.shape[1] - size + 1)
+            ),
+            default=np.inf,
+        )
+
+    assert measures.global_diversity(off) == pytest.approx(cheapest(0) / len(off))
+
+
+def test_variety_is_measured_on_what_is_bundled(tmp_path: Path) -> None:
+    from experiments.harness import Setting, answer
+
+    rows = answer("variety", Setting(quick=True, data=None), Here(), tmp_path)
+    assert [row["kind"] for row in rows] == ["vary", "GenMM"]
+    assert all(0.0 <= row["closely"] <= row["coverage"] <= 1.0 for row in rows)

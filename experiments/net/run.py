@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
-from experiments.material import FPS, RECORDED, movement, recorded, without
+from experiments.material import FPS, TOLD_APART, movement, recorded, without
 from motionmind import Skeleton
 from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy_file import anatomy_named as anatomy
@@ -58,7 +58,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
             ),
         }
         asked = {"duration": SECONDS, "node_budget": BUDGET, "fps": FPS}
-        for kind, more in (*((scheme, {"coordination": scheme, "follow": True}) for scheme in SCHEMES), ("mean", {})):
+        for kind, more in (*((scheme, {"coordination": scheme, "guide": 0.0}) for scheme in SCHEMES), ("guided", {})):
             motion = found.tween(real.posture(0), real.posture(-1), **asked, **more).motion
             made[kind] = motion.rotations, motion.root
         for kind, (rotations, root) in made.items():
@@ -85,7 +85,7 @@ def work(data: str | None, name: str, sequence: str, windows: int, seed: int) ->
 @lru_cache(maxsize=1)
 def style_classifier(data: str | None, name: str) -> StyleClassifier:
     """Fit the classifier that tells the corpus from others."""
-    names = [name, *recorded(data, *(other for other in RECORDED if other != name))] if name in RECORDED else []
+    names = [name, *recorded(data, *(other for other in TOLD_APART if other != name))] if name in TOLD_APART else []
     return fit_style_classifier(
         {
             one: {seq: [piece.rotations for piece in pieces] for seq, pieces in movement(data, one, FRAMES).items()}
@@ -159,7 +159,7 @@ COMPARED = (
     ("progression", "none"),
     ("progression", "posture"),
     ("posture", "slerp"),
-    ("mean", "posture"),
+    ("guided", "posture"),
 )
 
 
@@ -167,7 +167,7 @@ def chart(rows: list[Row]) -> str:
     panels = []
     for key, (title, _) in MEASURES.items():
         panel = Panel(title, "a dot a sequence, at the right their mean", "", joined=False, numbered=False)
-        for place, kind in enumerate(("danced", "slerp", *SCHEMES, "mean")):
+        for place, kind in enumerate(("danced", "slerp", *SCHEMES, "guided")):
             by_sequence = _by_sequence(rows, kind, key)
             found = [(place + 0.3 * n / len(by_sequence), _mean(v)) for n, v in enumerate(by_sequence.values())]
             panel.series[kind] = [*found, (place + 0.5, _mean([v for values in by_sequence.values() for v in values]))]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from experiments.material import FPS, RECORDED, movement, recorded
+from experiments.material import FPS, TOLD_APART, movement, recorded
 from motionmind.metrics import fit_style_classifier
 
 SECONDS = (0.6, 1.2, 2.0, 4.0)
@@ -22,9 +22,9 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(__file__).parents[3] / "shared" / "data")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    names = recorded(options.data, *RECORDED)
+    names = recorded(options.data, *TOLD_APART)
     if len(names) < 2:
-        parser.error(f"{options.data}: there are not two of {', '.join(RECORDED)} to be told apart")
+        parser.error(f"{options.data}: there are not two of {', '.join(TOLD_APART)} to be told apart")
     clips = {
         name: {sequence: [piece.rotations for piece in pieces] for sequence, pieces in found.items()}
         for name in names

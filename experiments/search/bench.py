@@ -2,9 +2,9 @@
 
 python experiments/search/bench.py PATH/TO/cmu-05 --pairs 100 --setting 10,5 [--seed 0] [--few 8] [--plot gap.svg]
 
-A setting is postures a second and degrees. Five parts: all pairs, after loading; some of them coordinated by moves; the
-bounds, by what A* has to expand under each; gaps against time as less effort is allowed; and the same problems
-solved by toulbar2. The last three look at the first few pairs.
+A setting is postures a second and degrees. Four parts: all pairs, after loading; some of them coordinated by moves;
+gaps against time as less effort is allowed; and the same problems solved by toulbar2. The last two look at the first
+few pairs.
 """
 
 import argparse
@@ -20,18 +20,14 @@ import pytoulbar2
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.progression import fit_progression
-from motionmind.search import astar, pair_chains, solve, trws
+from motionmind.search import bounding, solve
 from motionmind.search.cfn import cfn
-from motionmind.search.pair_chain_tables import PairChains
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Trellis, build_trellis
 from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 
 TIME_LIMIT = 20  # seconds that toulbar2 gets for one problem
-EXPANSIONS = 200_000
-ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 RULES = Rules(wait=1.0, per_move=1.0, shortest=1, longest=60, node_budget=200_000)
 EFFORTS = (  # sweeps of pair chains and of messages
     ("messages", (0, 2)),
@@ -72,7 +68,6 @@ def main() -> None:
     found = prove(model, pairs)
     prove_moves(engine, pairs[: options.moves])
     few = list(zip(pairs[: options.few], found, strict=False))
-    compare_bounds(model, few)
     trade(model, [ends for ends, _ in few], options.plot)
     compare_solvers(model, few, engine.grammar.chains)
 
@@ -90,20 +85,8 @@ def joinable(model: Model, states: Int32s, count: int, seed: int) -> Iterator[En
 
 def warm_up(model: Model, states: Int32s) -> None:
     """Compile, or load, all that is measured."""
-    for start, goal in joinable(model, states, 3, 1):
-        answer = solve.solve(model, start, goal, RULES)
-        assert answer is not None
-        moves = len(answer.path) - 1
-        trellis = pose(model, (start, goal), moves)
-        tables, path = (
-            pair_chains.build(trellis, trws.no_messages(trellis)),
-            np.zeros(len(trellis.dom_ptr) - 1, np.int64),
-        )
-        through = np.zeros(len(trellis.dom))
-        pair_chains.sweep(trellis, tables, through)
-        pair_chains.descend(trellis, tables, path)
-        pair_chains.prune(trellis, tables, through, np.inf)
-        astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 100, 100, ON)
+    for ends in joinable(model, states, 3, 1):
+        solve.solve(Problem(model, *ends, RULES))
 
 
 # --- all pairs -------------------------------------------------------------------------------------------------------
@@ -161,116 +144,6 @@ def moves_of(answer: Certificate) -> int:
     return len(answer.path) - 1
 
 
-# --- bounds ----------------------------------------------------------------------------------------------------------
-
-
-def compare_bounds(model: Model, few: list[tuple[Ends, Certificate]]) -> None:
-    """A* under each bound on the same trellises, in as many moves as were found, nothing known and nothing fixed
-    before."""
-    rows: dict[str, list[tuple[float, int, bool]]] = {}
-    for ends, answer in few:
-        trellis = pose(model, ends, moves_of(answer))
-        cost = answer.cost - RULES.per_move * trellis.moves
-        for name, estimate in estimates(trellis):
-            path = np.zeros(len(trellis.dom_ptr) - 1, np.int64)
-            root = pair_chains.lower_bound(estimate)
-            best, lower, expanded, _ = astar.search(trellis, estimate, root, np.inf, path, EXPANSIONS, EXPANSIONS, ON)
-            rows.setdefault(name, []).append((max(1.0 - root / cost, 0.0), expanded, lower > best - solve.PROVEN))
-    print(f"A* alone, {len(few)} pairs:                   short of the best   expansions, median and most     proven")
-    for name, row in rows.items():
-        short, expanded, proved = zip(*row, strict=True)
-        print(f"{name:45}{np.median(short):14.2%}{np.median(expanded):19.0f}{max(expanded):12}{sum(proved):13}")
-
-
-def estimates(trellis: Trellis) -> Iterator[tuple[str, PairChains]]:
-    """Bounds of the cost to go, each as tables of pair chains that A* reads."""
-    back = np.zeros(trellis.up_ptr[-1])  # the most that a position can save in the coupling to a kid
-    for u in range(len(back)):
-        back[u] = trellis.col_cost[trellis.col_ptr[u] : trellis.col_ptr[u + 1]].min(initial=0.0)
-    yield "each joint alone, in any number of moves", as_tables(trellis, alone(trellis, back, ends_at_goal=True), back)
-    yield (
-        "each joint alone, in the moves that are left",
-        as_tables(trellis, alone(trellis, back, ends_at_goal=False), back),
-    )
-    messages = trws.no_messages(trellis)
-    trws.tighten(trellis, messages, np.zeros(len(trellis.dom_ptr) - 1, np.int64), 160, np.inf)
-    yield "messages", as_tables(trellis, messages.up_row, messages.up_col, messages.constants)
-    tables, through = pair_chains.build(trellis, messages), np.zeros(len(trellis.dom))
-    for _ in range(10):
-        pair_chains.sweep(trellis, tables, through)
-    yield "pair_chains, 10 sweeps", tables
-
-
-def alone(trellis: Trellis, back: Floats, ends_at_goal: bool) -> Floats:
-    """What each position's chain costs from there on its own [P], couplings at the least that they can cost it."""
-    cost, least = trellis.unary.copy(), np.full(len(trellis.dom), np.inf)
-    for i in range(trellis.chains, len(trellis.dom_ptr) - 1):
-        here = slice(trellis.dom_ptr[i], trellis.dom_ptr[i + 1])
-        if trellis.up_ptr[i + 1] == trellis.up_ptr[i]:
-            least[here] = 0.0
-            continue
-        a = trellis.dom_ptr[i - i % trellis.chains + trellis.parents[i % trellis.chains]]
-        for k, u in enumerate(range(trellis.up_ptr[i], trellis.up_ptr[i + 1])):
-            cost[a + k] += back[u]
-            paid = np.full(here.stop - here.start, -back[u])
-            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
-            paid[trellis.col_to[pairs] - here.start] += trellis.col_cost[pairs]
-            least[here] = np.minimum(least[here], paid)
-    goal = trellis.dom[trellis.dom_ptr[-trellis.chains - 1 : -1]]
-    rest = np.zeros(len(trellis.dom))
-    for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):
-        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            edges = slice(trellis.row_ptr[p], trellis.row_ptr[p + 1])
-            to = trellis.row_to[edges]
-            rest[p] = (trellis.row_cost[edges] + cost[to] + least[to] + rest[to]).min()
-            if ends_at_goal and trellis.dom[p] == goal[i % trellis.chains]:
-                rest[p] = min(rest[p], 0.0)
-    return rest
-
-
-def as_tables(trellis: Trellis, rest: Floats, back: Floats, constants: Floats | None = None) -> PairChains:
-    """The estimate `rest` by position [P] plus `back` by coupling row where only the parent has moved, in A*'s form.
-
-    `constants` [n] is what it counts besides for each variable to come.
-    """
-    taken = np.zeros(len(trellis.dom_ptr) - 1) if constants is None else constants
-    stand = trellis.unary - np.repeat(taken, np.diff(trellis.dom_ptr))
-    s = pair_chains.build(trellis, trws.no_messages(trellis))
-    s.edge_share[:], s.partner_share[:] = trellis.row_cost, 0.0
-    for i in range(len(taken)):
-        chain = i % trellis.chains
-        if chain == 0:
-            continue
-        a = i - chain + s.partner[chain]
-        here, above = (slice(trellis.dom_ptr[k], trellis.dom_ptr[k + 1]) for k in (i, a))
-        paid = np.zeros((above.stop - above.start, here.stop - here.start)) + stand[here]
-        to_go = np.zeros(paid.shape) + rest[here]
-        pending = np.zeros(len(paid))
-        for k, u in enumerate(range(trellis.up_ptr[i], trellis.up_ptr[i + 1])):
-            pairs = slice(trellis.col_ptr[u], trellis.col_ptr[u + 1])
-            paid[k, trellis.col_to[pairs] - here.start] += trellis.col_cost[pairs]
-            pending[k] = back[u]
-        if chain == 1:  # whose pair chain bears all that the first chain costs
-            edges = slice(trellis.row_ptr[above.start], trellis.row_ptr[above.stop])
-            s.partner_share[s.partner_ptr[i] : s.partner_ptr[i + 1]] = trellis.row_cost[edges]
-            paid += stand[above, None]
-            to_go += rest[above, None]
-            pending += stand[above] + rest[above]
-        s.pair_cost[s.pair_ptr[i] : s.pair_ptr[i + 1]] = paid.ravel()
-        s.to_go[s.pair_ptr[i] : s.pair_ptr[i + 1]] = to_go.ravel()
-        if i >= trellis.chains:
-            before = slice(trellis.dom_ptr[i - trellis.chains], trellis.dom_ptr[i - trellis.chains + 1])
-            s.half[s.half_ptr[i] : s.half_ptr[i + 1]] = (pending[:, None] + rest[before]).ravel()
-    s.pair_cost[s.pair_ptr[1]] += taken.sum()  # which f begins with
-    return s
-
-
-def pose(model: Model, ends: Ends, moves: int) -> Trellis:
-    start, goal = ends
-    held = with_waits(model, goal, RULES.wait)
-    return build_trellis(held, start, moves, costs_to_go(held, goal, moves), np.inf)
-
-
 # --- gaps against time -----------------------------------------------------------------------------------------------
 
 
@@ -291,15 +164,15 @@ def spend(
 ) -> tuple[list[float], list[float]]:
     """Seconds and gaps with so many sweeps of messages and of pair chains, and nodes of A*."""
     seconds, gaps = [], []
-    most = solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS
-    solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS = pair_chain_sweeps, most[1] if pair_chain_sweeps else 0
+    most = bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS
+    bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS = pair_chain_sweeps, most[1] if pair_chain_sweeps else 0
     rules = Rules(RULES.wait, RULES.per_move, RULES.shortest, RULES.longest, node_budget, sweeps)
     for start, goal in few:
         began = perf_counter()
         answer = solve.solve(Problem(model, start, goal, rules))
         seconds.append(perf_counter() - began)
         gaps.append(gap(answer))
-    solve.PAIR_CHAIN_SWEEPS, solve.MOST_PAIRS = most
+    bounding.PAIR_CHAIN_SWEEPS, bounding.MOST_PAIRS = most
     return seconds, gaps
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from motionmind import Engine, make_discretization, own_skeleton, read_motion
 from motionmind.search import astar, pair_chains, trws
+from motionmind.search.heuristic import Heuristic
 from motionmind.search.problem import costs_to_go, with_waits
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.problem import build_model
@@ -35,10 +36,11 @@ def grown(folder: Path, budget: int) -> tuple[int, int, int]:
     held = with_waits(model, goal, 1.0)
     trellis = build_trellis(held, start, MOVES, costs_to_go(held, goal, MOVES), np.inf)
     tables = pair_chains.build(trellis, trws.no_messages(trellis))  # shares as they come, with nothing evened out
+    heuristic = Heuristic.of_pair_chains(tables)
 
     def search(nodes: int) -> int:
         path, on = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(1, dtype=bool)
-        return astar.search(trellis, tables, pair_chains.lower_bound(tables), np.inf, path, nodes, nodes // 2, on)[3]
+        return astar.search(trellis, heuristic, np.inf, path, nodes, nodes // 2, on)[3]
 
     search(100)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

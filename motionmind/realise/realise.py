@@ -96,7 +96,9 @@ def realise(
         walk.moments @ carriage.stands,
         carriage.loose,
         _given_heights(postures, walk),
-        size * travel_along(walk.moves @ carriage.travel, walk.headings),
+        _drift_with_rates(
+            size * travel_along(walk.moves @ carriage.travel, walk.headings), walk.half_steps, leaving, arriving
+        ),
         (a.root, b.root),
     )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
@@ -173,6 +175,16 @@ def _with_rates(rotations: Floats, times: Floats, leaving: Velocity | None, arri
     if first is None and last is None:
         return rotations
     return rot.mul(rotations, rot.exp(departure(times, first, last)))
+
+
+def _drift_with_rates(drift: Floats, half_steps: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
+    """Return level displacements in each half step [2 T, 3], metres, that begin and end at the given velocities."""
+    level, seconds = np.array([1.0, 0.0, 1.0]), np.diff(half_steps)
+    first = None if leaving is None else level * leaving.root - drift[0] / seconds[0]
+    last = None if arriving is None else level * arriving.root - drift[-1] / seconds[-1]
+    if first is None and last is None:
+        return drift
+    return np.asarray(drift + np.diff(departure(half_steps, first, last), axis=0))
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

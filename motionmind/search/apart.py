@@ -31,7 +31,7 @@ from motionmind.search.costs import path_cost
 from motionmind.search.polish import minimise_chain, minimise_moment
 from motionmind.search.problem import Problem, places
 from motionmind.search.solve import PROVEN, Certificate, Progress, Status, Watch, solve
-from motionmind.search.trellis import Trellis, positions, segment_trellises
+from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
 ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three
 DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
@@ -193,14 +193,15 @@ class _Search:
         stops, chains, cost = [0, *found.passed, len(path) - 1], path.shape[1], problem.rules.per_move * (len(path) - 1)
         excess = self._excess(path)
         for trellis, (first, last) in zip(segment_trellises(problem, stops), pairwise(stops), strict=True):
-            chosen = positions(trellis, path[first + 1 : last + 1])
+            chosen = locate(trellis, path[first : last + 1])
+            chosen[:chains] = trellis.dom_ptr[:chains]  # a via, at which the segment before may arrive
             variable = np.repeat(np.arange(len(chosen)), np.diff(trellis.dom_ptr))
             rows = problem.model.starts[variable % chains] + trellis.dom
             agreeing = self._agreeing[:, first + variable // chains, rows]
             allowed = agreeing[:, chosen].sum(axis=1) - excess
             cost += _improve(trellis, chosen, agreeing, allowed, prices)
             excess = agreeing[:, chosen].sum(axis=1) - allowed
-            path[first + 1 : last + 1] = trellis.dom[chosen[chains:]].reshape(-1, chains)
+            path[first + 1 : last + 1] = states_of(trellis, chosen)[1:]
         if np.all(excess <= 0.0) and cost < self.best.cost:
             self.best = _Path(path, found.passed, cost)
 

@@ -1,7 +1,9 @@
 """Memory-bounded A* over the variables of a trellis, one at a time (operator decomposition).
 
 A node fixes the variables up to one; its *frontier* is the last position chosen in each chain. The rest depends on
-nothing else, so nodes with the same variable and frontier are the same node. f grows by `pair_chains.step`.
+nothing else, so nodes with the same variable and frontier are the same node. f is what the fixed variables cost plus
+the heuristic's bound on the rest, and grows by `heuristic.step`. Where the bound is tight some path has no growth at
+all; as the deeper of two nodes with the same f goes first, the search walks along it: one expansion a variable.
 
 When the node budget is full the worst leaves are forgotten, and the least f among a node's forgotten children is backed
 up into it; the node is opened again with that f, so nothing is lost from the proof. A quarter of the memory is
@@ -21,15 +23,14 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.search.pair_chain_tables import PairChains
-from motionmind.search.pair_chains import step
+from motionmind.search.heuristic import Heuristic, from_start, step
 from motionmind.search.trellis import Trellis
 
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
 KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
 
-_FREE, _HEAPED, _NODES, _PEAK, _EXPANDED = range(5)  # entries of the tally
+_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED = range(6)  # entries of the tally
 
 
 class _Nodes(NamedTuple):
@@ -45,15 +46,14 @@ class _Nodes(NamedTuple):
     following: Int32s  # next node of the same bucket, -1 at the end [N]
     bucket: Int32s  # first node of each bucket [a power of two]
     heap: Int32s  # open nodes, a binary heap [N]
-    free: Int32s  # stack of unused nodes [N]
+    free: Int32s  # stack of unused nodes [N]; of those never used yet, the first _FRESH, nothing is written
     tally: Ints
 
 
 @jit
 def search(
     trellis: Trellis,
-    tables: PairChains,
-    bound: float,
+    heuristic: Heuristic,
     cost: float,
     path: Ints,
     budget: int,
@@ -64,30 +64,29 @@ def search(
 
     Args:
         trellis: the problem.
-        tables: its pair chains.
-        bound: their lower bound from the start, nats.
-        cost: cost of a path already known, nats.
+        heuristic: the bound on the cost to go.
+        cost: what a path has to be cheaper than, nats.
         path: receives the best path of positions, if one is found [n].
         budget: nodes held at most.
         expansions: nodes expanded at most.
-        ended: set from another thread to stop the search [1].
+        ended: set from another thread to stop the search after the next expansion [1].
 
     Returns:
         The cost of the best path found, or `cost`; a lower bound on the cost of every path; the number of expansions;
         and the greatest number of nodes held.
     """
-    nodes = _root(trellis, bound, budget)
+    nodes = _root(trellis, from_start(heuristic), budget)
     lower = cost
     while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
         if nodes.key[node] >= cost - SAME:
             break
-        if nodes.tally[_EXPANDED] >= expansions or ended[0]:
+        if nodes.tally[_EXPANDED] >= expansions or (ended[0] and nodes.tally[_EXPANDED] > 0):
             lower = nodes.key[node]
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(trellis, tables, nodes, node, cost, path)
+        cost, complete = _expand(trellis, heuristic, nodes, node, cost, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -97,7 +96,7 @@ def search(
 
 @jit
 def _expand(
-    trellis: Trellis, tables: PairChains, nodes: _Nodes, node: int, cost: float, path: Ints
+    trellis: Trellis, heuristic: Heuristic, nodes: _Nodes, node: int, cost: float, path: Ints
 ) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`.
 
@@ -110,7 +109,7 @@ def _expand(
     floor = nodes.key[node]  # forgetting may back a greater key up into the node before its last child has come
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
-        f = nodes.f[node] + step(trellis, tables, i, nodes.frontier[node], e)
+        f = nodes.f[node] + step(trellis, heuristic, i, nodes.frontier[node], e)
         key = max(f, floor)
         if key >= cost - SAME:
             continue
@@ -145,21 +144,22 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
         buckets *= 2
     nodes = _Nodes(
         np.empty(budget, np.int32),
-        np.zeros((budget, trellis.chains), np.uint16),
+        np.empty((budget, trellis.chains), np.uint16),
         np.empty(budget),
         np.empty(budget),
-        np.full(budget, -1, np.int32),
-        np.zeros(budget, np.int32),
-        np.full(budget, -1, np.int32),
-        np.full(budget, -1, np.int32),
+        np.empty(budget, np.int32),
+        np.empty(budget, np.int32),
+        np.empty(budget, np.int32),
+        np.empty(budget, np.int32),
         np.full(buckets, -1, np.int32),
         np.empty(budget, np.int32),
-        np.arange(budget - 1, -1, -1).astype(np.int32),
-        np.zeros(5, np.int64),
+        np.empty(budget, np.int32),
+        np.zeros(6, np.int64),
     )
-    nodes.tally[_FREE] = budget - 1
+    nodes.tally[_FREE] = nodes.tally[_FRESH] = budget - 1
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
     nodes.var[0], nodes.f[0], nodes.key[0] = trellis.chains - 1, bound, bound
+    nodes.frontier[0], nodes.parent[0], nodes.children[0] = 0, -1, 0
     _open(nodes, 0)
     return nodes
 
@@ -293,7 +293,11 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, key: float) -> None:
     """Add an open child of `node`."""
     nodes.tally[_FREE] -= 1
-    child = nodes.free[nodes.tally[_FREE]]
+    if nodes.tally[_FREE] < nodes.tally[_FRESH]:  # memory is touched only as it is needed: most searches need little
+        nodes.tally[_FRESH] = nodes.tally[_FREE]
+        child = len(nodes.free) - 1 - nodes.tally[_FREE]
+    else:
+        child = nodes.free[nodes.tally[_FREE]]
     nodes.tally[_NODES] += 1
     nodes.tally[_PEAK] = max(nodes.tally[_PEAK], nodes.tally[_NODES])
     nodes.frontier[child] = nodes.frontier[node]

@@ -23,7 +23,7 @@ from motionmind.jit import jit
 from motionmind.search.costs import coupling, edge_cost, path_cost
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Trellis, correction, positions, segment_trellises
+from motionmind.search.trellis import Trellis, correction, locate, segment_trellises, states_of
 
 ROUNDS = 100  # each samples every chain and every moment once
 
@@ -43,10 +43,10 @@ def sample_path(problem: Problem, certificate: Certificate, seed: int) -> Certif
     path = certificate.path.copy()
     moves = [0, *certificate.passed, len(path) - 1]
     for trellis, (first, last) in zip(segment_trellises(problem, moves), pairwise(moves), strict=True):
-        segment = path[first + 1 : last + 1]
-        chosen = positions(trellis, segment)
+        chosen = locate(trellis, path[first : last + 1])
+        chosen[: trellis.chains] = trellis.dom_ptr[: trellis.chains]  # a via, at which the segment before may arrive
         cost += float(gibbs_sample(trellis, chosen, ROUNDS, rng))
-        segment[:] = trellis.dom[chosen[trellis.chains :]].reshape(segment.shape)
+        path[first + 1 : last + 1] = states_of(trellis, chosen)[1:]
     return replace(certificate, path=path, cost=cost + problem.rules.per_move * (len(path) - 1), status="sampled")
 
 

@@ -8,12 +8,14 @@ from the least costs from the start to each node, and from each node to the end.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Floats, States
+
+SAME = 1e-9  # nats: costs closer than this differ by rounding
 
 
 class Piece(NamedTuple):
@@ -76,34 +78,45 @@ class Segments:
         piece = Piece(*map(int, np.unravel_index(through.argmin(), through.shape)))
         return piece, float(through[piece]), min(self.best - float(others[piece]), float(self._cost[piece]))
 
-    def reopen(self, left: Iterable[Piece]) -> None:
-        """Mark just these pieces as unseen."""
-        self._unseen[:] = False
-        for piece in left:
-            self._unseen[piece] = True
+    def reopen(self) -> None:
+        """Mark all pieces as unseen."""
+        self._unseen = np.isfinite(self.lower)
 
     def update(self, piece: Piece, lower: float, cost: float, path: States) -> None:
-        """Take in a piece's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen."""
+        """Take in a piece's bound, and a path of it [n + 1, L] with its cost, or an empty one; mark it as seen.
+
+        Of two paths that cost the same but for rounding, the later stays.
+        """
         self._unseen[piece] = False
         self.lower[piece] = max(self.lower[piece], lower)
-        if len(path) > 0 and cost < self._cost[piece]:
+        if len(path) > 0 and cost <= self._cost[piece] + SAME:
             self._cost[piece], self._paths[piece] = cost, path
-            self.best = min(self.best, float(self._so_far(self._cost)[-1].min()))
+            self.best = float(self._so_far(self._cost)[-1].min())
 
-    def path(self) -> tuple[States, tuple[int, ...]]:
-        """Return the best path [N + 1, L], and the moves at which it passes its vias."""
-        pieces, stops = [], []
+    def cost(self, piece: Piece) -> float:
+        """Return the least cost of a piece's paths that is known, nats."""
+        return float(self._cost[piece])
+
+    def best_pieces(self) -> list[Piece]:
+        """Return the pieces of the best path, from the start on; none before there is one."""
+        pieces: list[Piece] = []
         so_far = self._so_far(self._cost)
+        if not np.isfinite(self.best):
+            return pieces
         last = int(so_far[-1].argmin())
         for segment in range(len(self._cost) - 1, -1, -1):
-            stops.append(last)
             firsts = np.arange(last + 1)
             rows = firsts % self._cost.shape[1]
             first = int((so_far[segment][: last + 1] + self._cost[segment, rows, last - firsts]).argmin())
-            pieces.append(self._paths[Piece(segment, int(rows[first]), last - first)])
+            pieces.insert(0, Piece(segment, int(rows[first]), last - first))
             last = first
-        pieces.reverse()
-        return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])]), tuple(reversed(stops[1:]))
+        return pieces
+
+    def path(self) -> tuple[States, tuple[int, ...]]:
+        """Return the best path [N + 1, L], and the moves at which it passes its vias."""
+        pieces = self.best_pieces()
+        paths, stops = [self._paths[piece] for piece in pieces], np.cumsum([piece.moves for piece in pieces[:-1]])
+        return np.concatenate([paths[0], *(path[1:] for path in paths[1:])]), tuple(map(int, stops))
 
     def _so_far(self, table: Floats) -> list[Floats]:
         """Return the least cost from the start to each of the K + 1 stops, by the move it is passed at [N + 1]."""

@@ -90,14 +90,6 @@ def build_trellis(
     return _build(model, start, moves, to_go, below, np.zeros((0, 0)) if timed is None else timed)
 
 
-def positions(trellis: Trellis, states: Int32s) -> Ints:
-    """Return the positions [n] of a path, given by its states after each move [T, L]; it starts where all do."""
-    out = trellis.dom_ptr[:-1].copy()
-    domains = [trellis.dom[slice(*span)] for span in pairwise(trellis.dom_ptr[trellis.chains :])]
-    out[trellis.chains :] += [np.searchsorted(domain, s) for domain, s in zip(domains, states.ravel(), strict=True)]
-    return out
-
-
 @jit
 def correction(trellis: Trellis, u: int, x: int) -> float:
     """Return the correction in nats of position `x` in coupling row `u`; 0 for a pair that is not listed."""
@@ -109,6 +101,23 @@ def correction(trellis: Trellis, u: int, x: int) -> float:
         else:
             high = middle
     return float(trellis.col_cost[low]) if low < trellis.col_ptr[u + 1] and trellis.col_to[low] == x else 0.0
+
+
+def states_of(trellis: Trellis, chosen: Ints) -> Int32s:
+    """Return the states [T + 1, L] of a path of positions [n]."""
+    return trellis.dom[chosen].reshape(trellis.moves + 1, trellis.chains)
+
+
+@jit
+def locate(trellis: Trellis, states: Int32s) -> Ints:
+    """Return the positions [n] of a path of states [T + 1, L]; -1 for a state that is not in its domain."""
+    out = np.full(len(trellis.dom_ptr) - 1, -1, np.int64)
+    for i in range(len(out)):
+        state = states[i // trellis.chains, i % trellis.chains]
+        for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+            if trellis.dom[p] == state:
+                out[i] = p
+    return out
 
 
 @jit

@@ -4,15 +4,18 @@ A likeliest path of chains that each know their last state alone is not the like
 joint freezes and rushes. The walks know whole limbs and bodies. For T moves from A to B they expect an orientation
 m_j(t) of each chain at each move (`motionmind.realise.expectation`), and a state x_j(t) pays
 
-    kappa (seconds of a move / 0.2) (angle(x_j(t), m_j(t)) / tolerance_j)^2   nats,
+    kappa (seconds of a move / 0.2) (angle(x_j(t), m_j(t)) / width)^2   nats,
 
 the -log of a Gaussian about the walks' mean but for a constant. So likelihoods of the chains, coordination and walks
-multiply. The time of a move makes the whole independent of the corpus's rate.
+multiply. The width is the chain's tolerance, or the angle to the nearest of its states where all are farther: in a
+sparse vocabulary the guide chooses among the states that there are, and does not force unattested moves between them.
+The time of a move makes the whole independent of the corpus's rate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -50,6 +53,7 @@ def make_guide(
     space, seconds = learned.space, usual(learned.grammar.transitions)
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
 
+    @lru_cache(maxsize=1)  # of the last number of moves, for its path is taken apart once it is found
     def costs(moves: int) -> Floats:
         length = moves * seconds if duration is None else duration
         walked = max(1, round(length / seconds))
@@ -57,23 +61,23 @@ def make_guide(
         expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
         chains = expected.chains(learned.corpus, np.linspace(0.0, length, moves + 1)[1:-1])
         price = kappa * length / moves / MOVE
-        return departures(chains, space.centres, space.starts, price / np.radians(space.tolerances) ** 2)[:, rows]
+        return price * departures(chains, space.centres, space.starts, np.radians(space.tolerances))[:, rows]
 
     return costs
 
 
-def departures(expected: Floats, centres: Floats, starts: Ints, prices: Sequence[float] | Floats) -> Floats:
-    """Return the price of the squared angle between each state and what is expected of its chain [K, G].
+def departures(expected: Floats, centres: Floats, starts: Ints, tolerances: Floats) -> Floats:
+    """Return the squared angle between each state and what is expected of its chain, in units of the width [K, G].
 
     Args:
         expected: orientations of the chains [K, L, 4].
         centres: orientations of the states, chain after chain [G, 4].
         starts: first row of each chain's states [L + 1].
-        prices: nats a squared radian for each chain [L].
+        tolerances: of the chains [L], radians.
     """
     out = np.empty((len(expected), len(centres)))
-    for chain, price in enumerate(prices):
+    for chain, tolerance in enumerate(tolerances):
         rows = slice(starts[chain], starts[chain + 1])
-        cosine = np.abs(expected[:, chain] @ centres[rows].T)
-        out[:, rows] = price * (2.0 * np.arccos(np.minimum(cosine, 1.0))) ** 2
+        angles = 2.0 * np.arccos(np.minimum(np.abs(expected[:, chain] @ centres[rows].T), 1.0))
+        out[:, rows] = (angles / np.maximum(angles.min(axis=1, keepdims=True), tolerance)) ** 2
     return out

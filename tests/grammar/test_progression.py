@@ -26,10 +26,11 @@ from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
 from motionmind.grammar.progression import fit_progression
+from motionmind.search.bounding import PROVEN
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Model, Problem, Rules, Via, costs_to_go, places, with_waits
 from motionmind.search.sample import gibbs_sample, sample_path
-from motionmind.search.solve import PROVEN, solve
+from motionmind.search.solve import solve
 from motionmind.search.trellis import build_trellis
 from motionmind.tween.engine import Engine
 from motionmind.tween.progression import lift_to_moves

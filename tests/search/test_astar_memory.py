@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from toys import noisy_messages, random_toy, solution, trellis_of
 
-from motionmind.search import astar, pair_chains, solve
+from motionmind.search import astar, bounding, pair_chains
+from motionmind.search.heuristic import Heuristic
 from motionmind.search.pair_chain_tables import PairChains
 from motionmind.search.trellis import Trellis
 
@@ -39,7 +40,11 @@ class Case:
         """Cost, bound, expansions and peak of nodes of A*."""
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.trellis, self.tables, self.bound, cost, path, budget, expansions, on)
+        return astar.search(self.trellis, self.heuristic, cost, path, budget, expansions, on)
+
+    @property
+    def heuristic(self) -> Heuristic:
+        return Heuristic.of_pair_chains(self.tables)
 
     @property
     def depth(self) -> int:
@@ -128,7 +133,7 @@ def test_merging_frontiers_saves_what_the_tree_of_prefixes_would_cost() -> None:
 
 def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
     """No theorem: who forgets other leaves looks elsewhere first. It holds for these; a change is worth a look."""
-    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
     for seed in SEEDS:
         toy = random_toy(seed, frustrated=True)
         found = [
@@ -153,7 +158,7 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
                 break
             node = int(nodes.heap[0])
             astar._close(nodes, node)
-            astar._expand(case.trellis, case.tables, nodes, node, np.inf, path)
+            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue

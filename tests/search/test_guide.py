@@ -15,11 +15,12 @@ from toys import Toy, best, evaluate, random_toy, solution
 
 from motionmind._typing import Bools, Floats
 from motionmind.geometry import rotations as rot
+from motionmind.search.bounding import PROVEN
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
 from motionmind.search.problem import Problem, Rules, Via
 from motionmind.search.sample import sample_path
-from motionmind.search.solve import PROVEN, Certificate, Progress, feasible, solve
+from motionmind.search.solve import Certificate, Progress, feasible, solve
 from motionmind.search.trellis import segment_trellises
 from motionmind.tween.engine import Engine
 from motionmind.tween.problem import build_model

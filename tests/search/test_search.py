@@ -6,22 +6,25 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from toys import Toy, evaluate, noisy_messages, random_toy, solution, trellis_of
 
-from motionmind.search import astar, pair_chains, solve, trws
+from motionmind.search import astar, bounding, pair_chains, parts, solve, trws
+from motionmind.search.attention import Attention
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
+from motionmind.search.heuristic import Heuristic
 from motionmind.search.pair_chain_tables import PairChains
 from motionmind.search.polish import polish
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
-from motionmind.search.trellis import Trellis
+from motionmind.search.trellis import Trellis, locate
 
 MOVES = 6
-PROVEN = 2 * solve.PROVEN
+PROVEN = 2 * bounding.PROVEN
 ROUNDING = 1e-9
 ON = np.zeros(1, dtype=bool)  # what would end A* before its time
 KINDS = {
@@ -96,14 +99,14 @@ def test_a_path_keeps_the_rules_and_costs_what_is_stated(kind: dict[str, bool]) 
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, node_budget)
 
 
-@pytest.mark.parametrize("pairs", [0, solve.MOST_PAIRS])
+@pytest.mark.parametrize("pairs", [0, bounding.MOST_PAIRS])
 @pytest.mark.parametrize("sweeps", [1, 2])
 def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
     monkeypatch: pytest.MonkeyPatch, sweeps: int, pairs: int
 ) -> None:
-    monkeypatch.setattr(solve, "MOST_PAIRS", pairs)
-    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
-    monkeypatch.setattr(solve, "SWEEPS_AT_ONCE", sweeps)
+    monkeypatch.setattr(bounding, "MOST_PAIRS", pairs)
+    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
+    monkeypatch.setattr(bounding, "SWEEPS_AT_ONCE", sweeps)
     searched = bounded = 0
     for seed in range(60):
         toy = random_toy(seed, frustrated=True)
@@ -116,12 +119,54 @@ def test_bound_optimum_and_cost_stand_in_this_order_whatever_effort_is_allowed(
                 assert found.cost >= optima[moves] - ROUNDING, (seed, moves, node_budget)
                 assert toy.cost(found.path) == pytest.approx(found.cost, abs=ROUNDING), (seed, moves, node_budget)
                 assert found.lower_bound <= found.cost
-                assert (found.status == "optimal") == (found.cost - found.lower_bound <= solve.PROVEN)
+                assert (found.status == "optimal") == (found.cost - found.lower_bound <= bounding.PROVEN)
                 assert found.peak_nodes <= node_budget
-                assert found.expansions <= node_budget
-                searched += found.expansions > 0
+                assert min(moves, 1) <= found.expansions <= node_budget
+                searched += found.expansions > moves * len(toy.sizes)
                 bounded += found.status == "bounded"
-    assert searched > 0 if pairs else bounded > 0
+    assert searched > 0
+    assert bounded > 0
+
+
+@pytest.mark.parametrize("pairs", [0, bounding.MOST_PAIRS])
+def test_the_answer_is_the_path_that_the_search_returned_and_never_dearer_than_the_one_before(
+    monkeypatch: pytest.MonkeyPatch, kind: dict[str, bool], pairs: int
+) -> None:
+    """Where it had room to walk from the start to the goal, of all parts together."""
+    monkeypatch.setattr(bounding, "MOST_PAIRS", pairs)
+    walked: list[np.ndarray] = []
+    search = astar.search
+
+    def listening(trellis: Trellis, heuristic: Heuristic, cost: float, path: np.ndarray, *rest: Any) -> Any:
+        found = search(trellis, heuristic, cost, path, *rest)
+        if found[0] < cost:
+            walked.append(trellis.dom[path].reshape(-1, trellis.chains))
+        return found
+
+    monkeypatch.setattr(astar, "search", listening)
+    for seed in range(60):
+        toy = random_toy(seed, **kind)
+        walked.clear()
+        found = answer(toy, toy.rules(1, MOVES))
+        if found is None:
+            assert not walked
+        else:
+            assert found.expansions >= 1
+            mine = [path for path in walked if len(path) == len(found.path)]
+            for chain in range(len(toy.sizes)):  # parts are put together chain by chain
+                assert any((path[:, chain] == found.path[:, chain]).all() for path in mine), (seed, chain)
+            if len(walked) == 1:
+                np.testing.assert_array_equal(walked[0], found.path)
+
+
+def test_where_the_bound_is_tight_the_search_walks_straight_to_the_goal() -> None:
+    straight = 0
+    for seed in range(100):
+        toy = random_toy(seed)
+        found = answer(toy, toy.rules(1, MOVES))
+        if found is not None:
+            straight += found.expansions == (len(found.path) - 1) * len(toy.sizes)
+    assert straight > 50
 
 
 # --- what proves it --------------------------------------------------------------------------------------------------
@@ -156,6 +201,31 @@ def test_what_chains_cost_on_their_own_is_the_optimum_where_nothing_couples_them
         held = with_waits(free.model(), goal, free.wait)
         alone = costs_to_go(held, goal, MOVES)[:, held.starts[:-1] + start].sum(axis=1)
         np.testing.assert_allclose(alone + free.per_move * np.arange(MOVES + 1), free.optima(MOVES), atol=ROUNDING)
+
+
+def test_the_best_path_stays_in_what_is_left_of_its_trellis(kind: dict[str, bool]) -> None:
+    pruned = 0
+    for trellis, optimum, seed in bodies(60, kind):
+        state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), np.inf)
+        bounding.tighten(state, 20, Attention(None))
+        chosen = locate(state.trellis, state.states)
+        assert (chosen >= 0).all(), seed
+        assert path_cost(state.trellis, chosen) == pytest.approx(state.cost, abs=ROUNDING), seed
+        assert state.lower_bound <= optimum + ROUNDING <= state.cost + 2 * ROUNDING, seed
+        pruned += len(state.trellis.dom) < len(trellis.dom)
+    assert pruned > 20
+
+
+@pytest.mark.parametrize("sweeps", [1, 5])
+def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind: dict[str, bool]) -> None:
+    for trellis, optimum, seed in bodies(60, kind):
+        messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        trws.tighten(trellis, messages, path, sweeps, np.inf)
+        heuristic = Heuristic.of_messages(messages)
+        cost, lower, _, _ = astar.search(trellis, heuristic, np.inf, path, 50_000, 50_000, ON)
+        assert cost == pytest.approx(optimum, abs=PROVEN), seed
+        assert lower == pytest.approx(optimum, abs=PROVEN), seed
+        assert path_cost(trellis, path) == pytest.approx(optimum, abs=PROVEN), seed
 
 
 @pytest.mark.parametrize("noise", [None, 0.5, 5.0])
@@ -272,9 +342,7 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
             trellis = smaller
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(
-            trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON
-        )
+        cost, lower, _, _ = astar.search(trellis, Heuristic.of_pair_chains(tables), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -324,9 +392,7 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         if trellis.chains == 1:
             continue
         tables = pair_chains.build(trellis, messages)
-        cost, lower, _, _ = astar.search(
-            trellis, tables, pair_chains.lower_bound(tables), np.inf, path, 50_000, 50_000, ON
-        )
+        cost, lower, _, _ = astar.search(trellis, Heuristic.of_pair_chains(tables), np.inf, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -353,23 +419,26 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
 
 
 def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solve, "PAIR_CHAIN_SWEEPS", 0)
+    def one_part(trellis: Trellis) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(trellis.chains, np.int64), np.ones(trellis.chains, dtype=bool)
+
+    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
     expansions = {"apart": 0, "at once": 0}
     for seed in range(60):
         toy = random_toy(seed, most=3, frustrated=True)
-        one, two = answer(toy, toy.rules(MOVES, MOVES)), twice(toy)
+        one, four = answer(toy, toy.rules(MOVES, MOVES)), side_by_side(toy, 4)
         if one is None or len(toy.sizes) == 1:
             continue
-        for how, parts in (("apart", solve._parts), ("at once", lambda trellis: np.zeros(trellis.chains, np.int64))):
+        for how, part in (("apart", parts._parts), ("at once", one_part)):
             with monkeypatch.context() as patch:
-                patch.setattr(solve, "_parts", parts)
-                found = answer(two, two.rules(MOVES, MOVES, sweeps=1))
+                patch.setattr(parts, "_parts", part)
+                found = answer(four, four.rules(MOVES, MOVES, sweeps=1))
             assert found is not None
             assert found.status == "optimal", seed
-            assert found.cost == pytest.approx(2 * one.cost - MOVES * toy.per_move, abs=PROVEN), seed
-            assert found.cost == pytest.approx(two.cost(found.path), abs=ROUNDING), seed
+            assert found.cost == pytest.approx(4 * one.cost - 3 * MOVES * toy.per_move, abs=2 * PROVEN), seed
+            assert found.cost == pytest.approx(four.cost(found.path), abs=ROUNDING), seed
             expansions[how] += found.expansions
-    assert 0 < expansions["apart"] < 0.8 * expansions["at once"]
+    assert 0 < expansions["apart"] < 0.3 * expansions["at once"]
 
 
 def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
@@ -384,8 +453,11 @@ def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
         wait=1.0,
         per_move=0.5,
     )
-    assert solve._parts(trellis_of(toy, 3)).tolist() == [0, 1, 2, 3]
-    assert solve._parts(trellis_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3)).tolist() == [0, 1, 0, 0]
+    part, free = parts._parts(trellis_of(toy, 3))
+    assert part.tolist() == [0, 1, 2, 3]
+    assert free.tolist() == [True, False, True, True]
+    part, _ = parts._parts(trellis_of(replace(toy, parents=(-1, 0, 0, 2), **coupled(toy)), 3))
+    assert part.tolist() == [0, 1, 0, 0]
 
 
 # --- edges of the problem --------------------------------------------------------------------------------------------
@@ -435,7 +507,7 @@ def test_a_body_without_a_tree_is_as_many_bodies_as_chains() -> None:
         found = answer(free, free.rules(MOVES, MOVES))
         optimum = free.optima(MOVES)[MOVES]
         assert (found.cost if found else np.inf) == pytest.approx(optimum, abs=PROVEN), seed
-        assert found is None or found.expansions == 0
+        assert found is None or found.expansions == MOVES * len(toy.sizes)
 
 
 @pytest.mark.parametrize("scale", [1e3, 1e6, 1e10, 1e13])
@@ -500,11 +572,11 @@ def test_the_written_problem_forbids_what_the_model_forbids() -> None:
 # --- helpers ---------------------------------------------------------------------------------------------------------
 
 
-def twice(toy: Toy) -> Toy:
-    """Two of a body side by side, as one."""
-    below = tuple(parent + len(toy.sizes) if parent >= 0 else -1 for parent in toy.parents)
-    doubled = {name: getattr(toy, name) * 2 for name in ("edges", "children", "above", "corrections", "start", "goal")}
-    return replace(toy, parents=toy.parents + below, **doubled)
+def side_by_side(toy: Toy, count: int) -> Toy:
+    """So many of a body side by side, as one."""
+    parents = tuple(parent + k * len(toy.sizes) if parent >= 0 else -1 for k in range(count) for parent in toy.parents)
+    names = ("edges", "children", "above", "corrections", "start", "goal")
+    return replace(toy, parents=parents, **{name: getattr(toy, name) * count for name in names})
 
 
 def coupled(toy: Toy) -> dict[str, tuple[np.ndarray, ...]]:

@@ -24,7 +24,7 @@ from motionmind.discretize import Codebook
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar import coordination
-from motionmind.search.solve import PROVEN
+from motionmind.search.bounding import PROVEN
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween
 

@@ -25,10 +25,11 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_motion, read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.search import astar
+from motionmind.search.bounding import PROVEN
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Via
 from motionmind.search.sample import gibbs_sample
-from motionmind.search.solve import PROVEN, Certificate, Progress
+from motionmind.search.solve import Certificate, Progress
 from motionmind.search.trellis import Trellis
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween

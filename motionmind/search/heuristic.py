@@ -1,0 +1,90 @@
+"""The heuristic of A*: the bound on the cost to go from a partial path, read from messages or from pair chains."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind._typing import Ints
+from motionmind.jit import jit
+from motionmind.search import pair_chains, trws
+from motionmind.search.pair_chain_tables import PairChains
+from motionmind.search.trellis import Trellis
+from motionmind.search.trws import Messages
+
+_NO_FLOATS, _NO_INTS = np.zeros(0), np.zeros(0, np.int64)
+_NO_MESSAGES = Messages(*(_NO_FLOATS,) * len(Messages._fields))
+_NO_PAIR_CHAINS = PairChains(
+    _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_INTS, _NO_FLOATS, _NO_FLOATS,
+    _NO_INTS, _NO_FLOATS,
+)  # fmt: skip
+
+
+class Heuristic(NamedTuple):
+    """Messages after a backward sweep, or pair chains; the others have no entries."""
+
+    messages: Messages
+    tables: PairChains
+
+    @property
+    def is_of_pair_chains(self) -> bool:
+        """Whether it is read from pair chains."""
+        return len(self.tables.partner) > 0
+
+    @staticmethod
+    def of_messages(messages: Messages) -> Heuristic:
+        """Return the heuristic that messages are."""
+        return Heuristic(messages, _NO_PAIR_CHAINS)
+
+    @staticmethod
+    def of_pair_chains(tables: PairChains) -> Heuristic:
+        """Return the heuristic that pair chains are."""
+        return Heuristic(_NO_MESSAGES, tables)
+
+
+@jit
+def from_start(heuristic: Heuristic) -> float:
+    """Return the bound on the cost of every path, in nats: f of the start."""
+    if len(heuristic.tables.partner) > 0:
+        return pair_chains.lower_bound(heuristic.tables)
+    return float(np.sum(heuristic.messages.constants))
+
+
+@jit
+def step(trellis: Trellis, heuristic: Heuristic, i: int, frontier: NDArray[np.uint16], e: int) -> float:
+    """Return by how much f, the cost so far plus the bound on the rest, grows with edge `e`, in nats.
+
+    At least 0 but for rounding.
+
+    Args:
+        trellis: the problem.
+        heuristic: its bound on the cost to go.
+        i: the variable that takes the position that the edge leads to.
+        frontier: last choice in each chain [L], as an index into its domain: at i's move for chains before i's, one
+            move before for all others.
+        e: an edge of i's chain.
+    """
+    if len(heuristic.tables.partner) > 0:
+        return pair_chains.step(trellis, heuristic.tables, i, frontier, e)
+    chain = i % trellis.chains
+    parent = trellis.parents[chain]
+    above = trellis.dom_ptr[i - chain + parent] + frontier[parent] if parent >= 0 else -1
+    before = trellis.dom_ptr[i - trellis.chains] + frontier[chain]
+    return trws.step(trellis, heuristic.messages, i, before, above, e)
+
+
+@jit
+def descend(trellis: Trellis, heuristic: Heuristic, path: Ints) -> None:
+    """Write to `path` [n] the path of positions that takes the least growth of f at each variable."""
+    chains = trellis.chains
+    frontier = np.zeros(chains, np.uint16)
+    path[:chains] = trellis.dom_ptr[:chains]
+    for i in range(chains, len(path)):
+        before, least = path[i - chains], np.inf
+        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+            grown = step(trellis, heuristic, i, frontier, e)
+            if grown < least:
+                least, path[i] = grown, trellis.row_to[e]
+        frontier[i % chains] = path[i] - trellis.dom_ptr[i]

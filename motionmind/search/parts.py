@@ -1,0 +1,108 @@
+"""Search a bounded trellis by A*, the parts of the body that nothing couples any more each by itself.
+
+What a path costs more or less than one path is the sum of the differences in each part, so with all other parts fixed
+to that path, the bounds of the parts add up. A part needs to be searched only up to what, with the most that the others
+may save, would still be of interest. Searched all at once, every near-best path of one part would be tried with those
+of all others.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Ints
+from motionmind.search import astar, heuristic, pair_chains
+from motionmind.search.attention import Attention
+from motionmind.search.bounding import Bounded, tighten_by_pair_chains
+from motionmind.search.costs import path_cost
+from motionmind.search.heuristic import Heuristic
+from motionmind.search.polish import polish
+from motionmind.search.trellis import Trellis, locate, states_of
+
+
+class Effort(NamedTuple):
+    """Nodes that A* expanded, and the most that it held at once."""
+
+    expansions: int = 0
+    peak_nodes: int = 0
+
+
+def search(state: Bounded, nodes: int, budget: int, attention: Attention) -> Effort:
+    """Search a trellis for the best path, and take what is found and proven into its bounds.
+
+    Where bound and path meet already, A* walks along the bound to the best path.
+
+    Args:
+        state: the trellis, and what is known of it.
+        nodes: nodes that A* may hold at once.
+        budget: nodes that it may expand.
+        attention: whoever may want the search to end.
+    """
+    part, free = _parts(state.trellis)
+    names = np.unique(part[free])
+    if state.closed or len(names) < 2 or not state.heuristic.is_of_pair_chains:
+        return _search_at_once(state, nodes, budget, attention)
+    chosen = locate(state.trellis, state.states) if state.found else _descend(state)
+    cost, states = path_cost(state.trellis, chosen), states_of(state.trellis, chosen)
+    left = {name: _fix_all_but(state, chosen, part == name) for name in names}
+    may_save = {name: max(cost - heuristic.from_start(smaller[1]), 0.0) for name, smaller in left.items()}
+    saved, effort = 0.0, Effort()
+    for name in sorted(may_save, key=lambda name: may_save[name]):
+        limit = state.cost + sum(may_save.values()) - may_save[name]
+        mine = Bounded(*left.pop(name), min(cost, limit), states if cost <= limit else None)
+        tighten_by_pair_chains(mine, attention)
+        spent = _search_at_once(mine, nodes, budget - effort.expansions, attention)
+        effort = Effort(effort.expansions + spent.expansions, max(effort.peak_nodes, spent.peak_nodes))
+        may_save[name] = cost - mine.lower_bound
+        if mine.found:
+            saved += cost - mine.cost
+            states[:, part == name] = mine.states[:, part == name]
+    state.take(cost - saved, states, cost - sum(may_save.values()))
+    return effort
+
+
+def _search_at_once(state: Bounded, nodes: int, budget: int, attention: Attention) -> Effort:
+    """Search a trellis, all chains in lockstep."""
+    if budget <= 0 or (state.closed and not state.found):
+        return Effort()
+    chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
+    cost, lower_bound, expansions, held = attention.run(
+        astar.search, state.trellis, state.heuristic, state.limit, chosen, nodes, budget
+    )
+    if cost < state.limit:
+        state.take(path_cost(state.trellis, chosen), states_of(state.trellis, chosen), lower_bound)
+    else:
+        state.lower_bound = min(max(state.lower_bound, lower_bound), state.cost)
+    return Effort(expansions, held)
+
+
+def _descend(state: Bounded) -> Ints:
+    """Return a good path of positions [n], whatever it costs."""
+    chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
+    heuristic.descend(state.trellis, state.heuristic, chosen)
+    polish(state.trellis, chosen)
+    return chosen
+
+
+def _fix_all_but(state: Bounded, chosen: Ints, mine: Bools) -> tuple[Trellis, Heuristic]:
+    """Return what is left with all chains but some [L] fixed to a path of positions [n]."""
+    free = np.repeat(np.resize(mine, len(chosen)), np.diff(state.trellis.dom_ptr))
+    free[chosen] = True
+    through = np.where(free, 0.0, np.inf)
+    trellis, tables = pair_chains.prune(state.trellis, state.heuristic.tables, through, 1.0)
+    return trellis, Heuristic.of_pair_chains(tables)
+
+
+def _parts(trellis: Trellis) -> tuple[Ints, Bools]:
+    """Return the first chain of the part that each chain belongs to, and whether the chain has any choice [L].
+
+    A coupling joins two chains only where there is a move at which both have more than one position left.
+    """
+    part: Ints = np.arange(trellis.chains)
+    many: Bools = np.diff(trellis.dom_ptr).reshape(-1, trellis.chains) > 1
+    for chain, parent in enumerate(trellis.parents):
+        if parent >= 0 and np.any(many[:, chain] & many[:, parent]):
+            part[chain] = part[parent]
+    return part, np.asarray(many.any(axis=0))
