@@ -27,10 +27,11 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.errors import InfeasibleError
+from motionmind.search.bounding import PROVEN
 from motionmind.search.costs import path_cost
 from motionmind.search.polish import minimise_chain, minimise_moment
 from motionmind.search.problem import Problem, places
-from motionmind.search.solve import PROVEN, Certificate, Progress, Status, Watch, solve
+from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
 ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three

@@ -15,8 +15,9 @@ from toys import Toy, random_toy, solution
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.errors import InfeasibleError
 from motionmind.search.apart import TooAlikeError, difference, solve_apart
+from motionmind.search.bounding import PROVEN
 from motionmind.search.problem import Problem, Via
-from motionmind.search.solve import PROVEN, Certificate, Progress, solve
+from motionmind.search.solve import Certificate, Progress, solve
 
 ROUNDING = 1e-9
 
