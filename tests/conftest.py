@@ -11,6 +11,10 @@ from command_line import Ran, Run
 from hypothesis import HealthCheck, settings
 
 from motionmind.cli import main
+from motionmind.discretize import Codebook
+from motionmind.formats import read_motion
+from motionmind.retarget.retarget import own_skeleton
+from motionmind.tween.engine import Engine
 
 # The same examples on every run and every machine, and no failure because a machine was slow.
 settings.register_profile(
@@ -32,6 +36,15 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"recorded movement is not here: no folder {SHARED_DATA}")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def cmu05(shared_data: Path) -> Engine:
+    """What is learned from twenty clips of one dancer, at 5 Hz and 15 degrees; each begins with an added T-pose."""
+    clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
+    if not clips:
+        pytest.skip(f"no clips in {shared_data / 'cmu-05'}")
+    return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
 
 
 @pytest.fixture

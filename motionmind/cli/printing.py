@@ -160,15 +160,18 @@ def _shares(result: Tween) -> str:
 
 
 def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
-    """Print alternative tweens, a line each; costs include the price of moves shared with earlier ones."""
-    click.echo("    moves  seconds      cost  proven      gap    attested  bridged  shared with earlier ones")
+    """Print alternative tweens, a line each, with the share by which each differs from those above."""
+    click.echo(
+        "    moves  seconds      cost  at least     gap  proven       attested  bridged  differs from those above"
+    )
     for number, result in enumerate(results, start=1):
-        changes = int((result.path[1:] != result.path[:-1]).sum())
-        click.echo(
-            f"{number:2}  {result.moves:5}  {result.motion.times[-1]:7.2f}  {result.cost:8.3f}  {result.status:11} "
-            f"{result.gap:6.2%} {result.attested:8.1%}  {len(result.bridges):7}  {result.shared} of "
-            f"{count(changes * (number - 1), 'move')}"
+        differs = ", ".join(f"{share:.0%}" for share in result.differs)
+        line = (
+            f"{number:2}  {result.moves:5}  {result.motion.times[-1]:7.2f}  {result.cost:8.3f}  "
+            f"{result.lower_bound:8.3f}  {result.gap:6.2%}  {result.status:11}  {result.attested:8.1%}  "
+            f"{len(result.bridges):7}  {differs}"
         )
+        click.echo(line.rstrip())
     print_written(files)
 
 

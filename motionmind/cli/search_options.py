@@ -113,13 +113,12 @@ SEARCH_OPTIONS = (
         "max_moves", "--max-moves", _SEARCH, "Try at most N moves, unless --moves is given.", COUNT, "N", advanced=True
     ),
     SearchOption(
-        "diversity",
-        "--diversity",
+        "differ",
+        "--differ",
         _SEARCH,
-        "Charge an alternative N nats for each joint's move that it shares with an earlier one.",
-        NATS,
-        "N",
-        advanced=True,
+        "Make an alternative differ from each earlier one in this share of its joints' states on the way.",
+        Number(min=0, max=1),
+        "SHARE",
     ),
     SearchOption(
         "node_budget", "--node-budget", _SEARCH, "Hold at most N search nodes at once.", COUNT, "N", advanced=True

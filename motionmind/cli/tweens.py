@@ -16,7 +16,7 @@ import click
 from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, numbered, write
 from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, option
 from motionmind.cli.postures import read_end
-from motionmind.cli.printing import Interruption, announce_compilation, print_alternatives, print_tween
+from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import COUNT, FILE
 from motionmind.cli.words import parse_frames, parse_posture
@@ -46,7 +46,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     section=Section.SEARCH,
     type=COUNT,
     metavar="K",
-    help="Find K tweens that differ; write out-1.json, out-2.json, ...",
+    help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
 )
 @option(
     "--before",
@@ -115,12 +115,17 @@ def tween(
 def _find_tweens(
     engine: Engine, ends: tuple[Posture, Posture], request: dict[str, Any], count: int, interruption: Interruption
 ) -> list[Tween]:
-    """Find `count` tweens, each unlike those before; fewer if Ctrl-C ends the search."""
+    """Find `count` tweens; fewer if Ctrl-C ends the search, or with a note if nothing else differs by enough."""
     found: list[Tween] = []
-    for _ in range(count):
-        found.append(engine.tween(*ends, **request, unlike=found, watch=interruption.watch))
-        if interruption.is_requested:
-            break
+    try:
+        for tween in engine.alternatives(*ends, count, **request, watch=interruption.watch):
+            found.append(tween)
+            if interruption.is_requested:
+                break
+    except NoPathError as error:
+        if not found:
+            raise
+        note(f"{len(found)} of {count} found: {error}")
     return found
 
 

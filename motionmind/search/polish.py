@@ -19,9 +19,9 @@ def polish(trellis: Trellis, path: Ints) -> float:
     cost = path_cost(trellis, path)
     while True:
         for chain in range(trellis.chains):
-            _minimise_chain(trellis, path, chain)
+            minimise_chain(trellis, path, chain)
         for t in range(1, trellis.moves + 1):
-            _minimise_moment(trellis, path, t)
+            minimise_moment(trellis, path, t)
         better = path_cost(trellis, path)
         if not better < cost - 1e-9:
             return min(better, cost)
@@ -29,7 +29,7 @@ def polish(trellis: Trellis, path: Ints) -> float:
 
 
 @jit
-def _minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
+def minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
     """Replace a chain's positions by the cheapest, given the other chains.
 
     value[p] is the least cost of the chain from position p on, its couplings to the others included.
@@ -56,7 +56,7 @@ def _minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
 
 
 @jit
-def _minimise_moment(trellis: Trellis, path: Ints, t: int) -> None:
+def minimise_moment(trellis: Trellis, path: Ints, t: int) -> None:
     """Replace all positions at move t by the cheapest, given the other moves.
 
     value[p] is the least cost of a chain with position p and of the chains below it in the tree.

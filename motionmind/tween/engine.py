@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -17,6 +18,7 @@ from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import realise
+from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
@@ -24,7 +26,6 @@ from motionmind.tween.certificate import Bridge, Source, break_down_cost, source
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
-from motionmind.tween.problem import shared_moves
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
@@ -98,6 +99,52 @@ class Engine(LearnedCorpus):
         }
         return self._account_for(formulation, certificate, motion, detail, seconds)
 
+    def alternatives(
+        self,
+        a: Posture,
+        b: Posture,
+        count: int,
+        request: TweenRequest | None = None,
+        *,
+        before: Motion | None = None,
+        after: Motion | None = None,
+        watch: Watch | None = None,
+        **options: Any,
+    ) -> Iterator[Tween]:
+        """Find the best movement, then others with as many moves, each of which differs from all before by `differ`.
+
+        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it.
+
+        Args:
+            a: where the motion starts, exactly.
+            b: where the motion ends, exactly.
+            count: how many movements to find.
+            request: see `tween`, as for the other arguments and the errors.
+            before: see `tween`.
+            after: see `tween`.
+            watch: see `tween`.
+            options: see `tween`.
+
+        Yields:
+            The tweens. The cost of each is least among what differs from those before, as far as its bound says.
+
+        Raises:
+            NoPathError: nothing joins the postures, or, after the first tween, nothing else differs by so much.
+
+        >>> from motionmind import Engine
+        >>> engine = Engine.load("ballet")
+        >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+        >>> best, other = engine.alternatives(motion.posture(0), motion.posture(9), 2)
+        >>> other.moves == best.moves, other.cost >= best.cost, min(other.differs) >= 0.2
+        (True, True, True)
+        """
+        request = TweenRequest.of(request, **options)
+        found: list[Tween] = []
+        for number in range(count):
+            change = {"seed": request.seed + number} if request.sample else {"unlike": (*request.unlike, *found)}
+            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **change))
+            yield found[-1]
+
     def _find_path(self, formulation: Formulation, watch: Watch | None) -> Certificate:
         """Return the best path of a formulated request; NoPathError says why there is none."""
         problem, searched = formulation.problem, formulation.searched
@@ -111,8 +158,13 @@ class Engine(LearnedCorpus):
             except InfeasibleError as error:
                 reason = diagnose_posturewise(self.corpus, self._bodies, formulation.nearest, problem.rules)
                 raise NoPathError(reason) from error
+        request = formulation.request
         try:
+            if request.unlike:
+                return solve_apart(searched, [other.path for other in request.unlike], request.differ, watch)
             return solve(searched, watch)
+        except TooAlikeError as error:
+            raise _no_other_path(request, error.most) from error
         except InfeasibleError as error:
             raise self._no_path(formulation) from error
 
@@ -188,7 +240,7 @@ class Engine(LearnedCorpus):
             attested=attested,
             bridges=bridges,
             waits=waits,
-            shared=shared_moves(path, [other.path for other in request.unlike]),
+            differs=tuple(difference(path, other.path) for other in request.unlike),
             passed=certificate.passed,
             snap_degrees=formulation.snap_degrees[[0, -1]],
             path_degrees=path_degrees,
@@ -228,6 +280,17 @@ class Engine(LearnedCorpus):
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
         """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
+
+
+def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
+    """Return the error that says that no path differs by enough from those of a request's tweens to differ from."""
+    count, moves = len(request.unlike), len(request.unlike[0].path) - 1
+    others = "the earlier one" if count == 1 else f"each of {count} earlier ones"
+    return NoPathError(
+        f"no path of {moves} move{'s' * (moves != 1)} was found that differs by {request.differ:.1%} from {others}; "
+        f"none can by more than {most:.1%}",
+        {"differ": request.differ, "most": most},
+    )
 
 
 def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:

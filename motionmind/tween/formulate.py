@@ -30,7 +30,7 @@ from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import make_guide
 from motionmind.tween.nearest_body import nearest_posture
-from motionmind.tween.problem import build_model, penalise
+from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import MOST_MOVES, TweenRequest
 
@@ -97,8 +97,8 @@ class Formulation:
     @property
     def stays(self) -> bool:
         """Whether no move at all is best: A is B to within rounding, does not move, and nothing is asked of the way."""
-        moving = self.leaving is not None or self.arriving is not None
-        return not (self.request.fixes_length or self.request.via or moving) and _same(self.a, self.b)
+        request, moving = self.request, self.leaving is not None or self.arriving is not None
+        return not (request.fixes_length or request.via or request.unlike or moving) and _same(self.a, self.b)
 
 
 def formulate(
@@ -140,8 +140,6 @@ def formulate(
     factor = request.coordination_factor
     bridge_price = None if request.strict else request.bridge_price
     model = _grammar_model(learned.grammar, request.weights, 0.0 if by_moves else factor, bridge_price, request.novelty)
-    if request.unlike:
-        model = penalise(model, [other.path for other in request.unlike], request.diversity)
     problem = Problem(
         restrict(model, constraints),
         start,
@@ -184,10 +182,11 @@ def _grammar_model(
 
 
 def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int]:
-    """Return the least and the greatest number of moves: what is asked, or the nearest number of moves of the corpus's
-    usual length that a duration holds."""
+    """Return the least and the greatest number of moves: what is asked, that of the tweens to differ from, or the
+    nearest number of moves of the corpus's usual length that a duration holds."""
+    theirs = len(request.unlike[0].path) - 1 if request.unlike else None
     if request.duration is None:
-        return request.move_range
+        return request.move_range if theirs is None else (theirs, theirs)
     seconds = usual(learned.grammar.transitions)
     longest = MOST_MOVES * seconds
     if not 1.0 / request.fps <= request.duration <= longest:
@@ -195,6 +194,8 @@ def _move_range(learned: LearnedCorpus, request: TweenRequest) -> tuple[int, int
             f"duration must be a number of seconds from a frame's {1.0 / request.fps:g} to {longest:g}, not "
             f"{request.duration}"
         )
+    if theirs is not None:
+        return theirs, theirs
     if request.moves is not None:
         return request.move_range
     nearest = max(1, round(request.duration / seconds))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -85,35 +84,3 @@ def couplings(net: Coordination, starts: Ints, factor: float) -> Couplings:
         alone[mine] = factor * least
     pair_starts, pair_ptr, parents = (np.array(part) for part in (net.pair_starts, net.pair_ptr, net.parents))
     return Couplings(parents, unary, alone, pair_starts, pair_ptr, np.array(net.pair_states), corrections)
-
-
-def changes(path: Int32s) -> list[tuple[int, int, int]]:
-    """List the state changes of a path [T + 1, L]: chain, state left, state arrived in."""
-    before, after = path[:-1], path[1:]
-    moves, chains = np.nonzero(before != after)
-    return list(zip(chains.tolist(), before[moves, chains].tolist(), after[moves, chains].tolist(), strict=True))
-
-
-def penalise(model: Model, paths: Sequence[Int32s], nats: float) -> Model:
-    """Return the model in which each state change costs `nats` more for every path of `paths` that makes it.
-
-    Args:
-        model: the costs; they stay as they are.
-        paths: states [T + 1, L] each.
-        nats: at least 0. A hold is no state change, and costs what it did.
-    """
-    costs = model.costs.copy()
-    for path in paths:
-        for chain, state, target in set(changes(path)):
-            row = model.starts[chain] + state
-            first, last = model.indptr[row], model.indptr[row + 1]
-            at = first + np.searchsorted(model.targets[first:last], target)
-            if at < last and model.targets[at] == target:
-                costs[at] += nats
-    return model._replace(costs=costs)
-
-
-def shared_moves(path: Int32s, others: Sequence[Int32s]) -> int:
-    """Count the state changes that a path [T + 1, L] shares with others, once for each of these."""
-    made = changes(path)
-    return sum(move in theirs for theirs in map(set, map(changes, others)) for move in made)

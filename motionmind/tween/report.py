@@ -53,7 +53,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         attested: share of the joints' moves that the corpus attests.
         bridges: moves that it does not attest.
         waits: moves spent waiting at the goal.
-        shared: state changes shared with the tweens to differ from.
+        differs: share of the joints' states on the way by which it differs from each tween to differ from.
         vias: postures to pass through.
         snap_degrees: angle of each joint to its state in A and in B.
         path_degrees: "mean" and "most" angle between the motion and the path's states on the way; empty without a way.
@@ -94,7 +94,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     attested: float = 0.0
     bridges: list[Bridge]
     waits: list[Wait]
-    shared: int = 0
+    differs: list[float] = []
     vias: list[PassedPosture] = []
     snap_degrees: dict[str, dict[str, float]] = {}
     path_degrees: dict[str, float] = {}

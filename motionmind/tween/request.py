@@ -47,8 +47,9 @@ class TweenRequest:
         hold: joints that keep their state all the way, such as a standing leg; A and B must agree there.
         avoid: joints, each with a state to avoid on the way, by number or name.
         via: postures to pass through, in this order; each at any move, or as (posture, move) at that one.
-        unlike: tweens to differ from.
-        diversity: nats that each change of a joint's state costs for every tween of `unlike` that makes it too.
+        unlike: tweens to differ from, of one number of moves, which this one has too.
+        differ: share of the joints' states on the way that has to be other than in each tween of `unlike`, compared
+            move by move, from 0 to 1.
         sample: sample a path with probability proportional to exp(-cost), instead of finding the best one; it has as
             many moves as the best. `motionmind.search.sample` says how close to that distribution it comes.
         seed: seed of the sample, at least 0.
@@ -88,7 +89,7 @@ class TweenRequest:
     avoid: Sequence[tuple[str, int | str]] = ()
     via: Sequence[Posture | tuple[Posture, int]] = ()
     unlike: Sequence[HasPath] = ()
-    diversity: float = 2.0
+    differ: float = 0.2
     sample: bool = False
     seed: int = 0
     strict: bool = False
@@ -128,9 +129,10 @@ class TweenRequest:
             raise MotionMindError(
                 f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {self.fps}"
             )
-        if not 0.0 <= self.novelty <= 1.0:
-            raise MotionMindError(f"novelty must be a number from 0 to 1, not {self.novelty}")
-        for name in ("lambda_", "beta", "tau", "bridge_price", "guide", "diversity"):
+        for name in ("novelty", "differ"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise MotionMindError(f"{name} must be a number from 0 to 1, not {getattr(self, name)}")
+        for name in ("lambda_", "beta", "tau", "bridge_price", "guide"):
             nats = getattr(self, name)
             if not (math.isfinite(nats) and nats >= 0.0):
                 raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
@@ -139,12 +141,23 @@ class TweenRequest:
                 raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
 
     def _check_combinations(self) -> None:
+        if self.unlike:
+            self._check_unlike()
         if not self.posturewise:
             return
         if self.pin or self.hold or self.avoid or self.via or self.unlike or self.sample:
             raise MotionMindError("posturewise knows whole postures alone: no pin, hold, avoid, via, unlike or sample")
         if self.coordination == "progression":
             raise MotionMindError("posturewise: coordination can be posture or none, not progression")
+
+    def _check_unlike(self) -> None:
+        if self.sample:
+            raise MotionMindError("unlike: samples differ by their seeds; leave out sample")
+        every, (least, most) = sorted({len(other.path) - 1 for other in self.unlike}), self.move_range
+        if len(every) > 1:
+            raise MotionMindError(f"unlike: the tweens must have one number of moves, not {every[0]} and {every[-1]}")
+        if self.moves is not None and not least <= every[0] <= most:
+            raise MotionMindError(f"unlike: the tweens have {every[0]} moves, which moves={self.moves} rules out")
 
     @classmethod
     def of(cls, request: TweenRequest | None = None, **options: Any) -> TweenRequest:

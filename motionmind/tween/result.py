@@ -31,7 +31,7 @@ class Tween:
         attested: share of the joints' moves that the corpus attests.
         bridges: the moves that it does not attest, but for waits.
         waits: moves spent waiting at the goal.
-        shared: number of state changes shared with the tweens to differ from, counted for each of them.
+        differs: share of the joints' states on the way by which it differs from each tween to differ from [K].
         passed: the moves at which the path passes the postures to pass through [K].
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
@@ -69,7 +69,7 @@ class Tween:
     attested: float
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
-    shared: int
+    differs: tuple[float, ...]
     passed: tuple[int, ...]
     snap_degrees: Floats
     path_degrees: Floats
@@ -114,7 +114,8 @@ class Tween:
     def problem(self) -> str:
         """Return the problem of this number of moves in toulbar2's cfn format; its optimum should be `cost`.
 
-        Postures to pass through are passed at the moves at which this tween passes them.
+        Postures to pass through are passed at the moves at which this tween passes them. That it differs from other
+        tweens is no part of what is written: without that, an alternative's optimum may be less.
         """
         vias = [Via(via.states, move) for via, move in zip(self.search_problem.vias, self.passed, strict=True)]
         return cfn(replace(self.search_problem, vias=tuple(vias)), self.moves, self.joints)
@@ -144,7 +145,7 @@ def report_of(tween: Tween) -> TweenReport:
         attested=tween.attested,
         bridges=list(tween.bridges),
         waits=list(tween.waits),
-        shared=tween.shared,
+        differs=list(tween.differs),
         vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
         snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
         path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},

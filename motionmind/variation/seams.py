@@ -302,8 +302,8 @@ def judge_and_smooth(
         given = {"before": before, "after": after, "watch": watching if watch else None, **options}
         tweens: list[Tween] = []
         try:
-            for _ in range(1 if posturewise else alternatives):
-                tweens.append(engine.tween(a, b, **given, unlike=tweens))
+            for tween in engine.alternatives(a, b, 1 if posturewise else alternatives, **given):
+                tweens.append(tween)
                 if ended:
                     break
         except NoPathError as error:

@@ -382,7 +382,7 @@ def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine) -> No
         {"lambda_": 0.5, "novelty": 0.5, "avoid": [("left_knee", "plie 56")]},
         {"strict": True},
         {"via": [read_posture(POSTURES / "passe.json")]},
-        {"unlike": [plain], "diversity": 3.0},
+        {"unlike": [plain], "differ": 0.3},
         {"sample": True, "seed": 2},
         {"moves": 7, "pin": {"left_wrist": "B"}},
     ):

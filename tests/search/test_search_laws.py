@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -58,9 +58,9 @@ def two(movement: list[Motion], seed: int) -> Ends:
 
 
 def join(engine: Engine, ends: Ends, **asked: Any) -> Tween | None:
-    """A tween by what is attested alone, or None where there is none."""
+    """A tween by what is attested alone, without a guide, or None where there is none."""
     try:
-        return engine.tween(*ends, strict=True, **{"moves": (1, MOVES)} | asked)
+        return engine.tween(*ends, strict=True, **{"moves": (1, MOVES), "guide": 0.0} | asked)
     except NoPathError:
         return None
 
@@ -116,7 +116,7 @@ class Book:
         avoid: Sequence[tuple[int, int]] = (),
         via: tuple[States, int | None] | None = None,
         unlike: Sequence[States] = (),
-        diversity: float = 0.0,
+        differ: float = 0.0,
     ) -> tuple[float, int]:
         """The least cost of all paths that do what is asked, and how many of them cost that."""
         every = []
@@ -133,10 +133,8 @@ class Book:
                 if via[1] is not None:
                     there &= np.arange(1, count) == via[1]
                 cost[~there.any(axis=1)] = np.inf
-            for other, chain in product(unlike, range(3)):
-                for a, b in set(pairwise(other[:, chain].tolist())):
-                    if a != b:
-                        cost += diversity * ((paths[:, :-1, chain] == a) & (paths[:, 1:, chain] == b)).sum(axis=1)
+            for other in unlike:
+                cost[(inner != other[1:-1]).mean(axis=(1, 2)) < differ] = np.inf
             every.append(cost)
         costs = np.concatenate(every)
         least = float(costs.min())
@@ -156,8 +154,8 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
     book = Book(engine, movement, ends, novelty)
     names = BODY.names
     moves = (int(rng.integers(1, MOVES + 1)), MOVES)
-    asked: dict[str, Any] = {"moves": moves, "novelty": novelty, "diversity": 0.75}
-    listed: dict[str, Any] = {"moves": range(moves[0], MOVES + 1), "diversity": 0.75}
+    asked: dict[str, Any] = {"moves": moves, "novelty": novelty, "differ": 0.25}
+    listed: dict[str, Any] = {"moves": range(moves[0], MOVES + 1), "differ": 0.25}
     if pinned:
         chain, end = int(rng.integers(3)), str(rng.choice(["A", "B"]))
         asked["pin"], listed["pin"] = {names[chain]: end}, (chain, end)
@@ -170,11 +168,19 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
         through = movement[0].posture(frame)
         asked["via"] = [through if move is None else (through, move)]
         listed["via"] = (engine.space.assign(through.rotations[None])[0], move)
-    asked["unlike"] = [tween for k in range(others) if (tween := join(engine, ends, novelty=0.5 * k)) is not None]
-    listed["unlike"] = [tween.path for tween in asked["unlike"]]
+    plain = join(engine, ends, **asked)
+    assert (np.inf if plain is None else plain.cost) == pytest.approx(book.best(**listed)[0], abs=SAME)
+    assert plain is None or plain.status == "optimal"
+    if plain is None or plain.moves == 1 or others == 0:
+        return
+    same = {"moves": plain.moves, "novelty": 1.0 - novelty}
+    asked["unlike"] = [plain, *(tween for _ in range(others - 1) if (tween := join(engine, ends, **same)) is not None)]
+    listed |= {"unlike": [tween.path for tween in asked["unlike"]], "moves": [plain.moves]}
     found, (least, _) = join(engine, ends, **asked), book.best(**listed)
-    assert (np.inf if found is None else found.cost) == pytest.approx(least, abs=SAME)
-    assert found is None or found.status == "optimal"
+    assert (found is None) == (least == np.inf)
+    if found is not None:
+        assert found.lower_bound <= least + SAME <= found.cost + 2 * SAME
+        assert min(found.differs) >= listed["differ"]
 
 
 # --- the same problem, put in another way -----------------------------------------------------------------------------

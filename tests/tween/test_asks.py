@@ -27,12 +27,11 @@ from motionmind.geometry import rotations as rot
 from motionmind.search import astar
 from motionmind.search.bounding import PROVEN
 from motionmind.search.cfn import cfn
-from motionmind.search.problem import Problem, Via
+from motionmind.search.problem import Via
 from motionmind.search.sample import gibbs_sample
 from motionmind.search.solve import Certificate, Progress
 from motionmind.search.trellis import Trellis
 from motionmind.tween.engine import Engine
-from motionmind.tween.problem import penalise, shared_moves
 from motionmind.tween.result import Tween
 
 MOVES = 5
@@ -154,31 +153,6 @@ def test_a_restriction_never_lowers_the_cost_and_one_that_the_best_path_keeps_ch
 
 
 @settings(max_examples=60)
-@given(st.integers(0, 10_000), st.floats(0.1, 3.0))
-def test_moves_shared_with_others_cost_as_much_more_as_is_said(seed: int, diversity: float) -> None:
-    toy = random_toy(seed)
-    others: list[Int32s] = []
-    for _ in range(3):
-        dear = toy.edges
-        for path in others:
-            tables = [table.copy() for table in dear]
-            made = {(chain, a[chain], b[chain]) for a, b in pairwise(path) for chain in range(len(tables))}
-            for chain, state, target in made:
-                if state != target:
-                    tables[chain][state, target] += diversity
-            dear = tuple(tables)
-        expected = replace(toy, edges=dear).optima(MOVES)[1:].min()
-        found = solution(Problem(penalise(toy.model(), others, diversity), *toy.ends(), toy.rules(1, MOVES)))
-        if found is None:
-            assert expected == np.inf
-            return
-        assert found.cost == pytest.approx(expected, abs=2 * PROVEN)
-        shared = shared_moves(found.path, others)
-        assert toy.cost(found.path) + diversity * shared == pytest.approx(found.cost, abs=1e-9)
-        others.append(found.path)
-
-
-@settings(max_examples=60)
 @given(st.integers(0, 10_000))
 def test_states_by_other_numbers_cost_the_same(seed: int) -> None:
     toy = random_toy(seed)
@@ -246,11 +220,8 @@ def test_what_was_asked_is_in_the_written_problem(tmp_path: Path) -> None:
         toy = random_toy(seed, frustrated=seed % 2 == 0)
         rng = np.random.default_rng(seed)
         allowed = rng.random(sum(toy.sizes)) >= 0.15
-        model = penalise(
-            toy.model()._replace(allowed=allowed), [rng.integers(toy.sizes, size=(9, len(toy.sizes)))], 1.5
-        )
         vias = [Via(rng.integers(toy.sizes)) for _ in range(seed % 3)]
-        problem = Problem(model, *toy.ends(), toy.rules(2, MOVES), vias)
+        problem = toy.problem(toy.rules(2, MOVES), vias, allowed=allowed)
         found = solution(problem)
         if found is None:
             continue
@@ -452,18 +423,6 @@ def test_novelty_0_is_the_default_exactly_and_1_weighs_all_that_is_attested_alik
     assert join(engine, novelty=1.0).status == "optimal"
 
 
-def test_alternatives_differ_and_are_ranked(engine: Engine, plain: Tween) -> None:
-    found = [plain]
-    for _ in range(3):
-        found.append(join(engine, unlike=found, diversity=3.0))
-    assert all(a.cost <= b.cost + 1e-6 for a, b in pairwise(found))
-    assert all(tween.status == "optimal" for tween in found)
-    assert len({tween.path.tobytes() for tween in found}) == 4
-    for k, tween in enumerate(found):
-        assert tween.cost - 3.0 * tween.shared >= plain.cost - 1e-6
-        assert tween.shared == shared_moves(tween.path, [other.path for other in found[:k]])
-
-
 def test_a_path_is_drawn_by_its_seed_under_all_that_was_asked(engine: Engine, plain: Tween) -> None:
     asked = {"via": [posture("passe")], "pin": {"left_wrist": "A"}, "moves": 9}
     best, *drawn = join(engine, **asked), *(join(engine, sample=True, seed=seed, **asked) for seed in (1, 1, 2))
@@ -487,7 +446,7 @@ def test_without_coordination_joints_move_each_on_its_own(engine: Engine) -> Non
 def test_the_report_adds_up_to_the_cost_whatever_was_asked(engine: Engine, plain: Tween) -> None:
     for asked in (
         {"novelty": 0.7, "pin": {"left_wrist": "B"}},
-        {"unlike": [plain], "diversity": 3.0},
+        {"unlike": [plain], "differ": 0.3},
         {"via": [posture("passe")]},
         {"sample": True, "seed": 2},
         {"coordination": "none"},
@@ -531,7 +490,8 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
         ({"avoid": [("left_knee", "bent")]}, "avoid left_knee=bent: a state is given by its number, 0 to .*: straight"),
         ({"novelty": 1.5}, "novelty must be a number from 0 to 1, not 1.5"),
         ({"novelty": np.nan}, "novelty must be"),
-        ({"diversity": -1.0}, "diversity must be a number of nats"),
+        ({"differ": 1.5}, "differ must be a number from 0 to 1, not 1.5"),
+        ({"differ": np.nan}, "differ must be"),
         ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
         ({"coordination": "all"}, "coordination must be 'posture', 'progression' or 'none', not 'all'"),
         ({"memory": 10}, "memory of 10 bytes holds not one node"),

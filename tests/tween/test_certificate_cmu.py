@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from toys import random_toy, solution
 
-from motionmind.discretize import Codebook
-from motionmind.formats import read_motion
 from motionmind.grammar.progression import fit_progression
-from motionmind.retarget.retarget import own_skeleton
 from motionmind.search.cfn import cfn
 from motionmind.search.problem import Problem, Rules, with_waits
 from motionmind.search.solve import solve
@@ -25,15 +22,6 @@ PAIRS = 50
 FEW = 10
 SECONDS = 100  # that toulbar2 may take for one problem
 SAME = 1e-3  # nats; the written costs are rounded to 1e-6 each
-
-
-@pytest.fixture(scope="session")
-def cmu05(shared_data: Path) -> Engine:
-    """What is learned from twenty clips of one dancer, at 5 Hz and 15 degrees; each begins with an added T-pose."""
-    clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))]
-    if not clips:
-        pytest.skip(f"no clips in {shared_data / 'cmu-05'}")
-    return Engine.fit(clips, rate=5.0, skip=1, facing="free", discretization=Codebook(15.0))
 
 
 def toulbar2(path: Path) -> float:

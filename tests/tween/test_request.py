@@ -110,12 +110,12 @@ def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
     """They lack what came later, and may have what is gone."""
     old = ballet.tween(FIRST, PLIE).report()
     del old["asked"]["posturewise"]
-    for name in ("detail", "path_degrees", "vias", "shared", "length", "followed"):
+    for name in ("detail", "path_degrees", "vias", "differs", "length", "followed"):
         del old[name]
     del old["costs"]["guide"]
-    (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1}), "utf-8")
+    (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1, "shared": 0}), "utf-8")
     report = read_report(tmp_path / "old.json")
-    assert (report.cost, report.detail, report.shared) == (old["cost"], [], 0)
+    assert (report.cost, report.detail, report.differs) == (old["cost"], [], [])
 
 
 def test_a_motion_is_no_report(run: Run) -> None:

@@ -1,0 +1,271 @@
+"""Find the cheapest path that differs by enough from earlier paths, with a bound on all that do.
+
+Two paths of T moves differ by the share of the (T - 1) L states on the way that are not the same. To differ from K
+paths ties all states of a path together, so it is relaxed: to agree with path k at a move costs mu_k nats for each
+chain that does, one more cost of states by their move, and what may agree is refunded. For mu >= 0
+
+    D(mu) = min over x of  E(x) + sum over k of mu_k (agree_k(x) - allowed)
+
+is a lower bound on the cost of every path that agrees with each path k in `allowed` states at most. Any of these
+that is met, or that a path met is improved to, is an upper bound. D is concave, and each path x bounds it from above by
+a linear function of mu; the mu where the least of those found so far is greatest is tried next.
+
+Sources: Fisher, "The Lagrangian relaxation method for solving integer programming problems", Management Science 27(1),
+1981; Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8(4), 1960; for one earlier path it is the
+method of Handler and Zang, "A dual algorithm for the constrained shortest path problem", Networks 10(4), 1980.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Floats, Int32s, Ints
+from motionmind.errors import InfeasibleError
+from motionmind.search.bounding import PROVEN
+from motionmind.search.costs import path_cost
+from motionmind.search.polish import minimise_chain, minimise_moment
+from motionmind.search.problem import Problem, places
+from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
+from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
+
+ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three
+DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
+CHANGED = (0.0, 0.5, 1.0, 2.0)  # multiples of the prices at which it is improved
+LEARNING_RATE = 4.0  # of the weights of earlier paths, while a path is sought that differs from all
+
+
+class TooAlikeError(InfeasibleError):
+    """No path was found that differs by enough from all earlier ones.
+
+    Attributes:
+        most: no path differs from each of them by more than this share.
+    """
+
+    def __init__(self, most: float) -> None:
+        super().__init__(f"no path was found that differs by enough; no more than a share of {most:.3f} is possible")
+        self.most = most
+
+
+def difference(path: Int32s, other: Int32s) -> float:
+    """Return the share of states on the way that are not the same in two paths [T + 1, L]; 0 without a way."""
+    return float((path[1:-1] != other[1:-1]).mean()) if len(path) > 2 else 0.0
+
+
+def solve_apart(problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None = None) -> Certificate:
+    """Find the cheapest path that differs by at least a share from each of some earlier ones.
+
+    Args:
+        problem: what to solve, in a given number of moves T.
+        earlier: places of earlier paths [T + 1, L] each, at least one.
+        share: from 0 to 1.
+        watch: as for `solve`; its costs are those of paths that differ by enough.
+
+    Returns:
+        The certificate. Cost and bound are the problem's own, without any price of agreement. It is "optimal" where
+        they agree to 1e-6 nats; else it is "bounded", and the gap includes what the relaxation cannot close.
+
+    Raises:
+        InfeasibleError: no path satisfies the problem; a TooAlikeError if none was found that differs by so much.
+    """
+    began = perf_counter()
+    search = _Search(problem, earlier, share, watch)
+    search.run()
+    best, seconds = search.best, search.seconds
+    seconds["search"] += perf_counter() - began - sum(seconds.values())
+    status: Status = "bounded"
+    if best.cost - search.lower_bound <= PROVEN:
+        status = "optimal"
+    elif search.ended:
+        status = "interrupted"
+    effort = search.expansions, search.peak_nodes, seconds
+    return Certificate(best.states, best.cost, search.lower_bound, status, *effort, best.passed)
+
+
+class _Path(NamedTuple):
+    """A path: its states [T + 1, L], the moves at which it passes the vias, and its cost in nats."""
+
+    states: Int32s
+    passed: tuple[int, ...]
+    cost: float
+
+
+class _Cut(NamedTuple):
+    """An upper bound on D, `cost + mu @ excess`, in nats; by how many states the path agrees too often [K]."""
+
+    cost: float
+    excess: Floats
+
+
+class _Search:
+    """The state of one search.
+
+    Attributes:
+        best: the best path that differs by enough; its cost is infinite before there is one.
+        lower_bound: no path that differs by enough costs less, nats.
+        ended: whether whoever watches ended it.
+    """
+
+    def __init__(self, problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None) -> None:
+        model, moves, chains = problem.model, problem.rules.longest, len(problem.model.parents)
+        budget = max(problem.rules.node_budget // ROUNDS, 1)
+        self._problem = replace(problem, rules=replace(problem.rules, node_budget=budget))
+        self._earlier, self._watch = np.stack(earlier), watch
+        self._on_the_way = max(moves - 1, 0) * chains  # states
+        self._allowed = float(np.floor((1.0 - share) * self._on_the_way + 1e-9))  # the margin is for rounding
+        chain_of_row = np.repeat(np.arange(chains), np.diff(model.starts))
+        self._agreeing = (self._earlier[:, :, chain_of_row] == model.place).astype(np.float64)  # [K, T + 1, G]
+        self._agreeing[:, [0, -1]] = 0.0
+        timed = problem.timed_costs(moves)
+        self._timed = np.zeros_like(self._agreeing[0]) if timed is None else timed
+        self.best, self.lower_bound = _Path(np.zeros((0, chains), dtype=np.int32), (), np.inf), -np.inf
+        self.ended, self.expansions, self.peak_nodes = False, 0, 0
+        self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
+
+    def run(self) -> None:
+        """Try prices until the bound cannot rise, or it meets the best path, or the search is to end."""
+        prices = np.zeros(len(self._earlier))
+        self._take(self._find_far(), prices)
+        cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
+        for _ in range(ROUNDS):
+            found, refund = self._solve(prices), float(prices.sum()) * self._allowed
+            excess = self._excess(found.path)
+            self._take(found, prices)
+            self.lower_bound = min(max(self.lower_bound, found.lower_bound - refund), self.best.cost)
+            cuts.append(_Cut(found.cost - refund - float(prices @ excess), excess))
+            cuts.append(_Cut(self.best.cost, self._excess(self.best.states)))
+            prices, promised = _greatest(cuts)
+            if self.ended or min(promised, self.best.cost) - self.lower_bound <= PROVEN:
+                return
+
+    def _excess(self, states: Int32s) -> Floats:
+        """Return by how many states a path agrees too often with each earlier one [K]; negative where more may."""
+        same = places(self._problem.model, states)[1:-1] == self._earlier[:, 1:-1]
+        return np.asarray(same.sum(axis=(1, 2)) - self._allowed, dtype=np.float64)
+
+    def _solve(self, prices: Floats) -> Certificate:
+        """Solve the problem with a price on agreement with each earlier path [K]."""
+        timed = self._timed + np.tensordot(prices, self._agreeing, 1)
+        found = solve(_guided(self._problem, timed), self._watching if self._watch else None)
+        self.expansions += found.expansions
+        self.peak_nodes = max(self.peak_nodes, found.peak_nodes)
+        for part, seconds in found.seconds.items():
+            self.seconds[part] += seconds
+        return found
+
+    def _watching(self, so_far: Progress) -> bool:
+        if self._watch is not None and not self.ended:
+            so_far = Progress(self.best.cost, self.lower_bound, self.expansions + so_far.expansions)
+            self.ended = bool(self._watch(so_far))
+        return self.ended
+
+    def _find_far(self) -> Certificate:
+        """Find a path that differs by enough, whatever it costs.
+
+        Without costs and couplings, chains move each on its own and the least weighted agreement is found at once. It
+        bounds the least agreement that all may have in common; weights grow where paths agree too often.
+        """
+        model, rules = self._problem.model, self._problem.rules
+        free = {name: np.zeros_like(getattr(model, name)) for name in ("costs", "unary", "alone")}
+        model = model._replace(parents=np.full_like(model.parents, -1), **free)
+        rules = replace(rules, per_move=0.0, wait=rules.wait if np.isinf(rules.wait) else 0.0)
+        alone = replace(self._problem, model=model, rules=rules)
+        weights, least = np.full(len(self._earlier), 1.0 / len(self._earlier)), 0.0
+        for _ in range(ROUNDS):
+            found = solve(_guided(alone, np.tensordot(weights, self._agreeing, 1)))
+            excess = self._excess(found.path)
+            if self._on_the_way > 0 and np.all(excess <= 0.0):
+                return found
+            least = max(least, found.lower_bound)
+            if self._on_the_way == 0 or least > self._allowed + PROVEN:
+                break
+            weights *= np.exp(LEARNING_RATE * excess / self._on_the_way)
+            weights /= weights.sum()
+        raise TooAlikeError(1.0 - least / self._on_the_way if self._on_the_way > 0 else 0.0)
+
+    def _take(self, found: Certificate, prices: Floats) -> None:
+        """Make a path differ by enough, and improve it; keep it if it is the best."""
+        problem, path = _guided(self._problem, self._timed), found.path.copy()
+        stops, chains, cost = [0, *found.passed, len(path) - 1], path.shape[1], problem.rules.per_move * (len(path) - 1)
+        excess = self._excess(path)
+        for trellis, (first, last) in zip(segment_trellises(problem, stops), pairwise(stops), strict=True):
+            chosen = locate(trellis, path[first : last + 1])
+            chosen[:chains] = trellis.dom_ptr[:chains]  # a via, at which the segment before may arrive
+            variable = np.repeat(np.arange(len(chosen)), np.diff(trellis.dom_ptr))
+            rows = problem.model.starts[variable % chains] + trellis.dom
+            agreeing = self._agreeing[:, first + variable // chains, rows]
+            allowed = agreeing[:, chosen].sum(axis=1) - excess
+            cost += _improve(trellis, chosen, agreeing, allowed, prices)
+            excess = agreeing[:, chosen].sum(axis=1) - allowed
+            path[first + 1 : last + 1] = states_of(trellis, chosen)[1:]
+        if np.all(excess <= 0.0) and cost < self.best.cost:
+            self.best = _Path(path, found.passed, cost)
+
+
+def _guided(problem: Problem, timed: Floats) -> Problem:
+    """Return the problem with other costs of being in each state after each move, nats [T + 1, G]."""
+    return replace(problem, guide=lambda _: timed[1:-1])
+
+
+def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, prices: Floats) -> float:
+    """Improve a path of positions [n] in place, and return its cost in nats.
+
+    It is polished at rising prices until it agrees with each earlier path in no more states than are allowed. Then one
+    chain or moment after another is replaced by what is cheapest at other prices, where that is cheaper and allowed.
+
+    Args:
+        trellis: the problem.
+        chosen: the path.
+        agreeing: 1 where a position agrees with an earlier path, else 0 [K, P].
+        allowed: in how many states the path may agree [K].
+        prices: nats for each such state [K].
+    """
+
+    def excess(path: Ints) -> float:
+        return float(np.maximum(agreeing[:, path].sum(axis=1) - allowed, 0.0).sum())
+
+    steps: list[tuple[Callable[[Trellis, Ints, int], None], int]]
+    steps = [(minimise_chain, chain) for chain in range(trellis.chains)]
+    steps += [(minimise_moment, t) for t in range(1, trellis.moves + 1)]
+
+    def replacements(factors: Sequence[float]) -> Iterator[Ints]:
+        for factor in factors:
+            dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
+            for minimise, which in steps:
+                trial = chosen.copy()
+                minimise(dearer, trial, which)
+                yield trial
+
+    too_much = excess(chosen)
+    for trial in replacements(DEARER):
+        if too_much == 0.0:
+            break
+        if (less := excess(trial)) < too_much:
+            chosen[:], too_much = trial, less
+    cost, before = path_cost(trellis, chosen), np.inf
+    while cost < before - 1e-9:
+        before = cost
+        for trial in replacements(CHANGED):
+            if (least := path_cost(trellis, trial)) < cost and excess(trial) <= too_much:
+                chosen[:], cost = trial, least
+    return cost
+
+
+def _greatest(cuts: Sequence[_Cut]) -> tuple[Floats, float]:
+    """Return the prices [K] at which the least of some cuts is greatest, and its value there in nats."""
+    from scipy.optimize import linprog  # slow to import
+
+    excess = np.stack([cut.excess for cut in cuts])
+    count = excess.shape[1]
+    found = linprog(
+        np.append(np.zeros(count), -1.0),
+        np.column_stack([-excess, np.ones(len(cuts))]),
+        [cut.cost for cut in cuts],
+        bounds=[(0.0, None)] * count + [(None, None)],
+    )
+    return found.x[:-1], float(found.x[-1])
