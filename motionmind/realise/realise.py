@@ -24,7 +24,9 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, timeline
 
-FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
+# Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
+# between two frames, and elsewhere.
+FIRMLY, FREELY = 0.95, 3.0
 
 
 def realise(
@@ -139,7 +141,7 @@ def _bounds(
 ) -> Floats:
     """Return how far each chain may be off its state at each move [T + 1, L], radians.
 
-    It is the chain's tolerance where something is asked of it. Elsewhere it is FREELY times as much, and what the walk
+    It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
     is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
     movement.
     """
@@ -149,7 +151,7 @@ def _bounds(
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
         nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
         beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
-    return np.where(wished, tolerances, FREELY * tolerances + beyond)
+    return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
 
 
 def _bend_to_states(

@@ -237,7 +237,7 @@ REPORT = [
     "attested",
     "bridges",
     "waits",
-    "shared",
+    "differs",
     "vias",
     "snap_degrees",
     "path_degrees",
