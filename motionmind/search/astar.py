@@ -30,11 +30,15 @@ from motionmind.search.trellis import Trellis
 SAME = 1e-9
 KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
 
-_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED = range(6)  # entries of the tally
+FEWEST_BUCKETS = 1 << 10
+_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _BUCKETS = range(7)  # entries of the tally
 
 
 class _Nodes(NamedTuple):
-    """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above."""
+    """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above.
+
+    Memory is written to only as it is needed: most searches need little of it.
+    """
 
     var: Int32s  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each chain, as an index into its domain [N, L]
@@ -44,7 +48,7 @@ class _Nodes(NamedTuple):
     children: Int32s  # number of children in memory [N]
     slot: Int32s  # place in the heap, -1 where closed [N]
     following: Int32s  # next node of the same bucket, -1 at the end [N]
-    bucket: Int32s  # first node of each bucket [a power of two]
+    bucket: Int32s  # first node of each bucket; the first _BUCKETS, a power of two, are in use
     heap: Int32s  # open nodes, a binary heap [N]
     free: Int32s  # stack of unused nodes [N]; of those never used yet, the first _FRESH, nothing is written
     tally: Ints
@@ -151,11 +155,13 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
-        np.full(buckets, -1, np.int32),
+        np.empty(buckets, np.int32),
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
-        np.zeros(6, np.int64),
+        np.zeros(7, np.int64),
     )
+    nodes.tally[_BUCKETS] = min(buckets, FEWEST_BUCKETS)
+    nodes.bucket[: nodes.tally[_BUCKETS]] = -1
     nodes.tally[_FREE] = nodes.tally[_FRESH] = budget - 1
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
     nodes.var[0], nodes.f[0], nodes.key[0] = trellis.chains - 1, bound, bound
@@ -270,7 +276,7 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
     for k in range(nodes.frontier.shape[1]):
         h = (h ^ np.uint64(choice if k == chain else nodes.frontier[node, k])) * np.uint64(1099511628211)
     h ^= h >> np.uint64(32)
-    return int(h & np.uint64(len(nodes.bucket) - 1))
+    return int(h & np.uint64(nodes.tally[_BUCKETS] - 1))
 
 
 @jit
@@ -290,10 +296,26 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 
 
 @jit
+def _widen(nodes: _Nodes) -> None:
+    """Take twice as many buckets into use; the nodes of each stay or move to the one that is as far into the new."""
+    count = nodes.tally[_BUCKETS]
+    nodes.tally[_BUCKETS] = 2 * count
+    for home in range(count):
+        node = nodes.bucket[home]
+        nodes.bucket[home] = nodes.bucket[count + home] = -1
+        while node >= 0:
+            after, chain = nodes.following[node], nodes.var[node] % nodes.frontier.shape[1]
+            now = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
+            nodes.following[node] = nodes.bucket[now]
+            nodes.bucket[now] = node
+            node = after
+
+
+@jit
 def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, key: float) -> None:
     """Add an open child of `node`."""
     nodes.tally[_FREE] -= 1
-    if nodes.tally[_FREE] < nodes.tally[_FRESH]:  # memory is touched only as it is needed: most searches need little
+    if nodes.tally[_FREE] < nodes.tally[_FRESH]:
         nodes.tally[_FRESH] = nodes.tally[_FREE]
         child = len(nodes.free) - 1 - nodes.tally[_FREE]
     else:
@@ -305,6 +327,8 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, 
     nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
     nodes.parent[child], nodes.children[child] = node, 0
     nodes.children[node] += 1
+    if nodes.tally[_NODES] > nodes.tally[_BUCKETS]:
+        _widen(nodes)
     home = _hash(nodes, child, var, choice, chain)
     nodes.following[child] = nodes.bucket[home]
     nodes.bucket[home] = child
