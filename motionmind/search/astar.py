@@ -43,7 +43,7 @@ class _Nodes(NamedTuple):
     var: Int32s  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each chain, as an index into its domain [N, L]
     f: Floats  # cost so far + bound on the cost to go [N]
-    key: Floats  # order of the open list: f, or the greater f backed up from forgotten children [N]
+    key: Floats  # order of the open list: f but for the slack, or the greater f backed up from forgotten children [N]
     parent: Int32s  # [N]
     children: Int32s  # number of children in memory [N]
     slot: Int32s  # place in the heap, -1 where closed [N]
@@ -59,6 +59,7 @@ def search(
     trellis: Trellis,
     heuristic: Heuristic,
     cost: float,
+    slack: float,
     path: Ints,
     budget: int,
     expansions: int,
@@ -70,6 +71,8 @@ def search(
         trellis: the problem.
         heuristic: the bound on the cost to go.
         cost: what a path has to be cheaper than, nats.
+        slack: nats by which the best path found may exceed the bound then proven; between nodes whose f differs by less
+            the deeper goes first, or among many paths of the same cost all would be tried for the last digit.
         path: receives the best path of positions, if one is found [n].
         budget: nodes held at most.
         expansions: nodes expanded at most.
@@ -80,17 +83,18 @@ def search(
         and the greatest number of nodes held.
     """
     nodes = _root(trellis, from_start(heuristic), budget)
-    lower = cost
+    known = lower = cost
     while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
-        if nodes.key[node] >= cost - SAME:
+        if nodes.key[node] >= cost - (slack if cost < known else SAME):
+            lower = nodes.key[node]
             break
         if nodes.tally[_EXPANDED] >= expansions or (ended[0] and nodes.tally[_EXPANDED] > 0):
             lower = nodes.key[node]
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(trellis, heuristic, nodes, node, cost, path)
+        cost, complete = _expand(trellis, heuristic, nodes, node, cost, slack, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -100,7 +104,7 @@ def search(
 
 @jit
 def _expand(
-    trellis: Trellis, heuristic: Heuristic, nodes: _Nodes, node: int, cost: float, path: Ints
+    trellis: Trellis, heuristic: Heuristic, nodes: _Nodes, node: int, cost: float, slack: float, path: Ints
 ) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`.
 
@@ -114,9 +118,9 @@ def _expand(
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
         f = nodes.f[node] + step(trellis, heuristic, i, nodes.frontier[node], e)
-        key = max(f, floor)
-        if key >= cost - SAME:
+        if max(f, floor) >= cost - SAME:
             continue
+        key = f if f > floor + slack else floor
         choice = x - trellis.dom_ptr[i]
         if i == len(trellis.dom_ptr) - 2:
             cost = f
@@ -358,11 +362,13 @@ def _drop(nodes: _Nodes, node: int) -> None:
 
 @jit
 def _before(nodes: _Nodes, a: int, b: int) -> bool:
-    """Order nodes by key, the deeper first among equals, then the one of lower number: ties are deterministic."""
+    """Order nodes by key, then the deeper first, then by f, then by number: ties are deterministic."""
     if nodes.key[a] != nodes.key[b]:
         return bool(nodes.key[a] < nodes.key[b])
     if nodes.var[a] != nodes.var[b]:
         return bool(nodes.var[a] > nodes.var[b])
+    if nodes.f[a] != nodes.f[b]:
+        return bool(nodes.f[a] < nodes.f[b])
     return a < b
 
 
