@@ -22,6 +22,8 @@ from motionmind.search.polish import polish
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, locate
+from motionmind.tween.engine import Engine
+from motionmind.tween.problem import build_model
 
 MOVES = 6
 PROVEN = 2 * bounding.PROVEN
@@ -167,6 +169,17 @@ def test_where_the_bound_is_tight_the_search_walks_straight_to_the_goal() -> Non
         if found is not None:
             straight += found.expansions == (len(found.path) - 1) * len(toy.sizes)
     assert straight > 50
+
+
+def test_many_paths_of_the_same_cost_do_not_lead_it_astray() -> None:
+    """Chains of bundled ballet that nothing couples, all attested moves alike, in more moves than they need."""
+    engine = Engine.load("ballet")
+    model, rng = build_model(engine.grammar, "conditional", 0.0, 1.0, novelty=1.0), np.random.default_rng(0)
+    for _ in range(10):
+        start, goal = engine.states[rng.integers(len(engine.states), size=2)].astype(np.int64)
+        found = solve.solve(Problem(model, start, goal, Rules(1.0, 1.0, 12, 12, 200_000)))
+        assert found.status == "optimal"
+        assert found.expansions == 12 * len(start)
 
 
 # --- what proves it --------------------------------------------------------------------------------------------------
