@@ -29,8 +29,8 @@ from motionmind.search.trellis import Trellis
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
 KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
+FEWEST_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
 
-FEWEST_BUCKETS = 1 << 10
 _FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _BUCKETS = range(7)  # entries of the tally
 
 
