@@ -19,6 +19,7 @@ from motionmind.errors import MotionMindWarning
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
     from motionmind.tween.result import Tween
+    from motionmind.tween.what_if import WhatIf
 
 
 class Notes(logging.Handler):
@@ -106,9 +107,22 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+    lines += [("without", format_what_if(one, result.request.kappa)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
+
+
+def format_what_if(one: WhatIf, kappa: float) -> str:
+    """Format what a restriction costs a tween with this factor of its guide: "hold neck: 12.400 nats and 1 move less"."""
+    nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
+    if one.proven:
+        nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
+    if kappa > 0.0 and not one.guided:
+        nats += ", guide left out,"
+    moves = count(abs(one.moves), "move")
+    change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
+    return f"{one.without}: {nats}{change}"
 
 
 def print_written(files: Sequence[Path]) -> None:

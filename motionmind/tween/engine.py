@@ -27,6 +27,7 @@ from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
+from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
 FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
@@ -86,6 +87,14 @@ class Engine(LearnedCorpus):
         formulation = formulate(self, a, b, request, before, after)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
+        what_if: tuple[WhatIf, ...] = ()
+        if request.what_if:
+
+            def answer(other: TweenRequest) -> Answer:
+                freed = formulate(self, a, b, other, before, after)
+                return Answer(other, freed.searched, self._find_path(freed, watch))
+
+            what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
         if request.sample and len(certificate.path) > 1:
             certificate = sample_path(formulation.searched, certificate, request.seed)
         realising = perf_counter()
@@ -97,7 +106,7 @@ class Engine(LearnedCorpus):
             "search": certificate.seconds["search"],
             "realise": perf_counter() - realising,
         }
-        return self._account_for(formulation, certificate, motion, detail, seconds)
+        return self._account_for(formulation, certificate, motion, detail, seconds, what_if)
 
     def alternatives(
         self,
@@ -113,7 +122,8 @@ class Engine(LearnedCorpus):
     ) -> Iterator[Tween]:
         """Find the best movement, then others with as many moves, each of which differs from all before by `differ`.
 
-        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it.
+        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it. What
+        restrictions cost (`what_if`) is reported of the first.
 
         Args:
             a: where the motion starts, exactly.
@@ -141,8 +151,12 @@ class Engine(LearnedCorpus):
         request = TweenRequest.of(request, **options)
         found: list[Tween] = []
         for number in range(count):
-            change = {"seed": request.seed + number} if request.sample else {"unlike": (*request.unlike, *found)}
-            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **change))
+            other: dict[str, Any] = {"unlike": (*request.unlike, *found)}
+            if request.sample:
+                other = {"seed": request.seed + number}
+            if found:
+                other["what_if"] = False
+            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **other))
             yield found[-1]
 
     def _find_path(self, formulation: Formulation, watch: Watch | None) -> Certificate:
@@ -207,6 +221,7 @@ class Engine(LearnedCorpus):
         motion: Motion,
         detail: Ints,
         seconds: dict[str, float],
+        what_if: tuple[WhatIf, ...],
     ) -> Tween:
         """Return the answer: a path and its motion with their certificate, costs and provenance."""
         request, searched = formulation.request, formulation.searched
@@ -238,6 +253,7 @@ class Engine(LearnedCorpus):
             bridges=bridges,
             waits=waits,
             differs=tuple(difference(path, other.path) for other in request.unlike),
+            what_if=what_if,
             passed=certificate.passed,
             snap_degrees=formulation.snap_degrees[[0, -1]],
             path_degrees=path_degrees,

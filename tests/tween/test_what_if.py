@@ -1,0 +1,125 @@
+"""What each restriction costs: against the same tween without it, and on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import Run
+
+from motionmind.cli.printing import format_what_if
+from motionmind.corpus.bundled import bundled
+from motionmind.errors import MotionMindError
+from motionmind.formats import read_posture
+from motionmind.search.bounding import PROVEN
+from motionmind.search.solve import Progress
+from motionmind.tween.engine import Engine
+from motionmind.tween.report import read_report
+from motionmind.tween.what_if import WhatIf
+
+POSTURES = bundled("corpora") / "ballet" / "postures"
+A, B, PASSE = POSTURES / "arabesque.json", POSTURES / "fifth.json", POSTURES / "passe.json"
+ENDS = read_posture(A), read_posture(B)
+SAME = 4 * PROVEN
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+def without(asked: dict[str, Any], name: str) -> dict[str, Any]:
+    """The same request without what a name says."""
+    kind, _, rest = name.partition(" ")
+    if kind == "pin":
+        joint = rest.partition("=")[0]
+        return asked | {"pin": {other: end for other, end in asked["pin"].items() if other != joint}}
+    if kind == "hold":
+        return asked | {"hold": [other for other in asked["hold"] if other != rest]}
+    if kind == "avoid":
+        return asked | {"avoid": [pair for pair in asked["avoid"] if f"{pair[0]}={pair[1]}" != rest]}
+    if kind == "via":
+        return asked | {"via": []}
+    return asked | {"moves": None, "duration": None}
+
+
+@pytest.mark.parametrize("budget", [1, 200_000])
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"moves": 7, "pin": {"left_wrist": "A", "right_knee": "B"}, "avoid": [("left_knee", "plie 56")]},
+        {"via": [read_posture(PASSE)], "pin": {"left_hip": "B"}},
+        {"duration": 3.0, "pin": {"left_hip": "A"}, "strict": True},
+        {"moves": (6, 9), "guide": 0.0, "coordination": "progression"},
+    ],
+)
+def test_a_price_is_the_difference_to_the_tween_without_the_restriction(
+    ballet: Engine, asked: dict[str, Any], budget: int
+) -> None:
+    found = ballet.tween(*ENDS, what_if=True, node_budget=budget, **asked)
+    kinds = {"moves" if key == "duration" else key for key in asked} & {"pin", "hold", "avoid", "via", "moves"}
+    assert {one.without.split()[0].replace("duration", "moves") for one in found.what_if} == kinds
+    for one in found.what_if:
+        freed = ballet.tween(*ENDS, **without(asked, one.without))
+        best = ballet.tween(*ENDS, **asked)
+        assert one.moves == freed.moves - found.moves
+        if not one.guided and found.request.kappa:
+            assert one.moves != 0 or "duration" in one.without
+            unguided = {"guide": 0.0, "moves": best.moves}
+            best = ballet.tween(*ENDS, **asked | unguided)
+            freed = ballet.tween(*ENDS, **without(asked, one.without) | unguided | {"moves": freed.moves})
+        assert 0.0 <= one.least <= one.most
+        assert one.least - SAME <= best.cost - freed.cost <= one.most + SAME
+        assert one.proven == (one.most - one.least <= 2 * PROVEN)
+
+
+def test_a_held_joint_has_its_price(ballet: Engine) -> None:
+    clip = ballet.corpus.motion(ballet.corpus.clips[0])
+    a, b = clip.posture(0), clip.posture(6)
+    states = ballet.space.assign(ballet.corpus.to_chains(clip.rotations[[0, 6]]))
+    joints = [joint for joint, *ends in zip(ballet.space.names, *states, strict=True) if ends[0] == ends[1]]
+    found = ballet.tween(a, b, hold=joints[:2], moves=6, what_if=True)
+    assert [one.without for one in found.what_if] == [f"hold {joints[0]}", f"hold {joints[1]}", "moves 6"]
+
+
+def test_nothing_is_reported_unless_it_is_asked_for(ballet: Engine) -> None:
+    assert ballet.tween(*ENDS, moves=6).what_if == ()
+    assert ballet.tween(*ENDS, what_if=True).what_if == ()
+    first, second = ballet.alternatives(*ENDS, 2, moves=6, what_if=True)
+    assert (len(first.what_if), len(second.what_if)) == (1, 0)
+    with pytest.raises(MotionMindError, match="asked of the best tween"):
+        ballet.tween(*ENDS, unlike=[first], what_if=True)
+
+
+def test_an_interrupted_search_prices_nothing(ballet: Engine) -> None:
+    calls: list[Progress] = []
+    found = ballet.tween(*ENDS, moves=6, what_if=True, watch=lambda so_far: calls.append(so_far) or True)  # type: ignore[func-returns-value]
+    assert found.what_if == () or found.status == "optimal"
+
+
+@pytest.mark.parametrize(
+    ("one", "kappa", "text"),
+    [
+        (WhatIf("hold neck", 12.4, 12.4, True, -1, False), 0.0, "hold neck: 12.400 nats and 1 move less"),
+        (WhatIf("via 1", 10.1, 12.4, False, 0, True), 1.0, "via 1: at least 10.100, at most 12.400 nats less"),
+        (WhatIf("pin neck=A", 0.0, 1e-9, True, 0, True), 1.0, "pin neck=A: no nats less"),
+        (WhatIf("moves 8", 5.0, 5.0, True, 2, False), 1.0, "moves 8: 5.000 nats, guide left out, less, 2 moves more"),
+    ],
+)
+def test_a_price_in_words(one: WhatIf, kappa: float, text: str) -> None:
+    assert format_what_if(one, kappa) == text
+
+
+def test_the_command_line_prints_a_line_for_each_restriction_and_the_report_has_them(run: Run) -> None:
+    asked = ("--what-if", "--pin", "left_wrist", "--via", f"{PASSE}@4", "--moves", 8)
+    ran = run("tween", A, B, "--corpus", "ballet", *asked, "--report", "r.json")
+    assert ran.code == 0, ran.err
+    lines = [line[10:] for line in ran.out.splitlines() if line.startswith("without   ")]
+    report = read_report(Path("r.json"))
+    assert [one.without for one in report.what_if] == ["pin left_wrist=A", "via 1 at move 4", "moves 8"]
+    assert lines == [format_what_if(one, 1.0) for one in report.what_if]
+    assert json.loads(Path("r.json").read_text())["what_if"][1].keys() == {
+        *("without", "least", "most", "proven", "moves", "guided"),
+    }
