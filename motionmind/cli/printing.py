@@ -114,15 +114,13 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
 
 
 def format_what_if(one: WhatIf, kappa: float) -> str:
-    """Format what a restriction costs a tween with this factor of its guide: "hold neck: 12.400 nats and 1 move less"."""
+    """Format what a restriction costs a tween whose guide has this factor: "hold neck: 12.400 nats and 1 move less"."""
     nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
     if one.proven:
         nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
-    if kappa > 0.0 and not one.guided:
-        nats += ", guide left out,"
     moves = count(abs(one.moves), "move")
     change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
-    return f"{one.without}: {nats}{change}"
+    return f"{one.without}: {nats}{change}{' (costs without the guide)' * (kappa > 0.0 and not one.guided)}"
 
 
 def print_written(files: Sequence[Path]) -> None:
