@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from command_line import Run
+from toys import best, random_toy
 
+from motionmind._typing import Floats
 from motionmind.cli.printing import format_what_if
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.search.bounding import PROVEN
+from motionmind.search.solve import solve
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import read_report
-from motionmind.tween.what_if import WhatIf
+from motionmind.tween.request import TweenRequest
+from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 
 POSTURES = bundled("corpora") / "ballet" / "postures"
 A, B, PASSE = POSTURES / "arabesque.json", POSTURES / "fifth.json", POSTURES / "passe.json"
 ENDS = read_posture(A), read_posture(B)
 SAME = 4 * PROVEN
+MOVES = 5
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +47,47 @@ def without(asked: dict[str, Any], name: str) -> dict[str, Any]:
     if kind == "via":
         return asked | {"via": []}
     return asked | {"moves": None, "duration": None}
+
+
+def check_prices_on_toy(seed: int, gap: float) -> list[bool]:
+    """Check what it costs chain 0 to avoid a state in a given number of moves; return which prices are proven.
+
+    Certificates are off by up to `gap` nats, as those of searches that ended early.
+    """
+    toy, rng = random_toy(seed, frustrated=True), np.random.default_rng(seed)
+    costs = rng.uniform(-2.0, 3.0, (MOVES - 1, sum(toy.sizes)))
+    free = rng.random(sum(toy.sizes)) >= 0.1
+    avoiding = free & (np.arange(len(free)) != 0)
+    asked = TweenRequest(moves=MOVES, avoid=[("chain0", 0)])
+
+    def guide(moves: int) -> Floats:
+        return costs[: moves - 1]
+
+    def answer(request: TweenRequest) -> Answer:
+        rules = toy.rules(*((1, MOVES) if request.moves is None else request.move_range))
+        problem = toy.problem(rules, guide=guide, allowed=avoiding if request.avoid else free)
+        found, (dearer, lower) = solve(problem), gap * rng.random(2)
+        return Answer(request, problem, replace(found, cost=found.cost + dearer, lower_bound=found.lower_bound - lower))
+
+    if best(toy, [MOVES], avoiding, [], guide) == np.inf:
+        return []
+    found = find_what_if(answer(asked), answer)
+    assert [one.without for one in found] == ["avoid chain0=0", f"moves {MOVES}"]
+    for one, allowed, counts in zip(found, (free, avoiding), ([MOVES], range(1, MOVES + 1)), strict=True):
+        assert one.guided == (one.moves == 0)
+        judge = guide if one.guided else None
+        freed = best(toy, [MOVES] if one.guided else counts, allowed, [], judge)
+        assert one.least - SAME <= best(toy, [MOVES], avoiding, [], judge) - freed <= one.most + SAME
+        assert one.least >= 0.0
+    return [bool(one.proven) for one in found]
+
+
+def test_on_toys_the_true_difference_lies_between_the_bounds() -> None:
+    exact = [proven for seed in range(100) for proven in check_prices_on_toy(seed, gap=0.0)]
+    early = [proven for seed in range(100) for proven in check_prices_on_toy(seed, gap=1.0)]
+    assert all(exact)
+    assert len(exact) == len(early) > 50
+    assert 0.0 < np.mean(early) < 0.9  # those of other lengths are searched anew
 
 
 @pytest.mark.parametrize("budget", [1, 200_000])
