@@ -11,7 +11,8 @@ that is met, or that a path met is improved to, is an upper bound. D is concave,
 a linear function of mu; the mu where the least of those found so far is greatest is tried next.
 
 Sources: Fisher, "The Lagrangian relaxation method for solving integer programming problems", Management Science 27(1),
-1981; Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8(4), 1960; for one earlier path it is the
+1981; Batra, Yadollahpour, Guzman-Rivera and Shakhnarovich, "Diverse M-best solutions in Markov random fields", ECCV
+2012; Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8(4), 1960; for one earlier path it is the
 method of Handler and Zang, "A dual algorithm for the constrained shortest path problem", Networks 10(4), 1980.
 """
 
