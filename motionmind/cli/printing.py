@@ -172,7 +172,10 @@ def _shares(result: Tween) -> str:
 
 
 def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
-    """Print alternative tweens, a line each, with the share by which each differs from those above."""
+    """Print alternative tweens, a line each, with the share by which each differs from those above.
+
+    What restrictions cost the first follows, where that was asked.
+    """
     click.echo(
         "    moves  seconds      cost  at least     gap  proven       attested  bridged  differs from those above"
     )
@@ -184,6 +187,8 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
             f"{len(result.bridges):7}  {differs}"
         )
         click.echo(line.rstrip())
+    for one in results[0].what_if:
+        click.echo(f"without   {format_what_if(one, results[0].request.kappa)}")
     print_written(files)
 
 

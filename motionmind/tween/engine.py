@@ -298,12 +298,14 @@ class Engine(LearnedCorpus):
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
     """Return the error that says that no path differs by enough from those of a request's tweens to differ from."""
     count, moves = len(request.unlike), len(request.unlike[0].path) - 1
+    diagnosis = {"differ": request.differ, "most": most}
+    if moves < 2:
+        return NoPathError(
+            f"in {moves} move{'s' * (moves != 1)} nothing on the way can differ; ask for more", diagnosis
+        )
     others = "the earlier one" if count == 1 else f"each of {count} earlier ones"
-    return NoPathError(
-        f"no path of {moves} move{'s' * (moves != 1)} was found that differs by {request.differ:.1%} from {others}; "
-        f"none can by more than {most:.1%}",
-        {"differ": request.differ, "most": most},
-    )
+    found = f"no path of {moves} moves was found that differs by {request.differ:.1%} from {others}"
+    return NoPathError(f"{found}; none can by more than {most:.1%}", diagnosis)
 
 
 def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:

@@ -1,4 +1,4 @@
-"""What each restriction costs: the same request without it, searched again, and the two certificates compared."""
+"""The price of each restriction: the same request without it is searched again, and the two certificates compared."""
 
 from __future__ import annotations
 
