@@ -106,7 +106,8 @@ def _gains(rows: list[Row]) -> str:
 def _interval(row: Row | None) -> str:
     if row is None:
         return ""
-    return f"{100 * row['gain']:.1f} ({100 * row['least']:.1f} to {100 * row['most']:.1f})"
+    spread = f"{100 * row['least']:.1f} to {100 * row['most']:.1f}" if row["families"] > 1 else "one family"
+    return f"{100 * row['gain']:.1f} ({spread})"
 
 
 def _windows(rows: list[Row]) -> str:

@@ -66,7 +66,8 @@ def main() -> None:
     warm_up(model, np.asarray(engine.states))
     pairs = list(joinable(model, np.asarray(engine.states), options.pairs, options.seed))
     found = prove(model, pairs)
-    prove_moves(engine, pairs[: options.moves])
+    if options.moves:
+        prove_moves(engine, pairs[: options.moves])
     few = list(zip(pairs[: options.few], found, strict=False))
     trade(model, [ends for ends, _ in few], options.plot)
     compare_solvers(model, few, engine.grammar.chains)

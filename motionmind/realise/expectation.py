@@ -1,4 +1,4 @@
-"""What walks through a corpus expect of a movement between two postures: where each joint is, and where the body faces.
+"""The expectation of walks through a corpus, between two postures: where each joint is, and where the body faces.
 
 The search takes it as its guide, before any path is known; the motion takes it again, of walks near the path.
 """
@@ -21,7 +21,7 @@ from motionmind.realise.stops import Stop, moments_rates
 
 
 class Expectation(NamedTuple):
-    """What walks expect at T moves and midway between them: the half steps.
+    """The expectation of walks at T moves and midway between them: the half steps.
 
     Attributes:
         half_steps: times [2 T + 1], seconds.
@@ -72,7 +72,7 @@ def expect(
         ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
         turn, spread = moves @ carriage.turn, moves @ carriage.turn**2
-        headings = turn_with_walks(turn, spread, half_steps, facing, (ends[0], ends[1]))
+        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]))
     else:
         headings = rot.heading(walk.poses[:, 0])
     return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust)

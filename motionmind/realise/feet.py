@@ -9,6 +9,7 @@ recordings than those that experiments/inbetween reports.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -35,6 +36,7 @@ def plant_feet(
     clearance: Floats,
     stands: Floats,
     loose: Bools,
+    fixed: Bools,
     fps: float,
     given: Floats,
 ) -> tuple[Floats, Floats]:
@@ -54,6 +56,7 @@ def plant_feet(
         stands: how firmly each limb, and last the trunk, is to stand where it is low, between frames
             [N - 1, limbs + 1], from 0 to 1.
         loose: joints without limits [J].
+        fixed: joints that must not change [J]; nor do the others of their leg, whose foot then stands as it may.
         fps: frames a second.
         given: times of postures that must not change, in frames, whole or not, from the first frame to the last [G].
             The frames next to them do not change either.
@@ -69,7 +72,10 @@ def plant_feet(
     lift = heights - low.min(axis=1)
     root[:, 1] += lift
     low += lift[:, None]
-    sunk = _sink_depth(low, stands)
+    free = [not fixed[leg].any() for leg, _ in legs]
+    rests = stands.copy()
+    rests[:, [number for number, bends in zip(numbers, free, strict=True) if not bends]] = 1.0  # it cannot bend
+    sunk = _sink_depth(low, rests)
     for start, end in pairwise(given):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
@@ -79,7 +85,7 @@ def plant_feet(
             root[part, 1] -= sink
             under = np.maximum(heights[part, None] - (low[part][:, numbers] - sink[:, None]), 0.0)
             stretch = rotations[part], root[part], floor[part], under, stands[part.start : part.stop - 1, numbers]
-            rotations[part], root[part] = _plant_stretch(skeleton, legs, *stretch, loose, fps)
+            rotations[part], root[part] = _plant_stretch(skeleton, legs, *stretch, loose, free, fps)
     return rotations, stand(skeleton, rotations, root, heights)
 
 
@@ -92,23 +98,25 @@ def _plant_stretch(
     under: Floats,
     stands: Floats,
     loose: Bools,
+    free: Sequence[bool],
     fps: float,
 ) -> tuple[Floats, Floats]:
     """Return rotations and root of three frames or more with planted feet; the first and the last do not change.
 
-    Arguments are those of `plant_feet`, of the legs alone; each leg is also lifted by as much as it is `under` the
-    height at which the body stands [N, legs], metres.
+    Arguments are those of `plant_feet`, of the legs alone, of which those that are `free` may bend; each leg is also
+    lifted by as much as it is `under` the height at which the body stands [N, legs], metres.
     """
     turned = skeleton.global_rotations(rotations)
     places = skeleton.positions_and_tips(rotations, root)
     # Both ends of each foot's last bone: one that turns on its ball or on its tip stands.
     ends = [places[:, [leg[-1], leg[-1] + len(skeleton)]] for leg, _ in legs]
     heights = [end[..., 1] - floor[:, None] + lifted[:, None] for end, lifted in zip(ends, under.T, strict=True)]
-    off = np.empty((len(rotations), len(legs), 3))
-    for foot, end in enumerate(ends):
+    off = np.zeros((len(rotations), len(legs), 3))
+    feet = [foot for foot, bends in enumerate(free) if bends]
+    for foot in feet:
         others = [height.min(axis=1) for other, height in enumerate(heights) if other != foot]
         others_stand = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
-        off[:, foot] = departure(end, heights[foot], stands[:, foot], others_stand, fps)
+        off[:, foot] = departure(ends[foot], heights[foot], stands[:, foot], others_stand, fps)
         heights[foot] = heights[foot] + off[:, foot, 1:2]
         off[:, foot, 1] += under[:, foot]
     # Hip, knee, and the point that they bring to its place: the next joint, or the tip.
@@ -123,7 +131,7 @@ def _plant_stretch(
         planted[:, knee] = rot.inv_mul(thigh, shank)
         if end < len(skeleton):
             planted[:, end] = rot.inv_mul(shank, turned[:, end])
-    joints = [joint for leg, _ in legs for joint in leg]
+    joints = [joint for foot in feet for joint in legs[foot][0]]
     out = rotations.copy()
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
     return out, root + moved

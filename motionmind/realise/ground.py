@@ -10,6 +10,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry.splines import natural_spline
 from motionmind.realise.feet import plant_feet
+from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory
 
 
@@ -21,9 +22,11 @@ def set_on_floor(
     clearance: Floats,
     stands: Floats,
     loose: Bools,
+    fixed: Bools,
     low: Mapping[int, float],
     drift: Floats,
     ends: tuple[Floats, Floats],
+    rates: tuple[Floats | None, Floats | None],
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
 
@@ -36,10 +39,12 @@ def set_on_floor(
         stands: how firmly each limb, and last the trunk, stands where it is low, at the half steps
             [2 T + 1, limbs + 1], from 0 to 1.
         loose: joints without limits [J].
+        fixed: joints that must not change for the feet's sake [J].
         low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
             with the first and the last.
         drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
         ends: the first and the last position of the root [3], metres.
+        rates: its first and its last velocity [3], metres a second; None where unknown.
     """
     given = 2 * np.array(list(low))
     floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
@@ -51,11 +56,24 @@ def set_on_floor(
     middles = 0.5 * (times[1:] + times[:-1])
     held = np.stack([np.interp(middles, half_steps, limb) for limb in stands.T], axis=1)
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
-    root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends)
+    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends), times, rates)
     fps = 1.0 / (times[1] - times[0])
-    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fps, fps * half_steps[given])
+    frames = fps * half_steps[given]
+    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fixed, fps, frames)
     root[0], root[-1] = ends
     return rotations, root
+
+
+def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
+    """Return positions of the root [N, 3] that leave the first and arrive at the last with the given level velocities.
+
+    Feet that stand near an end do not know how the body passes it, and may carry it elsewhere.
+    """
+    steps, level = np.diff(root, axis=0) / (times[1] - times[0]), np.array([1.0, 0.0, 1.0])
+    first, last = (
+        None if rate is None else level * (rate - step) for rate, step in zip(rates, steps[[0, -1]], strict=True)
+    )
+    return np.asarray(root + departure(times, first, last))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats) -> Floats:

@@ -17,6 +17,7 @@ RUN = 0.5  # seconds for which a body that turns goes on turning
 def turn_with_walks(
     turn: Floats,
     spread: Floats,
+    trust: Floats,
     half_steps: Floats,
     facing: Mapping[int, Floats],
     rates: tuple[float | None, float | None],
@@ -27,18 +28,21 @@ def turn_with_walks(
     variance V the share M^2 / (M^2 + V) is taken, the linear estimate of least mean square error. Walks that turn do so
     for about RUN seconds, so V counts steps that vary together for as long. The turn still missing to each facing is
     distributed over the steps in proportion to their variance, as in the mean of normal variables given their sum; of
-    all facings that differ by whole turns, the nearest is meant. A body that turns at an end does so there, too.
+    all facings that differ by whole turns, the nearest is meant. As far as walks are not trusted, the body does not
+    turn with them, and distributes what is missing evenly. A body that turns at an end does so there, too.
 
     Args:
         turn: mean turn of the walks in each step [2 T], radians.
         spread: mean square of the same [2 T].
+        trust: how far walks are trusted in each step [2 T], from 0 to 1.
         half_steps: times of the steps' ends [2 T + 1], seconds.
         facing: the rotations [4] that the headings meet, by the number of moves; with the first and the last.
         rates: turning at the first and at the last, radians a second; None where it is unknown.
     """
     varies = np.maximum(spread - turn**2, 1e-4)
     variance = varies.sum() * RUN * len(turn) / (half_steps[-1] - half_steps[0])
-    turn = turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
+    turn = trust * turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
+    varies = trust * varies + (1.0 - trust) * varies.mean()
     out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     for start, end in pairwise(2 * move for move in facing):
         missing = rot.heading(facing[end // 2]) - out[end]
@@ -50,11 +54,13 @@ def turn_with_walks(
     first, last = (
         None if rate is None else np.asarray(rate - step) for rate, step in zip(rates, steps[[0, -1]], strict=True)
     )
-    return np.asarray(out + departure(half_steps, first, last))
+    moves = [*facing]
+    until = half_steps[2 * moves[1]], half_steps[2 * moves[-2]]
+    return np.asarray(out + departure(half_steps, first, last, until))
 
 
-def correct_headings(headings: Floats, centres: Floats, within: float) -> Floats:
-    """Return what to add to headings [K] to be `within` radians of the `centres` of states [K], without a leap.
+def correct_headings(headings: Floats, centres: Floats, within: Floats) -> Floats:
+    """Return what to add to headings [K] to be `within` radians [K] of the `centres` of states [K], without a leap.
 
     Where both turn on opposite ways the corrections come to a whole turn, and stay there.
     """

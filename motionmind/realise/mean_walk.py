@@ -18,7 +18,6 @@ from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.minimal import departure, minimal_movement, trust
 from motionmind.realise.stops import Rates, Stop
 from motionmind.realise.walks import (
-    ENDS_WITHIN,
     FOLLOWS_WITHIN,
     LEAVES_WITHIN,
     SIZES,
@@ -27,6 +26,7 @@ from motionmind.realise.walks import (
     likelihood,
     squared_differences,
     squared_distances,
+    variance_at_ends,
 )
 
 
@@ -164,7 +164,7 @@ def _part_marginals(
     for k, stop in enumerate(ends):
         off = squared_distances(shown, stop.chains[part])
         nearest[k] = np.sqrt(off.min())
-        near[-k] = likelihood(off / ENDS_WITHIN**2, *_rate_terms(part, rates, stop))
+        near[-k] = likelihood(off / variance_at_ends(off), *_rate_terms(part, rates, stop))
     near[0] *= carriage.weights
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
     marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, near)

@@ -13,26 +13,31 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
 LASTS = 0.45  # seconds for which a velocity at an end is felt at most
-FAR = 0.85  # how far the corpus may be, as a share of the way to go, is 1 / FAR where walks are trusted by half
+FAR = 1.6  # walks are trusted by half where the corpus is as far as 1 / FAR of the way to go
+UNLIKE = 0.45  # radians a joint (root mean square): as far as that the corpus holds another posture altogether
 SHARPLY = 4  # power by which trust falls beyond that
-NO_WAY = 1e-6  # radians a joint: nothing to go
+NO_WAY = 1e-3  # radians a joint: nothing to go, but for the rounding of files
 
 
-def departure(times: Floats, leaving: Floats | None, arriving: Floats | None) -> Floats:
+def departure(
+    times: Floats, leaving: Floats | None, arriving: Floats | None, until: tuple[float, float] | None = None
+) -> Floats:
     """Return the cubic that is 0 at both ends and has the given rates there: [S + 1, ...].
 
-    Each rate is felt for LASTS seconds, or for as long as the whole lasts.
+    Each rate is felt for LASTS seconds at most.
 
     Args:
         times: increasing [S + 1], seconds.
         leaving: rate at the first time [...], units a second; None for 0.
         arriving: rate at the last.
+        until: the time by which the first is over, and that before which the last is not felt; None for the whole.
     """
-    within = min(LASTS, float(times[-1] - times[0]))
-    begin, end = times - times[0], times[-1] - times
+    over, begins = until or (times[-1], times[0])
+    begin, end = (times - times[0], over - times[0]), (times[-1] - times, times[-1] - begins)
     out = np.zeros(1)
-    for since, rate, sign in ((begin, leaving, 1.0), (end, arriving, -1.0)):
+    for (since, most), rate, sign in ((begin, leaving, 1.0), (end, arriving, -1.0)):
         if rate is not None:
+            within = min(LASTS, most)
             felt = sign * since * np.maximum(1.0 - since / within, 0.0) ** 2
             out = out + felt.reshape(-1, *(1,) * np.ndim(rate)) * rate
     return np.asarray(out)
@@ -59,11 +64,15 @@ def minimal_movement(ends: Floats, times: Floats, leaving: Floats | None, arrivi
 def trust(nearest: Floats, way: float) -> float:
     """Return the share of what walks of a part of the body add that is to be trusted, from 0 to 1.
 
-    It is 1 / (1 + (FAR r)^SHARPLY), with r the distance of the ends from the corpus's nearest postures, on average,
-    over the distance from one end to the other. Where there is no way to go, nothing is added.
+    It is 1 / (1 + (FAR d / way)^SHARPLY) / (1 + (d / UNLIKE)^SHARPLY), with d the distance of the ends from the
+    corpus's nearest postures, on average, and the way that from one end to the other. Where there is no way to go,
+    nothing is added.
 
     Args:
         nearest: distance of each end from the corpus's nearest posture of the part [2], radians a joint.
         way: distance from one end to the other, radians a joint.
     """
-    return float(1.0 / (1.0 + (FAR * nearest.mean() / way) ** SHARPLY)) if way > NO_WAY else 0.0
+    if way < NO_WAY:
+        return 0.0
+    off = float(nearest.mean())
+    return 1.0 / (1.0 + (FAR * off / way) ** SHARPLY) / (1.0 + (off / UNLIKE) ** SHARPLY)

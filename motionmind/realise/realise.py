@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +24,10 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, timeline
 
+# Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
+# between two frames, and elsewhere.
+FIRMLY, FREELY = 0.95, 3.0
+
 
 def realise(
     path: Int32s,
@@ -32,7 +36,9 @@ def realise(
     corpus: Corpus,
     grammar: Grammar,
     carriage: Carriage,
-    within: Floats,
+    tolerances: Floats,
+    wished: Bools,
+    fixed: Bools,
     fps: float,
     length: float | None = None,
     through: Mapping[int, Posture] = MappingProxyType({}),
@@ -49,9 +55,9 @@ def realise(
     (`motionmind.realise.detail`).
 
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
-    stands. The legs hold what one root cannot (`motionmind.realise.feet`). The lowest point stays as far above the
-    floor as in the corpus's postures; the floor is at 0, or lower under ends that are lower, or higher under ends
-    higher than the corpus knows of such postures.
+    stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
+    lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
+    are lower, or higher under ends higher than the corpus knows of such postures.
 
     Args:
         path: states of the chains [T + 1, L].
@@ -60,7 +66,9 @@ def realise(
         corpus: the movement that was learned from.
         grammar: what was learned of its states.
         carriage: how its bodies hold themselves, travel and stand.
-        within: radians within which each chain is of its state at each move [L].
+        tolerances: radians within which a state of each chain stands for an orientation [L].
+        wished: chains of which more is asked than that they go from `a` to `b` [L].
+        fixed: those of them that do not move for the feet's sake either [L].
         fps: frames a second; the whole is stretched by less than a frame so that `b` falls on one.
         length: duration, seconds, to which frames are fitted; None for as long as the corpus takes.
         through: postures on the way, by the number of moves that lead there, increasing.
@@ -79,10 +87,11 @@ def realise(
     stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage)
+    within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
-    rotations = _with_rates(rotations, clock.frames, leaving, arriving)
+    rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     rotations = _limit(rotations, postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -95,11 +104,11 @@ def realise(
         size * (walk.moments @ carriage.clearance),
         walk.moments @ carriage.stands,
         carriage.loose,
+        fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
-        _drift_with_rates(
-            size * travel_along(walk.moves @ carriage.travel, walk.headings), walk.half_steps, leaving, arriving
-        ),
+        size * travel_along(walk.moves @ carriage.travel, walk.headings),
         (a.root, b.root),
+        (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
     )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
@@ -121,6 +130,30 @@ def _walk_near(
     return expect(corpus, carriage, stops, half_steps, path)
 
 
+def _bounds(
+    walk: Expectation,
+    path: Int32s,
+    clock: Timeline,
+    corpus: Corpus,
+    grammar: Grammar,
+    tolerances: Floats,
+    wished: Bools,
+) -> Floats:
+    """Return how far each chain may be off its state at each move [T + 1, L], radians.
+
+    It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
+    is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
+    movement.
+    """
+    chains, starts = walk.chains(corpus, clock.moves), grammar.transitions.starts
+    beyond = np.empty(path.shape)
+    for chain, tolerance in enumerate(tolerances):
+        centres = grammar.centres[starts[chain] : starts[chain + 1]]
+        nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
+        beyond[:, chain] = np.maximum(nearest - tolerance, 0.0)
+    return np.where(wished, FIRMLY * tolerances, FREELY * tolerances + beyond)
+
+
 def _bend_to_states(
     walk: Expectation,
     states: Floats,
@@ -129,7 +162,7 @@ def _bend_to_states(
     corpus: Corpus,
     within: Floats,
 ) -> Expectation:
-    """Return a walk bent so that each chain is `within` radians [L] of its state [T + 1, L, 4] at each move.
+    """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
 
     The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
     """
@@ -138,13 +171,13 @@ def _bend_to_states(
     poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
     missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
     far = np.linalg.norm(missing, axis=-1, keepdims=True)
-    bends = missing * np.maximum(1.0 - within[:joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
+    bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
     poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
     headings = walk.headings
     if corpus.facing == "free":
         at_moves, centres = natural_spline(walk.half_steps, headings, clock.moves), rot.heading(states[:, -1])
         centres[~inner] = at_moves[~inner]
-        bent = correct_headings(at_moves, centres, float(within[-1]))
+        bent = correct_headings(at_moves, centres, within[:, -1])
         headings = headings + natural_spline(clock.moves, bent, walk.half_steps)
     return walk._replace(poses=poses, headings=headings)
 
@@ -167,24 +200,21 @@ def _add_detail(
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 
-def _with_rates(rotations: Floats, times: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
-    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities."""
+def _with_rates(
+    rotations: Floats, clock: Timeline, stops: Sequence[int], leaving: Velocity | None, arriving: Velocity | None
+) -> Floats:
+    """Return rotations [N, J, 4] that leave their first frame and arrive at their last with the given velocities.
+
+    They do not change at the moves of the `stops` nor between those on the way.
+    """
+    times = clock.frames
     turned = rot.log(rot.inv_mul(rotations[[0, -2]], rotations[[1, -1]])) / (times[1] - times[0])
     first = None if leaving is None else leaving.rotations - turned[0]
     last = None if arriving is None else arriving.rotations - turned[1]
     if first is None and last is None:
         return rotations
-    return rot.mul(rotations, rot.exp(departure(times, first, last)))
-
-
-def _drift_with_rates(drift: Floats, half_steps: Floats, leaving: Velocity | None, arriving: Velocity | None) -> Floats:
-    """Return level displacements in each half step [2 T, 3], metres, that begin and end at the given velocities."""
-    level, seconds = np.array([1.0, 0.0, 1.0]), np.diff(half_steps)
-    first = None if leaving is None else level * leaving.root - drift[0] / seconds[0]
-    last = None if arriving is None else level * arriving.root - drift[-1] / seconds[-1]
-    if first is None and last is None:
-        return drift
-    return np.asarray(drift + np.diff(departure(half_steps, first, last), axis=0))
+    until = clock.moves[stops[1]], clock.moves[stops[-2]]
+    return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

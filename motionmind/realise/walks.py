@@ -21,7 +21,10 @@ from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
-ENDS_WITHIN = 0.09  # radians a joint, standard deviation: how near a walk's ends are to the given postures
+# How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
+# between them a share of the distance of the corpus's nearest posture. Where movement recurs the nearest know best.
+ENDS_WITHIN = 0.03, 0.09
+OF_NEAREST = 0.75
 LEAVES_WITHIN = 1.0  # radians a second a joint, the same: how near its velocities there are to the given ones
 TURNS_WITHIN = 1.0  # radians a second, the same of the body's turning
 TRAVELS_WITHIN = 0.5  # metres a second, the same of its travel
@@ -55,6 +58,16 @@ def squared_differences(rates: Floats, rate: Floats) -> Floats:
             for k in range(3):
                 out[i] += (rates[i, j, k] - rate[j, k]) ** 2
     return out / len(rate)
+
+
+def variance_at_ends(squared_distances: Floats) -> float:
+    """Return the variance of a walk's end about the given posture, radians^2.
+
+    Args:
+        squared_distances: of the corpus's moments from the posture [N], radians^2 a joint.
+    """
+    nearest = float(np.sqrt(squared_distances.min()))
+    return float(np.clip(OF_NEAREST * nearest, *ENDS_WITHIN)) ** 2
 
 
 def likelihood(*terms: Floats) -> Floats:

@@ -29,22 +29,26 @@ from motionmind.search.trellis import Trellis
 # Costs closer than this, in nats, are the same: sums of the same numbers in another order differ by far less.
 SAME = 1e-9
 KEPT = 0.75  # share of the memory that is kept when it is full; more costs time, less makes more nodes anew
+FEWEST_BUCKETS = 1 << 10  # of the hash table; their number grows with the nodes
 
-_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED = range(6)  # entries of the tally
+_FREE, _FRESH, _HEAPED, _NODES, _PEAK, _EXPANDED, _BUCKETS = range(7)  # entries of the tally
 
 
 class _Nodes(NamedTuple):
-    """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above."""
+    """Up to N nodes, the open list and the hash table that finds nodes. `tally` holds the counters above.
+
+    Memory is written to only as it is needed: most searches need little of it.
+    """
 
     var: Int32s  # the last variable that is fixed [N]
     frontier: NDArray[np.uint16]  # last choice in each chain, as an index into its domain [N, L]
     f: Floats  # cost so far + bound on the cost to go [N]
-    key: Floats  # order of the open list: f, or the greater f backed up from forgotten children [N]
+    key: Floats  # order of the open list: f but for the slack, or the greater f backed up from forgotten children [N]
     parent: Int32s  # [N]
     children: Int32s  # number of children in memory [N]
     slot: Int32s  # place in the heap, -1 where closed [N]
     following: Int32s  # next node of the same bucket, -1 at the end [N]
-    bucket: Int32s  # first node of each bucket [a power of two]
+    bucket: Int32s  # first node of each bucket; the first _BUCKETS, a power of two, are in use
     heap: Int32s  # open nodes, a binary heap [N]
     free: Int32s  # stack of unused nodes [N]; of those never used yet, the first _FRESH, nothing is written
     tally: Ints
@@ -55,6 +59,7 @@ def search(
     trellis: Trellis,
     heuristic: Heuristic,
     cost: float,
+    slack: float,
     path: Ints,
     budget: int,
     expansions: int,
@@ -66,6 +71,8 @@ def search(
         trellis: the problem.
         heuristic: the bound on the cost to go.
         cost: what a path has to be cheaper than, nats.
+        slack: nats by which the best path found may exceed the bound then proven; between nodes whose f differs by less
+            the deeper goes first, or among many paths of the same cost all would be tried for the last digit.
         path: receives the best path of positions, if one is found [n].
         budget: nodes held at most.
         expansions: nodes expanded at most.
@@ -76,17 +83,18 @@ def search(
         and the greatest number of nodes held.
     """
     nodes = _root(trellis, from_start(heuristic), budget)
-    lower = cost
+    known = lower = cost
     while nodes.tally[_HEAPED] > 0:
         node = nodes.heap[0]
-        if nodes.key[node] >= cost - SAME:
+        if nodes.key[node] >= cost - (slack if cost < known else SAME):
+            lower = nodes.key[node]
             break
         if nodes.tally[_EXPANDED] >= expansions or (ended[0] and nodes.tally[_EXPANDED] > 0):
             lower = nodes.key[node]
             break
         _close(nodes, node)
         nodes.tally[_EXPANDED] += 1
-        cost, complete = _expand(trellis, heuristic, nodes, node, cost, path)
+        cost, complete = _expand(trellis, heuristic, nodes, node, cost, slack, path)
         if not complete:
             lower = min(nodes.key[node], nodes.key[nodes.heap[0]] if nodes.tally[_HEAPED] else np.inf)
             break
@@ -96,7 +104,7 @@ def search(
 
 @jit
 def _expand(
-    trellis: Trellis, heuristic: Heuristic, nodes: _Nodes, node: int, cost: float, path: Ints
+    trellis: Trellis, heuristic: Heuristic, nodes: _Nodes, node: int, cost: float, slack: float, path: Ints
 ) -> tuple[float, bool]:
     """Generate the children of a node that may lead below `cost`.
 
@@ -110,9 +118,9 @@ def _expand(
     for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
         x = trellis.row_to[e]
         f = nodes.f[node] + step(trellis, heuristic, i, nodes.frontier[node], e)
-        key = max(f, floor)
-        if key >= cost - SAME:
+        if max(f, floor) >= cost - SAME:
             continue
+        key = f if f > floor + slack else floor
         choice = x - trellis.dom_ptr[i]
         if i == len(trellis.dom_ptr) - 2:
             cost = f
@@ -151,11 +159,13 @@ def _root(trellis: Trellis, bound: float, budget: int) -> _Nodes:
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
-        np.full(buckets, -1, np.int32),
+        np.empty(buckets, np.int32),
         np.empty(budget, np.int32),
         np.empty(budget, np.int32),
-        np.zeros(6, np.int64),
+        np.zeros(7, np.int64),
     )
+    nodes.tally[_BUCKETS] = min(buckets, FEWEST_BUCKETS)
+    nodes.bucket[: nodes.tally[_BUCKETS]] = -1
     nodes.tally[_FREE] = nodes.tally[_FRESH] = budget - 1
     nodes.tally[_NODES] = nodes.tally[_PEAK] = 1
     nodes.var[0], nodes.f[0], nodes.key[0] = trellis.chains - 1, bound, bound
@@ -270,7 +280,7 @@ def _hash(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
     for k in range(nodes.frontier.shape[1]):
         h = (h ^ np.uint64(choice if k == chain else nodes.frontier[node, k])) * np.uint64(1099511628211)
     h ^= h >> np.uint64(32)
-    return int(h & np.uint64(len(nodes.bucket) - 1))
+    return int(h & np.uint64(nodes.tally[_BUCKETS] - 1))
 
 
 @jit
@@ -290,10 +300,26 @@ def _find(nodes: _Nodes, node: int, var: int, choice: int, chain: int) -> int:
 
 
 @jit
+def _widen(nodes: _Nodes) -> None:
+    """Take twice as many buckets into use; the nodes of each stay or move to the one that is as far into the new."""
+    count = nodes.tally[_BUCKETS]
+    nodes.tally[_BUCKETS] = 2 * count
+    for home in range(count):
+        node = nodes.bucket[home]
+        nodes.bucket[home] = nodes.bucket[count + home] = -1
+        while node >= 0:
+            after, chain = nodes.following[node], nodes.var[node] % nodes.frontier.shape[1]
+            now = _hash(nodes, node, nodes.var[node], nodes.frontier[node, chain], chain)
+            nodes.following[node] = nodes.bucket[now]
+            nodes.bucket[now] = node
+            node = after
+
+
+@jit
 def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, key: float) -> None:
     """Add an open child of `node`."""
     nodes.tally[_FREE] -= 1
-    if nodes.tally[_FREE] < nodes.tally[_FRESH]:  # memory is touched only as it is needed: most searches need little
+    if nodes.tally[_FREE] < nodes.tally[_FRESH]:
         nodes.tally[_FRESH] = nodes.tally[_FREE]
         child = len(nodes.free) - 1 - nodes.tally[_FREE]
     else:
@@ -305,6 +331,8 @@ def _add(nodes: _Nodes, node: int, var: int, choice: int, chain: int, f: float, 
     nodes.var[child], nodes.f[child], nodes.key[child] = var, f, key
     nodes.parent[child], nodes.children[child] = node, 0
     nodes.children[node] += 1
+    if nodes.tally[_NODES] > nodes.tally[_BUCKETS]:
+        _widen(nodes)
     home = _hash(nodes, child, var, choice, chain)
     nodes.following[child] = nodes.bucket[home]
     nodes.bucket[home] = child
@@ -334,11 +362,13 @@ def _drop(nodes: _Nodes, node: int) -> None:
 
 @jit
 def _before(nodes: _Nodes, a: int, b: int) -> bool:
-    """Order nodes by key, the deeper first among equals, then the one of lower number: ties are deterministic."""
+    """Order nodes by key, then the deeper first, then by f, then by number: ties are deterministic."""
     if nodes.key[a] != nodes.key[b]:
         return bool(nodes.key[a] < nodes.key[b])
     if nodes.var[a] != nodes.var[b]:
         return bool(nodes.var[a] > nodes.var[b])
+    if nodes.f[a] != nodes.f[b]:
+        return bool(nodes.f[a] < nodes.f[b])
     return a < b
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.search import astar, heuristic, pair_chains
 from motionmind.search.attention import Attention
-from motionmind.search.bounding import Bounded, tighten_by_pair_chains
+from motionmind.search.bounding import HAIR, PROVEN, Bounded, tighten_by_pair_chains
 from motionmind.search.costs import path_cost
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.polish import polish
@@ -68,8 +68,9 @@ def _search_at_once(state: Bounded, nodes: int, budget: int, attention: Attentio
     if budget <= 0 or (state.closed and not state.found):
         return Effort()
     chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
+    slack = PROVEN + 2.0 * HAIR if state.closed else astar.SAME
     cost, lower_bound, expansions, held = attention.run(
-        astar.search, state.trellis, state.heuristic, state.limit, chosen, nodes, budget
+        astar.search, state.trellis, state.heuristic, state.limit, slack, chosen, nodes, budget
     )
     if cost < state.limit:
         state.take(path_cost(state.trellis, chosen), states_of(state.trellis, chosen), lower_bound)

@@ -10,9 +10,9 @@ import numpy as np
 
 from motionmind._typing import Int32s
 from motionmind.errors import InfeasibleError
-from motionmind.search import parts, trws
+from motionmind.search import bounding, parts, trws
 from motionmind.search.attention import Attention, Clock
-from motionmind.search.bounding import HAIR, MOST_PAIRS, PROVEN, Bounded, tighten
+from motionmind.search.bounding import HAIR, PROVEN, Bounded, tighten
 from motionmind.search.heuristic import Heuristic
 from motionmind.search.pieces import Pieces
 from motionmind.search.problem import Problem, Rules
@@ -184,7 +184,7 @@ class _Solver:
                 return
             state = self._bounded(piece, below)
             more = len(state.heuristic.tables.pair_cost)
-            if (state.found or not state.closed) and pairs + more <= MOST_PAIRS:
+            if (state.found or not state.closed) and pairs + more <= bounding.MOST_PAIRS:
                 self.kept[piece] = state
                 pairs += more
             self._update(piece, state)

@@ -14,6 +14,7 @@ from motionmind._typing import Bools, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
 from motionmind.errors import InfeasibleError, NoPathError
+from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.realise import realise
@@ -30,8 +31,7 @@ from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
-FREELY = 3.0  # tolerances by which a chain of which nothing is asked may be off its state, at a move
-SAME_ANGLE = 1e-3  # degrees: a movement that was bent to within a tolerance is within it to this
+SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -206,7 +206,9 @@ class Engine(LearnedCorpus):
             self.corpus,
             self.grammar,
             self.carriage,
-            np.radians(self.space.tolerances * np.where(formulation.wished, 1.0, FREELY)),
+            np.radians(self.space.tolerances),
+            formulation.wished,
+            formulation.constrained,
             request.fps,
             request.duration,
             dict(zip(certificate.passed, formulation.through, strict=True)),
@@ -239,8 +241,9 @@ class Engine(LearnedCorpus):
         )
         motion = _with_bridges(motion, bridges)
         moves = self.corpus.moves
-        reached = self.corpus.to_chains(motion.at(motion.insertions[0].times).rotations)
-        path_degrees = self.space.distance(reached, path)
+        # A curve through the frames: a move may fall between two, and the arc between them is a chord.
+        reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
+        path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         return Tween(
             motion=motion,

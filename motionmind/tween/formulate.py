@@ -82,9 +82,15 @@ class Formulation:
     @property
     def wished(self) -> Bools:
         """Which chains the request asks something of, beside the ends and the length, so that it should be seen [L]."""
-        request, chains = self.request, self.problem.model.starts[:-1]
+        request = self.request
         if request.unlike or request.sample or request.novelty or not request.kappa:
-            return np.ones(len(chains), dtype=np.bool_)
+            return np.ones(len(self.constrained), dtype=np.bool_)
+        return self.constrained
+
+    @property
+    def constrained(self) -> Bools:
+        """Which chains may not be in all of their states on the way [L]."""
+        chains = self.problem.model.starts[:-1]
         allowed = np.logical_and.reduce([constraint.allowed for constraint in self.constraints], axis=0)
         return np.add.reduceat(~np.broadcast_to(allowed, self.problem.model.allowed.shape), chains) > 0
 

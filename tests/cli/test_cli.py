@@ -24,23 +24,10 @@ from motionmind.geometry import rotations as rot
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
 REPORT = {
-    *("asked", "shared", "vias"),
-    *("status", "cost", "lower_bound", "gap", "moves", "expansions", "peak_nodes", "node_budget", "seconds", "joints"),
-    *(
-        "path",
-        "attested",
-        "bridges",
-        "waits",
-        "snap_degrees",
-        "path_degrees",
-        "detail",
-        "sources",
-        "times",
-        "names",
-        "degrees",
-        "likelihood",
-    ),
-    *("costs", "asked", "vias", "shared"),
+    *("asked", "status", "cost", "lower_bound", "gap", "moves", "length"),
+    *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
+    *("attested", "bridges", "waits", "differs", "vias", "snap_degrees", "path_degrees", "followed", "sources"),
+    *("detail", "times", "names", "degrees", "likelihood", "costs"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 

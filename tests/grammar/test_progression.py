@@ -300,6 +300,33 @@ def written_cost(text: dict[str, Any], model: Model, path: Int32s, passed: tuple
     return total
 
 
+def test_a_guide_over_moves_is_paid_on_the_way_and_the_optimum_is_that_of_toulbar2(tmp_path: Path) -> None:
+    pytoulbar2 = pytest.importorskip("pytoulbar2", reason="toulbar2 is not installed: no outside solver")
+    checked = 0
+    for seed in range(60):
+        toy, (start, goal) = body(seed), ends_of(seed)
+        model, _ = toy.of_moves(goal, 0.7, 1.0)
+        rng = np.random.default_rng(seed)
+        guides = [rng.uniform(-2.0, 3.0, (max(moves - 1, 0), model.starts[-1])) for moves in range(MOVES + 1)]
+        vias = [Via(rng.integers(toy.sizes))] * (seed % 2)
+        problem = Problem(model, start, goal, Rules(np.inf, 0.3, 1, MOVES, 100_000), vias, guides.__getitem__)
+        found = solution(problem)
+        if found is None:
+            continue
+        moves, chains = len(found.path) - 1, [f"chain{chain}" for chain in range(len(toy.sizes))]
+        problem = replace(problem, vias=[Via(via.states, t) for via, t in zip(vias, found.passed, strict=True)])
+        plain = json.loads(cfn(replace(problem, guide=None), moves, chains))
+        paid = sum(guides[moves][t, model.starts[:-1] + states].sum() for t, states in enumerate(found.path[1:-1]))
+        cost = written_cost(plain, model, found.path, found.passed, chains) + paid
+        assert cost == pytest.approx(found.cost, abs=1e-4), seed
+        (tmp_path / "problem.cfn").write_text(cfn(problem, moves, chains))
+        network = pytoulbar2.CFN(verbose=-1)
+        network.Read(str(tmp_path / "problem.cfn"))
+        assert network.Solve()[1] == pytest.approx(found.cost, abs=1e-4), seed
+        checked += moves > 1
+    assert checked > 10
+
+
 def word(state: int, place: int) -> str:
     return f"s{state}" if state == place else f"m{state}_s{place}"
 

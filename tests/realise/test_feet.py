@@ -42,7 +42,9 @@ def sway(seconds: float = 1.2, size: float = 0.12, travel: float = 0.0, fps: flo
 
 def planted(q: Floats, root: Floats, fps: float = 30.0, given: Sequence[float] = ()) -> tuple[Floats, Floats]:
     zero = np.zeros(len(q))
-    return plant_feet(human23(), q, root, zero, zero, stands(q), TIGHT, fps, np.array(given or [0.0, len(q) - 1.0]))
+    return plant_feet(
+        human23(), q, root, zero, zero, stands(q), TIGHT, TIGHT, fps, np.array(given or [0.0, len(q) - 1.0])
+    )
 
 
 def stands(q: Floats, skeleton: Skeleton | None = None) -> Floats:
@@ -67,7 +69,7 @@ def test_feet_that_are_to_slide_are_let_slide() -> None:
     q, root = sway(size=0.05)
     zero = np.zeros(len(q))
     found, went = plant_feet(
-        human23(), q, root, zero, zero, 0.0 * stands(q), TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
+        human23(), q, root, zero, zero, 0.0 * stands(q), TIGHT, TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
     )
     before, after = (human23().positions(*one)[:, LEGS][..., [0, 2]] for one in ((q, root), (found, went)))
     assert np.abs(after - before).max() < 0.003  # what a knee yields where one foot is lower
@@ -86,7 +88,7 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     standing = stands(q)
     standing[:, [number for number, leg in enumerate(limbs_of(skeleton)) if knee in leg]] = 0.2
     found, went = plant_feet(
-        skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
+        skeleton, q, root, *np.zeros((2, len(q))), standing, TIGHT, TIGHT, 30.0, np.array([0.0, len(q) - 1.0])
     )
     assert abs(went[18, 1] - went[0, 1]) < 0.1 * abs(root[18, 1] - root[0, 1])
     assert np.ptp(went[:, 1]) < 0.3 * np.ptp(root[:, 1])  # near the ends it begins to
@@ -216,7 +218,7 @@ def test_a_body_without_legs_stays_as_it_is() -> None:
     rod = Skeleton("rod", ("a", "b"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     q, root = np.tile(rot.IDENTITY, (5, 2, 1)), np.arange(15.0).reshape(5, 3)
     found, went = plant_feet(
-        rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), TIGHT[:2], 30.0, np.array([0.0, 4.0])
+        rod, q, root, np.zeros(5), np.zeros(5), stands(q, rod), TIGHT[:2], TIGHT[:2], 30.0, np.array([0.0, 4.0])
     )
     np.testing.assert_array_equal(found, q)
     np.testing.assert_array_equal(went, root * np.array([1.0, 0.0, 1.0]))  # on the floor

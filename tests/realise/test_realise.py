@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,6 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
-from motionmind.realise.headings import turn_with_path
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
 from motionmind.realise.realise import realise
@@ -239,12 +239,25 @@ def learned(motion: Motion, facing: Facing = "free", rate: float | None = None) 
 
 
 def realised(
-    known: Learned, rows: list[int], a: Posture, b: Posture, fps: float = 30.0, within: Floats | None = None
+    known: Learned,
+    rows: list[int],
+    a: Posture,
+    b: Posture,
+    fps: float = 30.0,
+    within: float = np.pi,
+    **options: Any,
 ) -> Motion:
-    """The motion along postures `rows` of the corpus."""
-    motion, _ = realise(
-        known.states[rows], a, b, known.corpus, known, known.carriage, fps, within=within  # type: ignore[arg-type]
-    )  # fmt: skip
+    """The motion along postures `rows` of the corpus, each chain `within` radians of its states."""
+    path = known.states[rows]
+    return realised_path(known, path, a, b, fps, within, **options)
+
+
+def realised_path(
+    known: Learned, path: Int32s, a: Posture, b: Posture, fps: float, within: float, **options: Any
+) -> Motion:
+    tolerances, none = np.full(path.shape[1], within), np.zeros(path.shape[1], dtype=np.bool_)
+    learned = known.corpus, known, known.carriage
+    motion, _ = realise(path, a, b, *learned, tolerances, ~none, none, fps, **options)  # type: ignore[arg-type]
     return motion
 
 
@@ -270,15 +283,18 @@ def test_the_ends_are_a_and_b_bit_by_bit_and_frames_are_even(walking: Learned, r
     assert abs(found.times[-1] - durations(walking.states[rows], walking.transitions).sum()) <= 0.5 / fps + 1e-9
 
 
-def test_a_path_that_is_followed_is_in_its_states_at_each_move(walking: Learned) -> None:
+def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Learned) -> None:
+    """But for the legs, which feet that stand may bend; and the path is not followed closer than that."""
     motion, rows = walk(), [5, 6, 7, 20, 21, 30, 8, 9]
-    for within in (1e-6, np.radians(5.0)):
-        found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, np.full(23, within))
+    carried = np.setdiff1d(np.arange(23), parts_of(human23())[1][1:])
+    for within in (1e-6, np.radians(5.0), np.radians(12.0)):
+        # The moves of this path fall on frames.
+        found = realised(walking, rows, motion.posture(5), motion.posture(9), 60.0, within)
         at = found.at(found.insertions[0].times)
-        chains = [walking.corpus.to_chains(q)[:, :23] for q in (at.rotations, motion.rotations[rows])]
-        # Between two frames the spline is not the arc that `at` takes; a frame is 1 / 60 s.
-        assert rot.angle(*chains).max() < within + 0.02
-    assert rot.angle(*chains).max() > 0.02
+        chains = [walking.corpus.to_chains(q)[:, carried] for q in (at.rotations, motion.rotations[rows])]
+        off = rot.angle(*chains)
+        assert off.max() < within + 1e-6
+        assert off.max() > 0.99 * within
 
 
 def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:
@@ -326,10 +342,11 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     root[10:13, 1] += 0.25
     known = learned(replace(jumping, root=root))
     grounded, rows = walk(), list(range(5, 18))
-    found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, np.full(23, 1e-6))
+    found = realised(known, rows, grounded.posture(5), grounded.posture(17), 5.0, 1e-6)
     heights = lowest_height(human23(), found.rotations, found.root)
     assert heights.argmax() in (5, 6, 7)
-    assert 0.1 < heights.max() <= 0.25 + 1e-9
+    # Walks near the path are in the air at different moves: their mean jumps lower than each of them.
+    assert 0.08 < heights.max() <= 0.25 + 1e-9
     assert heights[[0, 1, 2, -3, -2, -1]].max() < 0.03
 
 
@@ -364,50 +381,3 @@ def test_no_moves_are_one_frame(walking: Learned) -> None:
     found = realised(walking, [3], a, a)
     assert (len(found), found.name, found.insertions[0].times.tolist()) == (1, "tween", [0.0])
     np.testing.assert_array_equal(found.rotations[0], a.rotations)
-
-
-@pytest.mark.parametrize("way", [1, -1])
-def test_a_body_turns_the_way_that_the_path_says(way: int) -> None:
-    """From north to 170 degrees off, by the short way or all the way round the other."""
-    known = learned(walk())
-    motion = walk()
-    goal = np.radians(170.0)
-    ends = [replace(motion.posture(row), rotations=motion.rotations[row].copy()) for row in (3, 9)]
-    turned = []
-    for end, heading in zip(ends, (0.0, goal), strict=True):
-        q = end.rotations.copy()
-        q[0] = rot.mul(rot.about_vertical(heading - rot.heading(q[0])), q[0])
-        turned.append(replace(end, rotations=q))
-    whole = round(170.0 / 15.0) if way > 0 else round(170.0 / 15.0) - 24
-    path = known.states[[3, 4, 5, 6, 7, 8, 9]].copy()
-    path[:, 23] = np.round(np.linspace(0, whole, 7)).astype(np.int32) % 24
-    found, _ = realise(
-        path, *turned, known.corpus, known, known.carriage, 60.0, within=np.full(23, 0.3)  # type: ignore[arg-type]
-    )  # fmt: skip
-    headings = np.unwrap(rot.heading(found.rotations[:, 0]))
-    assert headings[-1] - headings[0] == pytest.approx(goal if way > 0 else goal - 2.0 * np.pi, abs=1e-9)
-    assert np.all(way * np.diff(headings) > -1e-3)
-
-
-@pytest.mark.parametrize("seconds", [np.full(8, 0.2), np.array([0.2, 0.4, 0.1, 0.3, 0.3, 0.2, 0.5, 0.2])])
-def test_steady_turning_stays_steady_through_steps_of_a_circle(seconds: Floats) -> None:
-    known = learned(walk())
-    keys = np.concatenate([[0.0], np.cumsum(seconds)])
-    for speed in (-200.0, -17.0, 0.0, 5.0, 40.0, 170.0):
-        turn = np.radians(356.0 + speed * keys)
-        path = np.round(turn / (np.pi / 12.0)).astype(np.int32) % 24
-        a, b = rot.about_vertical(turn[[0, -1]])
-        found = turn_with_path(path, known, seconds, {0: a, len(path) - 1: b})  # type: ignore[arg-type]
-        np.testing.assert_allclose(found - found[0], turn - turn[0], atol=1e-4)
-
-
-def test_headings_stay_in_their_states() -> None:
-    known, rng = learned(walk()), np.random.default_rng(0)
-    for _ in range(20):
-        path = np.cumsum(rng.integers(-3, 4, 20)).astype(np.int32) % 24
-        a, b = rot.about_vertical((path[[0, -1]] + rng.uniform(-0.5, 0.5, 2)) * np.pi / 12.0)
-        found = turn_with_path(path, known, rng.uniform(0.1, 1.0, 19), {0: a, 19: b})  # type: ignore[arg-type]
-        off = np.angle(np.exp(1j * (found - path * np.pi / 12.0)))
-        assert np.abs(off).max() <= np.pi / 24.0 + 1e-9
-        assert rot.angle(rot.about_vertical(found[[0, -1]]), np.stack([a, b])).max() < 1e-9
-        assert np.abs(np.diff(found)).max() <= 4.0 * np.pi / 12.0 + 1e-9

@@ -40,7 +40,7 @@ class Case:
         """Cost, bound, expansions and peak of nodes of A*."""
         path = np.zeros(len(self.trellis.dom_ptr) - 1, np.int64)
         on = np.zeros(1, dtype=bool)
-        return astar.search(self.trellis, self.heuristic, cost, path, budget, expansions, on)
+        return astar.search(self.trellis, self.heuristic, cost, astar.SAME, path, budget, expansions, on)
 
     @property
     def heuristic(self) -> Heuristic:
@@ -158,7 +158,7 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
                 break
             node = int(nodes.heap[0])
             astar._close(nodes, node)
-            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, path)
+            astar._expand(case.trellis, case.heuristic, nodes, node, np.inf, astar.SAME, path)
             astar._release(nodes, node)
         if nodes.tally[astar._FREE] >= 8 or nodes.tally[astar._HEAPED] == 0:
             continue

@@ -22,6 +22,8 @@ from motionmind.search.polish import polish
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, locate
+from motionmind.tween.engine import Engine
+from motionmind.tween.problem import build_model
 
 MOVES = 6
 PROVEN = 2 * bounding.PROVEN
@@ -137,8 +139,8 @@ def test_the_answer_is_the_path_that_the_search_returned_and_never_dearer_than_t
     walked: list[np.ndarray] = []
     search = astar.search
 
-    def listening(trellis: Trellis, heuristic: Heuristic, cost: float, path: np.ndarray, *rest: Any) -> Any:
-        found = search(trellis, heuristic, cost, path, *rest)
+    def listening(trellis: Trellis, heuristic: Heuristic, cost: float, slack: float, path: Any, *rest: Any) -> Any:
+        found = search(trellis, heuristic, cost, slack, path, *rest)
         if found[0] < cost:
             walked.append(trellis.dom[path].reshape(-1, trellis.chains))
         return found
@@ -167,6 +169,17 @@ def test_where_the_bound_is_tight_the_search_walks_straight_to_the_goal() -> Non
         if found is not None:
             straight += found.expansions == (len(found.path) - 1) * len(toy.sizes)
     assert straight > 50
+
+
+def test_many_paths_of_the_same_cost_do_not_lead_it_astray() -> None:
+    """Chains of bundled ballet that nothing couples, all attested moves alike, in more moves than they need."""
+    engine = Engine.load("ballet")
+    model, rng = build_model(engine.grammar, "conditional", 0.0, 1.0, novelty=1.0), np.random.default_rng(0)
+    for _ in range(10):
+        start, goal = engine.states[rng.integers(len(engine.states), size=2)].astype(np.int64)
+        found = solve.solve(Problem(model, start, goal, Rules(1.0, 1.0, 12, 12, 200_000)))
+        assert found.status == "optimal"
+        assert found.expansions == 12 * len(start)
 
 
 # --- what proves it --------------------------------------------------------------------------------------------------
@@ -222,7 +235,7 @@ def test_under_messages_alone_the_search_finds_the_optimum_too(sweeps: int, kind
         messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
         trws.tighten(trellis, messages, path, sweeps, np.inf)
         heuristic = Heuristic.of_messages(messages)
-        cost, lower, _, _ = astar.search(trellis, heuristic, np.inf, path, 50_000, 50_000, ON)
+        cost, lower, _, _ = astar.search(trellis, heuristic, np.inf, astar.SAME, path, 50_000, 50_000, ON)
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
         assert path_cost(trellis, path) == pytest.approx(optimum, abs=PROVEN), seed
@@ -342,7 +355,9 @@ def test_narrowed_pair_chains_keep_every_path_that_is_cheaper_and_what_was_prove
             trellis = smaller
         path = some_path(trellis, seed)
         assert shares(trellis, tables, path) == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        cost, lower, _, _ = astar.search(trellis, Heuristic.of_pair_chains(tables), np.inf, path, 50_000, 50_000, ON)
+        cost, lower, _, _ = astar.search(
+            trellis, Heuristic.of_pair_chains(tables), np.inf, astar.SAME, path, 50_000, 50_000, ON
+        )
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0
@@ -392,7 +407,9 @@ def test_a_narrowed_trellis_keeps_every_path_that_is_cheaper(spare: float) -> No
         if trellis.chains == 1:
             continue
         tables = pair_chains.build(trellis, messages)
-        cost, lower, _, _ = astar.search(trellis, Heuristic.of_pair_chains(tables), np.inf, path, 50_000, 50_000, ON)
+        cost, lower, _, _ = astar.search(
+            trellis, Heuristic.of_pair_chains(tables), np.inf, astar.SAME, path, 50_000, 50_000, ON
+        )
         assert cost == pytest.approx(optimum, abs=PROVEN), seed
         assert lower == pytest.approx(optimum, abs=PROVEN), seed
     assert taken_out > 0

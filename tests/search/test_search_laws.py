@@ -154,7 +154,7 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
     book = Book(engine, movement, ends, novelty)
     names = BODY.names
     moves = (int(rng.integers(1, MOVES + 1)), MOVES)
-    asked: dict[str, Any] = {"moves": moves, "novelty": novelty, "differ": 0.25}
+    asked: dict[str, Any] = {"moves": moves, "novelty": novelty, "differ": 0.25, "guide": 0.0}
     listed: dict[str, Any] = {"moves": range(moves[0], MOVES + 1), "differ": 0.25}
     if pinned:
         chain, end = int(rng.integers(3)), str(rng.choice(["A", "B"]))
@@ -173,7 +173,7 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
     assert plain is None or plain.status == "optimal"
     if plain is None or plain.moves == 1 or others == 0:
         return
-    same = {"moves": plain.moves, "novelty": 1.0 - novelty}
+    same = {"moves": plain.moves, "novelty": 1.0 - novelty, "guide": 0.0}
     asked["unlike"] = [plain, *(tween for _ in range(others - 1) if (tween := join(engine, ends, **same)) is not None)]
     listed |= {"unlike": [tween.path for tween in asked["unlike"]], "moves": [plain.moves]}
     found, (least, _) = join(engine, ends, **asked), book.best(**listed)
@@ -246,7 +246,7 @@ def test_every_clip_twice_says_the_same_once_the_pseudo_count_is_doubled_too_or_
     """(2 N(p, c) + 2 a m(c)) / (2 N(p) + 2 a) is P(c | p) as it was, and so is 2 C(s, s') / 2 C(s)."""
     movement = clips(seed)
     again = [replace(motion, name=motion.name + " again") for motion in movement]
-    ends, asked = two(movement, seed), {"lambda_": float(coordinated)}
+    ends, asked = two(movement, seed), {"lambda_": float(coordinated), "guide": 0.0}
     engine = learned(movement)
     once = join(engine, ends, **asked)
     with pytest.MonkeyPatch.context() as patch:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 
+from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
+from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
@@ -153,3 +154,95 @@ def test_movement_of_another_body_is_refused(ballet: Engine) -> None:
         ballet.tween(A, B, before=waving)
     with pytest.raises(SkeletonError, match="the movement after B is on another skeleton"):
         ballet.tween(A, B, after=waving)
+
+
+# --- the motion between them ------------------------------------------------------------------------------------------
+
+WINDOWS = [("ballet", 2), ("ballet", 7), ("karate", 1), ("karate", 6), ("walk-hexapod", 0)]
+
+
+def window(engine: Engine, number: int, fps: float = 120.0) -> tuple[Motion, Motion, Posture, Posture]:
+    """Frames before A and after B of a window of a corpus's own movement, five of its moves long; A and B."""
+    clip = max(engine.corpus.clips, key=lambda one: one.stop - one.start)
+    motion = engine.corpus.motion(clip)
+    seconds = float(np.median(engine.corpus.seconds))
+    first = motion.times[0] + (4 + 3 * number) * seconds
+    times = np.arange(motion.times[0], motion.times[-1], 1.0 / fps)
+    fine = motion.at(times)
+    a, b = (int(np.searchsorted(times, moment)) for moment in (first, first + 5.0 * seconds))
+    return fine.slice(a - 8, a + 1), fine.slice(b, b + 9), fine.posture(a), fine.posture(b)
+
+
+def speeds(motion: Motion) -> tuple[Floats, Floats]:
+    """Velocities of joints [2, J, 3] and root [2, 3] in the first and in the last frame to frame."""
+    step = motion.times[1] - motion.times[0]
+    turned = rot.log(rot.inv_mul(motion.rotations[[0, -2]], motion.rotations[[1, -1]])) / step
+    return turned, np.asarray((motion.root[[1, -1]] - motion.root[[0, -2]]) / step)
+
+
+@pytest.mark.parametrize(("name", "number"), WINDOWS)
+def test_a_motion_leaves_and_arrives_with_the_velocities_of_its_ends(name: str, number: int) -> None:
+    """Within what a frame leaves of it: the error falls with the length of a frame."""
+    engine = Engine.load(name)
+    before, after, a, b = window(engine, number)
+    given = np.stack([Velocity.at_end(before).rotations, Velocity.at_start(after).rotations])
+    assert np.abs(given).max() > 0.3
+    errors = []
+    for fps in (60.0, 240.0):
+        tween = engine.tween(a, b, moves=5, fps=fps, before=before, after=after)
+        errors.append(np.abs(speeds(tween.motion)[0] - given).max())
+    free = np.abs(speeds(engine.tween(a, b, moves=5, fps=240.0).motion)[0] - given).max()
+    assert errors[1] < 0.1 * free
+    assert errors[1] < 0.4 * errors[0]
+
+
+@pytest.mark.parametrize(("name", "number"), WINDOWS)
+def test_one_end_may_move_and_the_other_not(name: str, number: int) -> None:
+    engine = Engine.load(name)
+    before, after, a, b = window(engine, number)
+    plain = speeds(engine.tween(a, b, moves=5, fps=120.0).motion)[0]
+    for end, movement in ((0, {"before": before}), (1, {"after": after})):
+        found = speeds(engine.tween(a, b, moves=5, fps=120.0, **movement).motion)[0]  # type: ignore[arg-type]
+        velocity = Velocity.at_end(before) if end == 0 else Velocity.at_start(after)
+        assert np.abs(found[end] - velocity.rotations).max() < 0.25 * np.abs(plain[end] - velocity.rotations).max()
+
+
+@pytest.mark.parametrize(("name", "number"), WINDOWS)
+def test_the_root_leaves_and_arrives_nearly_as_its_ends_move(name: str, number: int) -> None:
+    engine = Engine.load(name)
+    before, after, a, b = window(engine, number)
+    given = np.stack([Velocity.at_end(before).root, Velocity.at_start(after).root])
+    off, free = (
+        np.linalg.norm(speeds(engine.tween(a, b, moves=5, fps=120.0, **moving).motion)[1] - given, axis=1)
+        for moving in ({"before": before, "after": after}, {})
+    )
+    print(name, number, off, free, given)
+
+
+@pytest.mark.parametrize(("name", "number"), WINDOWS)
+@pytest.mark.parametrize("move", [1, 2, 4])
+def test_postures_are_passed_exactly_however_near_to_an_end_that_moves(name: str, number: int, move: int) -> None:
+    engine = Engine.load(name)
+    before, after, a, b = window(engine, number)
+    clip = max(engine.corpus.clips, key=lambda one: one.stop - one.start)
+    via = engine.corpus.motion(clip).posture(4 + 3 * number + move)
+    try:
+        tween = engine.tween(a, b, moves=5, fps=240.0, via=[(via, move)], before=before, after=after)
+    except NoPathError:
+        pytest.skip("nothing passes that posture at that move")
+    passed = tween.motion.at(tween.motion.insertions[0].times[[move]])
+    assert np.degrees(rot.angle(passed.rotations[0], via.rotations)).max() < 0.1
+
+
+def test_a_body_that_runs_on_goes_on_for_a_while(ballet: Engine) -> None:
+    """The movement after A goes the way that the body moved, and further than without."""
+    before, _, a, b = window(ballet, 2)
+    velocity = Velocity.at_end(before)
+    joint = int(np.linalg.norm(velocity.rotations, axis=1).argmax())
+    way = velocity.rotations[joint] / np.linalg.norm(velocity.rotations[joint])
+    gone = []
+    for moving in ({"before": before}, {}):
+        motion = ballet.tween(a, b, moves=5, fps=120.0, **moving).motion  # type: ignore[arg-type]
+        gone.append(rot.log(rot.inv_mul(motion.rotations[0], motion.rotations[8]))[joint] @ way)
+    assert gone[0] > 0.5 * 8 / 120.0 * np.linalg.norm(velocity.rotations[joint])
+    assert gone[0] > gone[1]

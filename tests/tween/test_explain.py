@@ -80,8 +80,8 @@ def test_what_is_charged_adds_up_to_the_cost(insects: Engine, options: dict[str,
         assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)
         report = tween.report()
         costs = report["costs"]
-        told = sum(map(sum, costs["moves"])) + sum(map(sum, costs["coordination"])) + costs["per_move"] * tween.moves
-        assert told == pytest.approx(report["cost"], abs=1e-6)
+        told = sum(sum(map(sum, costs[name])) for name in ("moves", "coordination", "guide"))
+        assert told + costs["per_move"] * tween.moves == pytest.approx(report["cost"], abs=1e-6)
         for thing in (*tween.bridges, *tween.waits):
             charged = tween.costs.moves[thing.move, tween.joints.index(thing.joint)]
             assert charged == pytest.approx(thing.price)
@@ -100,7 +100,8 @@ def test_likelihoods_are_what_was_counted(insects: Engine, bridged: Tween) -> No
                 made = left & (states[moves.ends, chain] == after[chain])
             counted = moves.weights[made].sum() / moves.weights[left].sum() if left.any() else 0.0
             assert bridged.costs.likelihood[t, chain] == pytest.approx(counted)
-            assert (bridged.sources[t][chain] is None) == (counted == 0.0)
+            shown = bridged.followed[t, chain] and bridged.followed[t + 1, chain]
+            assert (bridged.sources[t][chain] is None) == (counted == 0.0 or not shown)
 
 
 def test_coordination_is_what_the_network_says(insects: Engine, bridged: Tween) -> None:
@@ -124,7 +125,7 @@ def test_a_source_says_when_it_was(insects: Engine, bridged: Tween) -> None:
 def test_the_explanation_adds_up_move_by_move(bridged: Tween, tmp_path: Path) -> None:
     told = explain(read_report(report_of(bridged, tmp_path)))
     assert sum(move.cost for move in told.moves) == pytest.approx(bridged.cost, abs=1e-6)
-    assert told.moved + told.coordinated + told.tolls == pytest.approx(bridged.cost, abs=1e-6)
+    assert told.moved + told.coordinated + told.guided + told.tolls == pytest.approx(bridged.cost, abs=1e-6)
     assert [(move.begins, move.ends) for move in told.moves] == list(pairwise(bridged.motion.insertions[0].times))
     for how, things in (("bridge", bridged.bridges), ("wait", bridged.waits)):
         found = {(step.joint, move.move - 1) for move in told.moves for step in move.joints if step.how == how}

@@ -90,6 +90,7 @@ def test_the_report_repeats_every_field(ballet: Engine) -> None:
     assert asked.keys() == {field.name.rstrip("_") for field in fields(TweenRequest)} | {"before", "after"}
     assert (asked["duration"], asked["pin"], asked["memory"]) == (2.0, {"left_wrist": "B"}, 10**8)
     assert asked["node_budget"] == tween.node_budget > 0
+    assert asked["guide"] == 1.0
 
 
 # --- the report ------------------------------------------------------------------------------------------------------
@@ -109,8 +110,9 @@ def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
     """They lack what came later, and may have what is gone."""
     old = ballet.tween(FIRST, PLIE).report()
     del old["asked"]["posturewise"]
-    for name in ("detail", "path_degrees", "vias", "differs"):
+    for name in ("detail", "path_degrees", "vias", "differs", "length", "followed"):
         del old[name]
+    del old["costs"]["guide"]
     (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1, "shared": 0}), "utf-8")
     report = read_report(tmp_path / "old.json")
     assert (report.cost, report.detail, report.differs) == (old["cost"], [], [])

@@ -1,0 +1,170 @@
+"""What walks through bundled corpora expect: exact at stops, moving as they do, and little where they know little."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion, Posture, Velocity
+from motionmind.geometry import rotations as rot
+from motionmind.realise.expectation import Expectation, expect
+from motionmind.realise.stops import Stop, moments_rates, stop_at
+from motionmind.tween.engine import Engine
+
+CORPORA = ["ballet", "karate", "walk-hexapod"]  # stage and free, people and insects
+STEPS = 6
+
+
+@cache
+def engine_of(name: str) -> Engine:
+    return Engine.load(name)
+
+
+@pytest.fixture(scope="module", params=CORPORA)
+def engine(request: pytest.FixtureRequest) -> Engine:
+    return engine_of(request.param)
+
+
+def clip_of(engine: Engine) -> Motion:
+    return engine.corpus.motion(engine.corpus.clips[0])
+
+
+def expected(engine: Engine, stops: dict[int, Stop], path: Floats | None = None) -> Expectation:
+    half_steps = np.linspace(0.0, max(stops) * float(np.median(engine.corpus.seconds)), 2 * max(stops) + 1)
+    return expect(engine.corpus, engine.carriage, stops, half_steps, path)
+
+
+def chains_at(engine: Engine, found: Expectation) -> Floats:
+    return found.chains(engine.corpus, found.half_steps)
+
+
+def far_off(engine: Engine, seed: int) -> Posture:
+    """A posture that the corpus knows nothing like: every joint about a right angle off the first."""
+    first, rng = clip_of(engine).posture(0), np.random.default_rng(seed)
+    off = rng.normal(size=(len(first.skeleton), 3))
+    off *= 1.5 / np.linalg.norm(off, axis=1, keepdims=True)
+    return replace(first, rotations=rot.mul(first.rotations, rot.exp(off)))
+
+
+def test_stops_are_met_exactly(engine: Engine) -> None:
+    clip = clip_of(engine)
+    moving = Velocity(np.full((len(clip.skeleton), 3), 0.7), np.array([0.2, 0.0, 0.1]))
+    stops = {
+        0: stop_at(engine.corpus, clip.posture(3), moving),
+        2: stop_at(engine.corpus, clip.posture(6)),
+        STEPS: stop_at(engine.corpus, far_off(engine, 0), moving),
+    }
+    found = expected(engine, stops)
+    chains = chains_at(engine, found)
+    for move, stop in stops.items():
+        assert rot.angle(chains[2 * move], stop.chains).max() < 1e-6
+    assert np.isfinite(chains).all()
+    np.testing.assert_allclose(found.moments.sum(axis=1), 1.0)
+    np.testing.assert_allclose(found.moves.sum(axis=1), 1.0)
+
+
+def test_walks_between_postures_of_the_corpus_are_trusted_and_the_less_the_farther_both_ends_are(
+    engine: Engine,
+) -> None:
+    a, b = clip_of(engine).posture(3), clip_of(engine).posture(12)
+    far, rng = [], np.random.default_rng(1)
+    off = rng.normal(size=(len(a.skeleton), 3))
+    for size in (0.0, 0.3, 0.7, 1.2):
+        ends = [replace(end, rotations=rot.mul(end.rotations, rot.exp(size * off))) for end in (a, b)]
+        stops = dict(zip((0, STEPS), (stop_at(engine.corpus, end) for end in ends), strict=True))
+        far.append(np.median(expected(engine, stops).trust))
+    assert far[0] > 0.99
+    assert np.all(np.diff(far) < 0.0)
+    assert far[-1] < 0.3
+
+
+@pytest.mark.parametrize("size", [0.1, 0.3])
+def test_far_from_the_corpus_joints_turn_the_short_way(engine: Engine, size: float) -> None:
+    """Between two postures near each other and far from everything known."""
+    a, rng = far_off(engine, 2), np.random.default_rng(3)
+    off = rng.normal(size=(len(a.skeleton), 3))
+    off[0] = 0.0
+    off *= size / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-9)
+    b = replace(a, rotations=rot.mul(a.rotations, rot.exp(off)))
+    stops = {0: stop_at(engine.corpus, a), STEPS: stop_at(engine.corpus, b)}
+    found = expected(engine, stops)
+    share = np.linspace(0.0, 1.0, 2 * STEPS + 1)[:, None]
+    joints = len(a.skeleton)
+    straight = rot.slerp(stops[0].chains[None, :joints], stops[STEPS].chains[None, :joints], share)
+    assert rot.angle(found.poses, straight).max() < 0.05 * size
+
+
+def test_without_a_way_to_go_no_joint_moves(engine: Engine) -> None:
+    joints = len(engine.corpus.skeleton)
+    for posture in (clip_of(engine).posture(5), far_off(engine, 4)):
+        stop = stop_at(engine.corpus, posture)
+        found = expected(engine, {0: stop, STEPS: stop})
+        assert rot.angle(found.poses, stop.chains[:joints]).max() < 1e-6
+
+
+def test_a_path_draws_the_walks_to_it(engine: Engine) -> None:
+    """Of two recorded ways on, walks take the one that they are told of."""
+    clip, joints = clip_of(engine), len(engine.corpus.skeleton)
+    a, b = (stop_at(engine.corpus, clip.posture(row)) for row in (4, 4 + STEPS))
+    path = engine.corpus.to_chains(clip.rotations[4 : 5 + STEPS])[:, :joints]
+    free, led = (expected(engine, {0: a, STEPS: b}, one).poses[::2] for one in (None, path))
+    assert rot.angle(led, path).mean() < rot.angle(free, path).mean()
+    other = rot.slerp(path[:1], path[-1:], np.linspace(0.0, 1.0, STEPS + 1)[:, None])
+    astray = expected(engine, {0: a, STEPS: b}, other).poses[::2]
+    assert rot.angle(astray, path).mean() > rot.angle(led, path).mean()
+
+
+def test_velocities_choose_among_walks(engine: Engine) -> None:
+    """The middle of a recorded move, with its velocity and against it: walks go on as it moved there."""
+    corpus, carriage, clip = engine.corpus, engine.carriage, clip_of(engine)
+    rates = moments_rates(corpus, carriage)
+    speed = np.linalg.norm(rates.joints[: len(clip)], axis=-1).mean(axis=1)
+    row = int(speed[2:-2].argmax()) + 2
+    a = clip.posture(row)
+    stop = stop_at(corpus, a)
+    with_it, against = (
+        replace_rates(stop, sign * rates.joints[row], sign * float(rates.turn[row]), sign * rates.travel[row])
+        for sign in (1.0, -1.0)
+    )
+    last = stop_at(corpus, far_off(engine, 5))
+    here = [float(expected(engine, {0: one, STEPS: last}).moments[0, row]) for one in (with_it, against)]
+    assert here[0] > here[1]
+
+
+def replace_rates(stop: Stop, joints: Floats, turn: float, travel: Floats) -> Stop:
+    from motionmind.realise.stops import Rates
+
+    return stop._replace(rates=Rates(joints, np.asarray(turn), travel))
+
+
+def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
+    """In the middle of a move, those of the move; and a stop's are those with which its chains turn."""
+    corpus, carriage = engine.corpus, engine.carriage
+    rates, seconds = moments_rates(corpus, carriage), corpus.moves.seconds
+    begins, ends = corpus.moves.begins, corpus.moves.ends
+    chains, middles = corpus.to_chains(corpus.rotations), len(corpus) + np.arange(len(seconds))
+    joints = len(corpus.skeleton)
+    turned = rot.log(rot.inv_mul(chains[begins], chains[ends])) / seconds[:, None, None]
+    small = np.linalg.norm(turned, axis=-1).max(axis=1) * seconds < 0.5 * np.pi
+    np.testing.assert_allclose(rates.joints[middles][small], turned[small][:, :joints], atol=1e-6)
+    if corpus.facing == "free":
+        np.testing.assert_allclose(rates.turn[middles], turned[:, -1, 1], atol=1e-6)
+    moved = corpus.root[ends] - corpus.root[begins]
+    np.testing.assert_allclose(
+        np.linalg.norm(rates.travel[middles], axis=1), np.linalg.norm(moved, axis=1) / seconds, atol=1e-6
+    )
+    posture, rng = clip_of(engine).posture(2), np.random.default_rng(6)
+    velocity = Velocity(rng.normal(size=(joints, 3)), rng.normal(size=3))
+    stop = stop_at(corpus, posture, velocity)
+    assert stop.rates is not None
+    later = corpus.to_chains(rot.mul(posture.rotations, rot.exp(1e-5 * velocity.rotations)))
+    expected_turns = rot.log(rot.inv_mul(stop.chains, later)) / 1e-5
+    np.testing.assert_allclose(stop.rates.joints, expected_turns[:joints], atol=0.02)
+    if corpus.facing == "free":
+        assert stop.rates.turn == pytest.approx(expected_turns[-1, 1], abs=0.02)
+    back = rot.mul_vec(rot.about_vertical(rot.heading(posture.rotations[0])), stop.rates.travel)
+    np.testing.assert_allclose(back, velocity.root, atol=1e-9)

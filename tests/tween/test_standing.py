@@ -1,0 +1,125 @@
+"""Feet in whole tweens: those that stand stay, none sinks into the floor, and bodies turn the near way round."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionmind.body.contact import lowest_height
+from motionmind.body.motion import Motion, Posture
+from motionmind.formats import read_motion
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.retarget import own_skeleton
+from motionmind.tween.engine import Engine
+
+
+@cache
+def engine_of(name: str) -> Engine:
+    return Engine.load(name)
+
+
+@pytest.fixture(scope="module")
+def recorded(shared_data: Path) -> Engine:
+    clips = [own_skeleton(read_motion(path)) for path in sorted((shared_data / "cmu-05").glob("*.bvh"))[:10]]
+    return Engine.fit(clips, name="cmu-05", rate=5.0, skip=1)
+
+
+def posture(engine: Engine, row: int) -> Posture:
+    corpus = engine.corpus
+    return Posture(corpus.skeleton, corpus.rotations[row], corpus.root[row])
+
+
+def stances(engine: Engine, gap: int, within: float) -> Iterator[tuple[int, int, str]]:
+    """Rows of postures `gap` moves apart, between which a foot stands in one place `within` metres, low."""
+    corpus = engine.corpus
+    points = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
+    for clip in corpus.clips:
+        here = points[clip.start : clip.stop]
+        floor = np.percentile(here[..., 1].min(axis=1), 5.0)
+        for side in ("left_toes", "right_toes"):
+            foot = here[:, corpus.skeleton.index(side)]
+            for row in range(0, len(foot) - gap, gap):
+                stands = foot[row : row + gap + 1]
+                near = np.linalg.norm(stands - stands[0], axis=1).max() < within
+                if near and (stands[:, 1] - floor).max() < 2.0 * within:
+                    yield clip.start + row, clip.start + row + gap, side
+
+
+def departures_of_standing_feet(engine: Engine, gap: int, within: float) -> tuple[list[float], list[float]]:
+    """How far standing feet slide and rise in twenty tweens between such postures, metres."""
+    found = list(stances(engine, gap, within))
+    chosen = np.random.default_rng(0).permutation(len(found))[:20]
+    slides, rises = [], []
+    for number in chosen:
+        a, b, side = found[number]
+        motion = engine.tween(posture(engine, a), posture(engine, b), moves=gap).motion
+        foot = motion.skeleton.positions(motion.rotations, motion.root)[:, motion.skeleton.index(side)]
+        slides.append(float(np.linalg.norm((foot - foot[0])[:, [0, 2]], axis=1).max()))
+        rises.append(float((foot[:, 1] - foot[[0, -1], 1].max()).max()))
+    return slides, rises
+
+
+@pytest.mark.parametrize(("name", "gap"), [("ballet", 4), ("karate", 5)])
+def test_a_foot_that_stands_in_a_in_b_and_between_stays_where_it_stands(name: str, gap: int) -> None:
+    slides, rises = departures_of_standing_feet(engine_of(name), gap, 0.015)
+    assert len(slides) > 10
+    assert np.mean(slides) < 0.008  # it is 1.5 and 3.3 cm where nothing holds them
+    assert np.max(slides) < 0.02
+    assert np.max(rises) < 0.03
+
+
+def test_a_dancer_s_standing_foot_stays_where_it_stands(recorded: Engine) -> None:
+    slides, rises = departures_of_standing_feet(recorded, 3, 0.03)
+    assert len(slides) > 10
+    assert np.mean(slides) < 0.02
+    assert np.mean(rises) < 0.03
+
+
+@pytest.mark.parametrize("name", ["ballet", "karate", "walk-hexapod"])
+def test_no_frame_is_below_the_floor(name: str) -> None:
+    """The floor is at 0, or as low as the ends are."""
+    engine = engine_of(name)
+    size = engine.corpus.skeleton.height
+    for a, b in np.random.default_rng(1).integers(0, len(engine.corpus), (12, 2)).tolist():
+        motion = engine.tween(posture(engine, a), posture(engine, b)).motion
+        low = lowest_height(motion.skeleton, motion.rotations, motion.root)
+        floor = np.interp(motion.times, motion.times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
+        assert np.min(low - floor) > -1e-3 * size
+
+
+def turned(found: Posture, degrees: float) -> Posture:
+    """The posture facing `degrees` about the vertical."""
+    rotations = found.rotations.copy()
+    off = np.radians(degrees) - rot.heading(rotations[0])
+    rotations[0] = rot.mul(rot.about_vertical(off), rotations[0])
+    return replace(found, rotations=rotations)
+
+
+def spinning(end: Posture, speed: float, before: bool) -> Motion:
+    """Frames that lead to a posture, or follow it, while it turns on the spot at `speed` radians a second."""
+    times = np.arange(5) / 30.0
+    angles = speed * (times - (times[-1] if before else 0.0))
+    rotations = np.repeat(end.rotations[None], 5, axis=0)
+    rotations[:, 0] = rot.mul(rot.about_vertical(angles), rotations[:, 0])
+    return Motion(end.skeleton, rotations, np.repeat(end.root[None], 5, axis=0), times, "spin")
+
+
+@pytest.mark.parametrize("speeds", [None, (0.0, 0.0), (0.5, 0.5), (-0.5, -0.5)])
+@pytest.mark.parametrize(("a", "b", "turn"), [(170.0, -170.0, 20.0), (-170.0, 170.0, -20.0), (0.0, 45.0, 45.0)])
+def test_a_body_turns_the_near_way_round(a: float, b: float, turn: float, speeds: tuple[float, float] | None) -> None:
+    engine = engine_of("karate")
+    for row in (20, 130):
+        stands = posture(engine, row)
+        first, last = turned(stands, a), turned(posture(engine, row + 3), b)
+        moving = {}
+        if speeds:
+            moving = {"before": spinning(first, speeds[0], True), "after": spinning(last, speeds[1], False)}
+        motion = engine.tween(first, last, duration=1.5, **moving).motion
+        headings = np.degrees(np.unwrap(rot.heading(motion.rotations[:, 0])))
+        assert headings[-1] - headings[0] == pytest.approx(turn, abs=1e-6)
+        assert headings.max() - headings.min() < abs(turn) + 40.0
