@@ -35,7 +35,7 @@ from motionmind.search.problem import Problem, places
 from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
-ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three
+ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 22 for three
 DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
 CHANGED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices at which it is improved
 LEARNING_RATE = 4.0  # of the weights of earlier paths, while a path is sought that differs from all
