@@ -19,6 +19,7 @@ from motionmind.errors import MotionMindWarning
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
     from motionmind.tween.result import Tween
+    from motionmind.tween.what_if import WhatIf
 
 
 class Notes(logging.Handler):
@@ -106,9 +107,20 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+    lines += [("without", format_what_if(one, result.request.kappa)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
+
+
+def format_what_if(one: WhatIf, kappa: float) -> str:
+    """Format what a restriction costs a tween whose guide has this factor: "hold neck: 12.400 nats and 1 move less"."""
+    nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
+    if one.proven:
+        nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
+    moves = count(abs(one.moves), "move")
+    change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
+    return f"{one.without}: {nats}{change}{' (costs without the guide)' * (kappa > 0.0 and not one.guided)}"
 
 
 def print_written(files: Sequence[Path]) -> None:
@@ -160,7 +172,10 @@ def _shares(result: Tween) -> str:
 
 
 def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
-    """Print alternative tweens, a line each, with the share by which each differs from those above."""
+    """Print alternative tweens, a line each, with the share by which each differs from those above.
+
+    What restrictions cost the first follows, where that was asked.
+    """
     click.echo(
         "    moves  seconds      cost  at least     gap  proven       attested  bridged  differs from those above"
     )
@@ -172,6 +187,8 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
             f"{len(result.bridges):7}  {differs}"
         )
         click.echo(line.rstrip())
+    for one in results[0].what_if:
+        click.echo(f"without   {format_what_if(one, results[0].request.kappa)}")
     print_written(files)
 
 

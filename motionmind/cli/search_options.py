@@ -107,6 +107,13 @@ SEARCH_OPTIONS = (
         "Use only whole postures in the order of the corpus, as the search of 1998 did.",
         bool,
     ),
+    SearchOption(
+        "what_if",
+        "--what-if",
+        _SEARCH,
+        "Say what each --pin, --hold, --avoid and --via costs, and the length: search again without it.",
+        bool,
+    ),
     SearchOption("sample", "--sample", _SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool),
     SearchOption("seed", "--seed", _SEARCH, "Seed the random numbers of --sample.", NATURAL, "N"),
     SearchOption(

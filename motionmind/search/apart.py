@@ -11,7 +11,8 @@ that is met, or that a path met is improved to, is an upper bound. D is concave,
 a linear function of mu; the mu where the least of those found so far is greatest is tried next.
 
 Sources: Fisher, "The Lagrangian relaxation method for solving integer programming problems", Management Science 27(1),
-1981; Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8(4), 1960; for one earlier path it is the
+1981; Batra, Yadollahpour, Guzman-Rivera and Shakhnarovich, "Diverse M-best solutions in Markov random fields", ECCV
+2012; Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8(4), 1960; for one earlier path it is the
 method of Handler and Zang, "A dual algorithm for the constrained shortest path problem", Networks 10(4), 1980.
 """
 
@@ -34,9 +35,9 @@ from motionmind.search.problem import Problem, places
 from motionmind.search.solve import Certificate, Progress, Status, Watch, solve
 from motionmind.search.trellis import Trellis, locate, segment_trellises, states_of
 
-ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 18 for three
+ROUNDS = 30  # prices tried at most; real ballet takes 6 for one earlier path, 22 for three
 DEARER = tuple(1.2**k for k in range(1, 12))  # multiples of the prices at which a path is made to differ by enough
-CHANGED = (0.0, 0.5, 1.0, 2.0)  # multiples of the prices at which it is improved
+CHANGED = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0)  # multiples of the prices at which it is improved
 LEARNING_RATE = 4.0  # of the weights of earlier paths, while a path is sought that differs from all
 
 
@@ -239,7 +240,8 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
             for minimise, which in steps:
                 trial = chosen.copy()
                 minimise(dearer, trial, which)
-                yield trial
+                if not np.array_equal(trial, chosen):
+                    yield trial
 
     too_much = excess(chosen)
     for trial in replacements(DEARER):

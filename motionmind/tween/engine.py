@@ -28,6 +28,7 @@ from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
+from motionmind.tween.what_if import Answer, WhatIf, find_what_if
 from motionmind.tween.whole_body import Bodies, find_bodies, solve_posturewise
 
 SAME_ANGLE = 0.1  # degrees: a movement that was bent to within a tolerance is within it to this, as frames tell
@@ -86,6 +87,14 @@ class Engine(LearnedCorpus):
         formulation = formulate(self, a, b, request, before, after)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
+        what_if: tuple[WhatIf, ...] = ()
+        if request.what_if:
+
+            def answer(other: TweenRequest) -> Answer:
+                freed = formulate(self, a, b, other, before, after)
+                return Answer(other, freed.searched, self._find_path(freed, watch))
+
+            what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
         if request.sample and len(certificate.path) > 1:
             certificate = sample_path(formulation.searched, certificate, request.seed)
         realising = perf_counter()
@@ -97,7 +106,7 @@ class Engine(LearnedCorpus):
             "search": certificate.seconds["search"],
             "realise": perf_counter() - realising,
         }
-        return self._account_for(formulation, certificate, motion, detail, seconds)
+        return self._account_for(formulation, certificate, motion, detail, seconds, what_if)
 
     def alternatives(
         self,
@@ -113,7 +122,8 @@ class Engine(LearnedCorpus):
     ) -> Iterator[Tween]:
         """Find the best movement, then others with as many moves, each of which differs from all before by `differ`.
 
-        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it.
+        Samples (`sample`) differ by their seeds instead, the one that is asked for and those that follow it. What
+        restrictions cost (`what_if`) is reported of the first.
 
         Args:
             a: where the motion starts, exactly.
@@ -141,8 +151,12 @@ class Engine(LearnedCorpus):
         request = TweenRequest.of(request, **options)
         found: list[Tween] = []
         for number in range(count):
-            change = {"seed": request.seed + number} if request.sample else {"unlike": (*request.unlike, *found)}
-            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **change))
+            other: dict[str, Any] = {"unlike": (*request.unlike, *found)}
+            if request.sample:
+                other = {"seed": request.seed + number}
+            if found:
+                other["what_if"] = False
+            found.append(self.tween(a, b, request, before=before, after=after, watch=watch, **other))
             yield found[-1]
 
     def _find_path(self, formulation: Formulation, watch: Watch | None) -> Certificate:
@@ -209,6 +223,7 @@ class Engine(LearnedCorpus):
         motion: Motion,
         detail: Ints,
         seconds: dict[str, float],
+        what_if: tuple[WhatIf, ...],
     ) -> Tween:
         """Return the answer: a path and its motion with their certificate, costs and provenance."""
         request, searched = formulation.request, formulation.searched
@@ -241,6 +256,7 @@ class Engine(LearnedCorpus):
             bridges=bridges,
             waits=waits,
             differs=tuple(difference(path, other.path) for other in request.unlike),
+            what_if=what_if,
             passed=certificate.passed,
             snap_degrees=formulation.snap_degrees[[0, -1]],
             path_degrees=path_degrees,
@@ -285,12 +301,14 @@ class Engine(LearnedCorpus):
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:
     """Return the error that says that no path differs by enough from those of a request's tweens to differ from."""
     count, moves = len(request.unlike), len(request.unlike[0].path) - 1
+    diagnosis = {"differ": request.differ, "most": most}
+    if moves < 2:
+        return NoPathError(
+            f"in {moves} move{'s' * (moves != 1)} nothing on the way can differ; ask for more", diagnosis
+        )
     others = "the earlier one" if count == 1 else f"each of {count} earlier ones"
-    return NoPathError(
-        f"no path of {moves} move{'s' * (moves != 1)} was found that differs by {request.differ:.1%} from {others}; "
-        f"none can by more than {most:.1%}",
-        {"differ": request.differ, "most": most},
-    )
+    found = f"no path of {moves} moves was found that differs by {request.differ:.1%} from {others}"
+    return NoPathError(f"{found}; none can by more than {most:.1%}", diagnosis)
 
 
 def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> tuple[tuple[Source | None, ...], ...]:

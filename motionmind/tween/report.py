@@ -13,6 +13,7 @@ from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.search.solve import LengthChoice
 from motionmind.tween.certificate import Bridge, Source, Wait
+from motionmind.tween.what_if import WhatIf
 
 
 class PassedPosture(msgspec.Struct, frozen=True):
@@ -54,6 +55,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         bridges: moves that it does not attest.
         waits: moves spent waiting at the goal.
         differs: share of the joints' states on the way by which it differs from each tween to differ from.
+        what_if: what each restriction costs, where that was asked.
         vias: postures to pass through.
         snap_degrees: angle of each joint to its state in A and in B.
         path_degrees: "mean" and "most" angle between the motion and the path's states on the way; empty without a way.
@@ -95,6 +97,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     bridges: list[Bridge]
     waits: list[Wait]
     differs: list[float] = []
+    what_if: list[WhatIf] = []
     vias: list[PassedPosture] = []
     snap_degrees: dict[str, dict[str, float]] = {}
     path_degrees: dict[str, float] = {}

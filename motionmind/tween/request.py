@@ -50,6 +50,8 @@ class TweenRequest:
         unlike: tweens to differ from, of one number of moves, which this one has too.
         differ: share of the joints' states on the way that has to be other than in each tween of `unlike`, compared
             move by move, from 0 to 1.
+        what_if: search again without each pin, held joint, state to avoid and via, and without the given length, and
+            report what each costs.
         sample: sample a path with probability proportional to exp(-cost), instead of finding the best one; it has as
             many moves as the best. `motionmind.search.sample` says how close to that distribution it comes.
         seed: seed of the sample, at least 0.
@@ -90,6 +92,7 @@ class TweenRequest:
     via: Sequence[Posture | tuple[Posture, int]] = ()
     unlike: Sequence[HasPath] = ()
     differ: float = 0.2
+    what_if: bool = False
     sample: bool = False
     seed: int = 0
     strict: bool = False
@@ -151,6 +154,8 @@ class TweenRequest:
             raise MotionMindError("posturewise: coordination can be posture or none, not progression")
 
     def _check_unlike(self) -> None:
+        if self.what_if:
+            raise MotionMindError("what_if: what restrictions cost is asked of the best tween; leave out unlike")
         if self.sample:
             raise MotionMindError("unlike: samples differ by their seeds; leave out sample")
         every, (least, most) = sorted({len(other.path) - 1 for other in self.unlike}), self.move_range

@@ -14,6 +14,7 @@ from motionmind.search.solve import LengthChoice, Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
+from motionmind.tween.what_if import WhatIf
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,7 @@ class Tween:
         bridges: the moves that it does not attest, but for waits.
         waits: moves spent waiting at the goal.
         differs: share of the joints' states on the way by which it differs from each tween to differ from [K].
+        what_if: what each restriction costs, where that was asked.
         passed: the moves at which the path passes the postures to pass through [K].
         snap_degrees: angle between A's (row 0) and B's (row 1) orientations and their states [2, L].
         path_degrees: angle between the motion's orientations at each move and the states of the path [moves + 1, L].
@@ -70,6 +72,7 @@ class Tween:
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
     differs: tuple[float, ...]
+    what_if: tuple[WhatIf, ...]
     passed: tuple[int, ...]
     snap_degrees: Floats
     path_degrees: Floats
@@ -146,6 +149,7 @@ def report_of(tween: Tween) -> TweenReport:
         bridges=list(tween.bridges),
         waits=list(tween.waits),
         differs=list(tween.differs),
+        what_if=list(tween.what_if),
         vias=[PassedPosture(move, by_joint(row)) for move, row in zip(tween.passed, tween.via_degrees, strict=True)],
         snap_degrees={end: by_joint(row) for end, row in zip("AB", tween.snap_degrees, strict=True)},
         path_degrees={"mean": float(inner.mean()), "most": float(inner.max())} if inner.size else {},

@@ -26,8 +26,8 @@ ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("ara
 REPORT = {
     *("asked", "status", "cost", "lower_bound", "gap", "moves", "length"),
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
-    *("attested", "bridges", "waits", "differs", "vias", "snap_degrees", "path_degrees", "followed", "sources"),
-    *("detail", "times", "names", "degrees", "likelihood", "costs"),
+    *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
+    *("sources", "detail", "times", "names", "degrees", "likelihood", "costs"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 

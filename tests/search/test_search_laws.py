@@ -183,6 +183,43 @@ def test_whatever_is_asked_together_the_cost_is_that_of_every_path_listed(
         assert min(found.differs) >= listed["differ"]
 
 
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.booleans(), st.integers(0, 2), st.booleans(), st.sampled_from([1, 200_000]))
+def test_what_a_restriction_costs_is_the_difference_to_every_path_listed_without_it(
+    seed: int, pinned: bool, avoided: int, timed: bool, node_budget: int
+) -> None:
+    movement, rng = clips(seed), np.random.default_rng(seed)
+    engine, ends = learned(movement), two(movement, seed)
+    book, names = Book(engine, movement, ends), BODY.names
+    asked: dict[str, Any] = {"max_moves": MOVES, "moves": None, "node_budget": node_budget}
+    listed: dict[str, Any] = {}
+    freed: dict[str, dict[str, Any]] = {}
+    if pinned:
+        chain, end = int(rng.integers(3)), str(rng.choice(["A", "B"]))
+        asked["pin"], listed["pin"] = {names[chain]: end}, (chain, end)
+        freed[f"pin {names[chain]}={end}"] = {"pin": None}
+    if avoided:
+        chains = rng.permutation(3)[:avoided]
+        listed["avoid"] = [(int(chain), int(rng.integers(book.sizes[chain]))) for chain in chains]
+        asked["avoid"] = [(names[chain], state) for chain, state in listed["avoid"]]
+        for chain, state in listed["avoid"]:
+            others = [one for one in listed["avoid"] if one[0] != chain]
+            freed[f"avoid {names[chain]}={state}"] = {"avoid": others}
+    if timed:
+        asked["moves"] = int(rng.integers(1, MOVES + 1))
+        listed["moves"] = [asked["moves"]]
+        freed[f"moves {asked['moves']}"] = {"moves": range(1, MOVES + 1)}
+    found = join(engine, ends, what_if=True, **asked)
+    if found is None:
+        return
+    assert {one.without for one in found.what_if} == freed.keys()
+    for one in found.what_if:
+        difference = book.best(**listed)[0] - book.best(**listed | freed[one.without])[0]
+        assert difference >= -SAME
+        assert max(one.least - SAME, 0.0) <= difference + SAME <= one.most + 3 * SAME
+        assert one.proven == (one.most - one.least <= SAME)
+
+
 # --- the same problem, put in another way -----------------------------------------------------------------------------
 
 

@@ -1,0 +1,118 @@
+"""The price of each restriction: the same request without it is searched again, and the two certificates compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
+
+from motionmind.search.bounding import PROVEN
+from motionmind.search.problem import Problem
+from motionmind.search.solve import Certificate, solve
+from motionmind.tween.request import TweenRequest
+
+_Item = TypeVar("_Item")
+
+
+@dataclass(frozen=True)
+class WhatIf:
+    """The price of a restriction: how much less the answer costs without it.
+
+    Attributes:
+        without: the restriction by its name, such as "pin left_wrist=B".
+        least: it costs at least this, nats.
+        most: it costs at most this, nats.
+        proven: whether the two agree to 1e-6 nats a search.
+        moves: how many moves the answer has more without it; negative for fewer.
+        guided: whether these are costs with the guide, as the tween's own. Answers of other lengths, or in other
+            durations, have other guides; then the costs compared are those of the cheapest paths without it.
+    """
+
+    without: str
+    least: float
+    most: float
+    proven: bool
+    moves: int
+    guided: bool
+
+
+class Answer(NamedTuple):
+    """A request, the problem that it became, and the certificate of its best path."""
+
+    request: TweenRequest
+    problem: Problem
+    certificate: Certificate
+
+
+def find_what_if(asked: Answer, answer: Callable[[TweenRequest], Answer]) -> tuple[WhatIf, ...]:
+    """Find what each pin, held joint, state to avoid and via costs, and what the given length does.
+
+    Args:
+        asked: the request, answered.
+        answer: answers another request between the same ends. Once a search is interrupted, no more are made.
+    """
+    out = []
+    for name, request in _without_each(asked):
+        freed = answer(request)
+        if "interrupted" in (asked.certificate.status, freed.certificate.status):
+            break
+        out.append(_compare(name, asked, freed))
+    return tuple(out)
+
+
+def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
+    """Yield each restriction by its name, with the request without it."""
+    request = asked.request
+    for joint, end in request.pin.items():
+        others = {other: request.pin[other] for other in request.pin if other != joint}
+        yield f"pin {joint}={end}", replace(request, pin=others)
+    for i, joint in enumerate(request.hold):
+        yield f"hold {joint}", replace(request, hold=_all_but(request.hold, i))
+    for i, (joint, state) in enumerate(request.avoid):
+        yield f"avoid {joint}={state}", replace(request, avoid=_all_but(request.avoid, i))
+    for i, (_, move) in enumerate(request.vias):
+        name = f"via {i + 1}" + ("" if move is None else f" at move {move}")
+        yield name, replace(request, via=_all_but(request.via, i))
+    if request.fixes_length:
+        longest = max(request.max_moves, len(asked.certificate.path) - 1)
+        yield _length_name(request), replace(request, moves=None, duration=None, max_moves=longest)
+
+
+def _length_name(request: TweenRequest) -> str:
+    """Name the length that a request gives: "moves 8", "moves 6..10", "duration 2.5", or both."""
+    names = []
+    if request.moves is not None:
+        least, most = request.move_range
+        names.append(f"moves {least}" if least == most else f"moves {least}..{most}")
+    if request.duration is not None:
+        names.append(f"duration {request.duration:g}")
+    return " and ".join(names)
+
+
+def _compare(name: str, asked: Answer, freed: Answer) -> WhatIf:
+    """Bound the difference of two optima from below and above.
+
+    Every path that keeps a restriction is also one without it, so the difference is never negative.
+    """
+    moves = len(freed.certificate.path) - len(asked.certificate.path)
+    same = moves == 0 and asked.request.duration == freed.request.duration
+    if same or asked.problem.guide is None:
+        (cost, bound), (freed_cost, freed_bound) = (
+            (one.certificate.cost, one.certificate.lower_bound) for one in (asked, freed)
+        )
+    else:
+        (cost, bound), (freed_cost, freed_bound) = _unguided(asked), _unguided(freed)
+    least, most = max(bound - freed_cost, 0.0), max(cost - freed_bound, 0.0)
+    return WhatIf(name, least, most, most - least <= 2.0 * PROVEN, moves, same and asked.problem.guide is not None)
+
+
+def _unguided(answer: Answer) -> tuple[float, float]:
+    """Return what the cheapest path without the guide costs, and the bound on it, nats."""
+    if len(answer.certificate.path) == 1:  # to stay is free
+        return 0.0, 0.0
+    found = solve(replace(answer.problem, guide=None))
+    return found.cost, found.lower_bound
+
+
+def _all_but(sequence: Sequence[_Item], i: int) -> list[_Item]:
+    return [*sequence[:i], *sequence[i + 1 :]]
