@@ -73,9 +73,7 @@ def plant_feet(
     root[:, 1] += lift
     low += lift[:, None]
     free = [not fixed[leg].any() for leg, _ in legs]
-    rests = stands.copy()
-    rests[:, [number for number, bends in zip(numbers, free, strict=True) if not bends]] = 1.0  # it cannot bend
-    sunk = _sink_depth(low, rests)
+    sunk = _sink_depth(low, stands)
     for start, end in pairwise(given):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)

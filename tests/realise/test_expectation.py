@@ -12,7 +12,8 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
 from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.stops import Stop, moments_rates, stop_at
+from motionmind.realise.mean_walk import _without_ends
+from motionmind.realise.stops import Rates, Stop, moments_rates, stop_at
 from motionmind.tween.engine import Engine
 
 CORPORA = ["ballet", "karate", "walk-hexapod"]  # stage and free, people and insects
@@ -119,26 +120,28 @@ def test_a_path_draws_the_walks_to_it(engine: Engine) -> None:
 
 
 def test_velocities_choose_among_walks(engine: Engine) -> None:
-    """The middle of a recorded move, with its velocity and against it: walks go on as it moved there."""
-    corpus, carriage, clip = engine.corpus, engine.carriage, clip_of(engine)
-    rates = moments_rates(corpus, carriage)
-    speed = np.linalg.norm(rates.joints[: len(clip)], axis=-1).mean(axis=1)
-    row = int(speed[2:-2].argmax()) + 2
-    a = clip.posture(row)
-    stop = stop_at(corpus, a)
-    with_it, against = (
-        replace_rates(stop, sign * rates.joints[row], sign * float(rates.turn[row]), sign * rates.travel[row])
-        for sign in (1.0, -1.0)
-    )
+    """A posture with the velocity that it was recorded with, and against it: walks go on as it moved there."""
+    corpus, clip = engine.corpus, clip_of(engine)
+    rates = moments_rates(corpus, engine.carriage)
     last = stop_at(corpus, far_off(engine, 5))
-    here = [float(expected(engine, {0: one, STEPS: last}).moments[0, row]) for one in (with_it, against)]
-    assert here[0] > here[1]
 
+    def likely(row: int, sign: float, which: str) -> float:
+        """How likely the moment is in which the body was there, with one of its velocities by `sign`."""
+        own = {"joints": rates.joints[row], "turn": rates.turn[row], "travel": rates.travel[row]}
+        own[which] = sign * own[which]
+        stop = Stop(stop_at(corpus, clip.posture(row)).chains, Rates(**own))
+        return float(expected(engine, {0: stop, STEPS: last}).moments[0, row])
 
-def replace_rates(stop: Stop, joints: Floats, turn: float, travel: Floats) -> Stop:
-    from motionmind.realise.stops import Rates
-
-    return stop._replace(rates=Rates(joints, np.asarray(turn), travel))
+    inner = slice(2, len(clip) - 2)
+    speeds = {
+        "joints": np.linalg.norm(rates.joints[inner], axis=-1).mean(axis=1),
+        "turn": np.abs(rates.turn[inner]),
+        "travel": np.linalg.norm(rates.travel[inner], axis=1),
+    }
+    for which, speed in speeds.items():
+        row = int(speed.argmax()) + 2
+        if speed.max() > 0.02:
+            assert likely(row, 1.0, which) > likely(row, -1.0, which), which
 
 
 def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
@@ -158,6 +161,9 @@ def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
         np.linalg.norm(rates.travel[middles], axis=1), np.linalg.norm(moved, axis=1) / seconds, atol=1e-6
     )
     posture, rng = clip_of(engine).posture(2), np.random.default_rng(6)
+    turned_about = posture.rotations.copy()
+    turned_about[0] = rot.mul(rot.about_vertical(2.0), turned_about[0])
+    posture = replace(posture, rotations=turned_about)
     velocity = Velocity(rng.normal(size=(joints, 3)), rng.normal(size=3))
     stop = stop_at(corpus, posture, velocity)
     assert stop.rates is not None
@@ -168,3 +174,17 @@ def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
         assert stop.rates.turn == pytest.approx(expected_turns[-1, 1], abs=0.02)
     back = rot.mul_vec(rot.about_vertical(rot.heading(posture.rotations[0])), stop.rates.travel)
     np.testing.assert_allclose(back, velocity.root, atol=1e-9)
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, False), (False, True), (True, True)])
+def test_departures_end_in_nothing_and_where_velocities_are_given_without_one(moving: tuple[bool, bool]) -> None:
+    rng = np.random.default_rng(7)
+    times = np.linspace(0.0, 2.0, 2001)
+    waves = np.sin(times[:, None, None] * rng.uniform(0.5, 3.0, (4, 3)) + rng.uniform(0.0, 6.0, (4, 3)))
+    out = _without_ends(waves, times, *moving)
+    np.testing.assert_allclose(out[[0, -1]], 0.0, atol=1e-12)
+    rates = np.abs(np.diff(out, axis=0)[[0, -1]] / 0.001).max(axis=(1, 2))
+    for rate, still in zip(rates, moving, strict=True):
+        assert (rate < 0.02) == still
+    # What is taken out is no more than what the ends were off, and their rates.
+    assert np.abs(out - waves).max() < np.abs(waves[[0, -1]]).max() + 3.0

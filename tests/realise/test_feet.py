@@ -95,6 +95,26 @@ def test_the_body_is_not_lifted_onto_a_foot_that_does_not_stand() -> None:
     np.testing.assert_allclose(lowest_height(skeleton, found, went), 0.0, atol=1e-9)
 
 
+def test_a_leg_that_must_not_change_does_not_and_the_body_rests_on_it() -> None:
+    """The same, but the leg that straightens is fixed: the body is lifted by it, and the other leg does not bend."""
+    skeleton, still = human23(), sway(size=0.0)
+    q, root = still[0].copy(), still[1].copy()
+    knee = skeleton.index("left_knee")
+    straighter = 0.15 * np.sin(np.linspace(0.0, np.pi, len(q)))
+    q[:, knee] = rot.mul(q[:, knee], rot.from_axis_angle([1.0, 0.0, 0.0], -straighter))
+    root = stand(skeleton, q, root, np.zeros(len(q)))
+    standing, fixed = stands(q), np.zeros(23, dtype=np.bool_)
+    standing[:, [number for number, leg in enumerate(limbs_of(skeleton)) if knee in leg]] = 0.05
+    fixed[knee] = True
+    zero, given = np.zeros(len(q)), np.array([0.0, len(q) - 1.0])
+    found, went = plant_feet(skeleton, q, root, zero, zero, standing, TIGHT, fixed, 30.0, given)
+    np.testing.assert_array_equal(found[:, 1:5], q[:, 1:5])
+    np.testing.assert_allclose(went[:, 1], root[:, 1], atol=0.002)
+    assert rot.angle(found[:, 5:9], q[:, 5:9]).max() < 0.02
+    free, _ = plant_feet(skeleton, q, root, zero, zero, standing, TIGHT, TIGHT, 30.0, given)
+    assert rot.angle(free[:, 1:5], q[:, 1:5]).max() > 0.05
+
+
 def test_feet_that_would_skate_step() -> None:
     q, root = sway(seconds=0.8, travel=0.5)
     found, went = planted(q, root)

@@ -42,17 +42,25 @@ def test_walks_that_surely_turn_lead_the_far_way() -> None:
 
 def test_walks_that_are_not_trusted_do_not_turn_the_body() -> None:
     """It turns the near way, evenly, whatever they do and however unevenly they vary."""
-    turn = np.full(40, np.radians(200.0) / 40.0)
-    found = turn_with_walks(
-        turn, turn**2 + np.linspace(0.0, 0.1, 40), 0.0 * SURE, TIMES, facings(0.0, 150.0), (None, None)
-    )
+    turn = np.radians(200.0) / 20.0 * np.linspace(0.0, 1.0, 40)
+    spread = turn**2 + np.linspace(0.0, 1e-3, 40)
+    found = turn_with_walks(turn, spread, 0.0 * SURE, TIMES, facings(0.0, 150.0), (None, None))
     np.testing.assert_allclose(np.degrees(found), np.linspace(0.0, 150.0, 41), atol=1e-6)
+    trusted = turn_with_walks(turn, spread, SURE, TIMES, facings(0.0, 150.0), (None, None))
+    assert np.degrees(trusted[20]) < 60.0
+
+
+def test_a_body_that_passes_facings_evenly_turns_evenly() -> None:
+    for direction in (1.0, -1.0):
+        wanted = facings(*(direction * np.linspace(0.0, 300.0, 6)))
+        found = turn_with_walks(*STILL, SURE, TIMES, wanted, (None, None))
+        np.testing.assert_allclose(np.diff(found), direction * np.radians(300.0) / 40.0, atol=1e-9)
 
 
 @given(st.integers(0, 10_000))
 def test_every_facing_is_met_however_the_body_turns_at_its_ends(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    wanted = facings(*rng.uniform(-180.0, 180.0, rng.integers(2, 9)))
+    wanted = facings(*rng.uniform(-180.0, 180.0, rng.integers(2, 21)))
     turn = rng.normal(0.0, 0.1, 40)
     rates = [float(rate) if rng.random() < 0.7 else None for rate in rng.normal(0.0, 2.0, 2)]
     found = turn_with_walks(

@@ -24,7 +24,7 @@ from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
-from motionmind.realise.realise import realise
+from motionmind.realise.realise import FIRMLY, realise
 from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
@@ -294,7 +294,23 @@ def test_a_motion_is_within_what_is_asked_of_its_states_at_each_move(walking: Le
         chains = [walking.corpus.to_chains(q)[:, carried] for q in (at.rotations, motion.rotations[rows])]
         off = rot.angle(*chains)
         assert off.max() < within + 1e-6
-        assert off.max() > 0.99 * within
+        assert off.max() > 0.99 * FIRMLY * within
+
+
+def test_given_postures_are_not_bent_to_their_states_nor_does_the_movement_leap_from_them(walking: Learned) -> None:
+    """Ends and a posture on the way are all far from the states that the path has for them."""
+    motion, rows, rng = walk(), [5, 6, 7, 8, 9, 10, 11], np.random.default_rng(0)
+    off = 0.3 * rng.normal(size=(3, 23, 3))
+    off[:, 0] = 0.0
+    a, via, b = (
+        replace(motion.posture(row), rotations=rot.mul(motion.rotations[row], rot.exp(by)))
+        for row, by in zip((5, 8, 11), off, strict=True)
+    )
+    found = realised(walking, rows, a, b, 240.0, 0.02, through={3: via})
+    passed = found.at(found.insertions[0].times[[3]])
+    assert rot.angle(passed.rotations[0, 1:], via.rotations[1:]).max() < 0.005
+    speed = rot.angle(found.rotations[1:], found.rotations[:-1])
+    assert speed[[0, -1]].max() < 1.5 * speed[1:-1].max()
 
 
 def test_what_the_corpus_does_is_done_again(walking: Learned) -> None:

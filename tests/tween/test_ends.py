@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError, SkeletonError
+from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
+from motionmind.realise.legs import find_legs
 from motionmind.retarget.retarget import to_human23
 from motionmind.tween.engine import Engine
 from motionmind.tween.formulate import formulate
@@ -182,18 +184,24 @@ def speeds(motion: Motion) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
 def test_a_motion_leaves_and_arrives_with_the_velocities_of_its_ends(name: str, number: int) -> None:
-    """Within what a frame leaves of it: the error falls with the length of a frame."""
+    """Within what a frame leaves of it: the error falls with the length of a frame. Legs also hold their feet."""
     engine = Engine.load(name)
     before, after, a, b = window(engine, number)
     given = np.stack([Velocity.at_end(before).rotations, Velocity.at_start(after).rotations])
     assert np.abs(given).max() > 0.3
-    errors = []
-    for fps in (60.0, 240.0):
-        tween = engine.tween(a, b, moves=5, fps=fps, before=before, after=after)
-        errors.append(np.abs(speeds(tween.motion)[0] - given).max())
-    free = np.abs(speeds(engine.tween(a, b, moves=5, fps=240.0).motion)[0] - given).max()
-    assert errors[1] < 0.1 * free
-    assert errors[1] < 0.4 * errors[0]
+    legs = [joint for leg, _ in find_legs(engine.corpus.skeleton)[1] for joint in leg]
+    carried = np.setdiff1d(np.arange(len(engine.corpus.skeleton)), legs)
+
+    def errors(fps: float, **moving: Any) -> Floats:
+        """The greatest error of each joint [J]."""
+        motion = engine.tween(a, b, moves=5, fps=fps, **moving).motion
+        return np.asarray(np.abs(speeds(motion)[0] - given).max(axis=(0, 2)))
+
+    free = errors(240.0)
+    coarse, fine = (errors(fps, before=before, after=after) for fps in (60.0, 240.0))
+    assert fine.max() < 0.35 * free.max()
+    assert fine[carried].max() < 0.1 * free[carried].max() + 1e-3
+    assert fine[carried].max() < 0.4 * coarse[carried].max() + 1e-3
 
 
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
@@ -209,28 +217,23 @@ def test_one_end_may_move_and_the_other_not(name: str, number: int) -> None:
 
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
 def test_the_root_leaves_and_arrives_nearly_as_its_ends_move(name: str, number: int) -> None:
+    """Level, where its feet let it; heights are the floor's matter."""
     engine = Engine.load(name)
     before, after, a, b = window(engine, number)
-    given = np.stack([Velocity.at_end(before).root, Velocity.at_start(after).root])
-    off, free = (
-        np.linalg.norm(speeds(engine.tween(a, b, moves=5, fps=120.0, **moving).motion)[1] - given, axis=1)
-        for moving in ({"before": before, "after": after}, {})
-    )
-    print(name, number, off, free, given)
+    given = np.stack([Velocity.at_end(before).root, Velocity.at_start(after).root])[:, [0, 2]]
+    off = speeds(engine.tween(a, b, moves=5, fps=120.0, before=before, after=after).motion)[1][:, [0, 2]] - given
+    assert np.linalg.norm(off, axis=1).max() < 0.1 * np.linalg.norm(given, axis=1).max() + 0.03
 
 
 @pytest.mark.parametrize(("name", "number"), WINDOWS)
-@pytest.mark.parametrize("move", [1, 2, 4])
-def test_postures_are_passed_exactly_however_near_to_an_end_that_moves(name: str, number: int, move: int) -> None:
+@pytest.mark.parametrize("row", [1, 4])
+def test_postures_are_passed_exactly_however_near_to_an_end_that_moves(name: str, number: int, row: int) -> None:
     engine = Engine.load(name)
     before, after, a, b = window(engine, number)
     clip = max(engine.corpus.clips, key=lambda one: one.stop - one.start)
-    via = engine.corpus.motion(clip).posture(4 + 3 * number + move)
-    try:
-        tween = engine.tween(a, b, moves=5, fps=240.0, via=[(via, move)], before=before, after=after)
-    except NoPathError:
-        pytest.skip("nothing passes that posture at that move")
-    passed = tween.motion.at(tween.motion.insertions[0].times[[move]])
+    via = engine.corpus.motion(clip).posture(4 + 3 * number + row)
+    tween = engine.tween(a, b, fps=240.0, via=[via], before=before, after=after)
+    passed = tween.motion.at(tween.motion.insertions[0].times[list(tween.passed)])
     assert np.degrees(rot.angle(passed.rotations[0], via.rotations)).max() < 0.1
 
 

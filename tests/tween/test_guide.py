@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
-from motionmind.body.motion import Posture, Velocity
+from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
 from motionmind.realise.expectation import expect
 from motionmind.realise.stops import stop_at
@@ -120,6 +120,21 @@ def test_ends_that_move_are_guided_otherwise(engine: Engine) -> None:
     assert np.abs(leaving - plain)[0].max() > 0.1
     assert np.abs(arriving - plain)[-1].max() > 0.1
     assert np.abs(leaving - arriving).max() > 0.1
+
+
+def test_the_search_is_guided_by_the_movement_before_a_and_after_b(engine: Engine) -> None:
+    a, b = ends(engine)
+    joints, times = len(a.skeleton), np.array([-0.1, -0.05, 0.0])
+    spin = rot.exp(times[:, None, None] * np.full((joints, 3), 2.0))
+    before = Motion(a.skeleton, rot.mul(a.rotations, spin), np.repeat(a.root[None], 3, axis=0), times + 1.0, "before")
+    after = Motion(b.skeleton, rot.mul(b.rotations, spin)[::-1], np.repeat(b.root[None], 3, axis=0), times, "after")
+    guides = []
+    for moving in ({}, {"before": before}, {"after": after}):
+        guide = formulate(engine, a, b, TweenRequest(), **moving).searched.guide
+        assert guide is not None
+        guides.append(guide(6))
+    assert np.abs(guides[1] - guides[0])[0].max() > 0.1
+    assert np.abs(guides[2] - guides[0])[-1].max() > 0.1
 
 
 # --- one energy -------------------------------------------------------------------------------------------------------
