@@ -238,6 +238,7 @@ REPORT = [
     "bridges",
     "waits",
     "differs",
+    "what_if",
     "vias",
     "snap_degrees",
     "path_degrees",
