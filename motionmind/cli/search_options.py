@@ -1,4 +1,7 @@
-"""The options of commands that search for movement: one for each field of `TweenRequest`, with its default."""
+"""The options of commands that search for movement: one for each field of `TweenRequest`, with its default.
+
+`tween` fills the others itself: `unlike` by --alternatives, `what_if` by --what-if.
+"""
 
 from __future__ import annotations
 
@@ -105,13 +108,6 @@ SEARCH_OPTIONS = (
         "--posturewise",
         _SEARCH,
         "Use only whole postures in the order of the corpus, as the search of 1998 did.",
-        bool,
-    ),
-    SearchOption(
-        "what_if",
-        "--what-if",
-        _SEARCH,
-        "Say what each --pin, --hold, --avoid and --via costs, and the length: search again without it.",
         bool,
     ),
     SearchOption("sample", "--sample", _SEARCH, "Sample a path, with probability proportional to exp(-cost).", bool),

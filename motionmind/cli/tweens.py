@@ -49,6 +49,12 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
 )
 @option(
+    "--what-if",
+    section=Section.SEARCH,
+    is_flag=True,
+    help="Say what each --pin, --hold, --avoid and --via costs, and the length: search again without it.",
+)
+@option(
     "--before",
     section=Section.MOTION,
     metavar="FRAMES",
@@ -71,6 +77,7 @@ def tween(
     problem: Path | None,
     home: Path | None,
     alternatives: int | None,
+    what_if: bool,
     before: str | None,
     after: str | None,
     **options: Any,
@@ -93,7 +100,7 @@ def tween(
     around = tuple(parse_frames(word) if word else None for word in (before, after))
     outputs = _Outputs(output, report, problem, alternatives)
     outputs.check([*(one.file for one in (*named, *around) if one), *via_files(options)])
-    request = request_options(options)
+    request = request_options(options) | {"what_if": what_if}
     engine = Engine.load(corpus, home)
     start, request["before"] = read_end(named[0], around[0], "before")
     end, request["after"] = read_end(named[1], around[1], "after")

@@ -248,7 +248,7 @@ def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
         TypeError: a name in `options` is no field of `TweenRequest`.
     """
     check_whole("alternatives", alternatives, 1)
-    known = {field.name for field in fields(TweenRequest)} - {"unlike"}
+    known = {field.name for field in fields(TweenRequest)} - {"unlike", "what_if"}
     for name in options:
         if name not in known:
             raise TypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")

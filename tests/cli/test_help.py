@@ -102,9 +102,9 @@ def test_help_hides_the_advanced_options_alone_and_help_all_none(path: tuple[str
     assert "--help-all" not in whole.out.splitlines()[-1]
 
 
-def test_each_field_of_a_request_has_one_option() -> None:
+def test_each_field_of_a_request_has_one_option_but_for_those_of_tween_alone() -> None:
     options = [row.field for row in SEARCH_OPTIONS]
-    assert sorted(options) == sorted({field.name for field in fields(TweenRequest)} - {"unlike"})
+    assert sorted(options) == sorted({field.name for field in fields(TweenRequest)} - {"unlike", "what_if"})
 
 
 def test_the_examples_run(run: Run, tmp_path: Path) -> None:

@@ -230,6 +230,8 @@ def test_how_to_smooth_is_checked_where_nothing_is_smoothed(kata: Piece, karate:
             vary(kata, engine, nudge=0.0, novelti=1.0)
         with pytest.raises(TypeError, match="'unlike'"):
             vary(kata, engine, nudge=0.0, unlike=[])
+        with pytest.raises(TypeError, match="'what_if'"):
+            vary(kata, engine, nudge=0.0, what_if=True)
     still = vary(kata, nudge=0.0)
     with pytest.raises(TypeError, match="'nonsense'"):
         still.smooth(karate, nonsense=3)
