@@ -20,6 +20,7 @@ def set_on_floor(
     times: Floats,
     half_steps: Floats,
     clearance: Floats,
+    trust: Floats,
     stands: Floats,
     loose: Bools,
     fixed: Bools,
@@ -36,6 +37,7 @@ def set_on_floor(
         times: of the frames [N], seconds.
         half_steps: times of the moves and midway between them [2 T + 1], seconds.
         clearance: height of the lowest point above the floor at the half steps [2 T + 1], metres.
+        trust: how far that is to be trusted, and not the way from one given height to the next [2 T + 1], from 0 to 1.
         stands: how firmly each limb, and last the trunk, stands where it is low, at the half steps
             [2 T + 1, limbs + 1], from 0 to 1.
         loose: joints without limits [J].
@@ -49,7 +51,9 @@ def set_on_floor(
     given = 2 * np.array(list(low))
     floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
     at_half_steps = clearance + floor
-    at_half_steps[given] = list(low.values())
+    evenly = np.interp(half_steps, half_steps[given], list(low.values()))
+    at_half_steps = evenly + trust * (at_half_steps - evenly)
+    at_half_steps[given] = evenly[given]
     heights = _eased(half_steps, at_half_steps, times)
     clear = np.maximum(heights - np.interp(times, half_steps, floor), 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])

@@ -13,7 +13,7 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 
 LASTS = 0.45  # seconds for which a velocity at an end is felt at most
-FAR = 1.6  # walks are trusted by half where the corpus is as far as 1 / FAR of the way to go
+FAR = 1.2  # walks are trusted by half where the corpus is as far as 1 / FAR of the way to go
 UNLIKE = 0.45  # radians a joint (root mean square): as far as that the corpus holds another posture altogether
 SHARPLY = 4  # power by which trust falls beyond that
 NO_WAY = 1e-3  # radians a joint: nothing to go, but for the rounding of files

@@ -27,6 +27,9 @@ from motionmind.realise.timeline import Timeline, timeline
 # Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
 # between two frames, and elsewhere.
 FIRMLY, FREELY = 0.95, 3.0
+LINGERS = (
+    0.1  # power of the trust in walks by which their detail is trusted: roughness is less particular than movement
+)
 
 
 def realise(
@@ -96,17 +99,19 @@ def realise(
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
+    trust = walk.trust[:, 0]
     rotations, root = set_on_floor(
         a.skeleton,
         rotations,
         clock.frames,
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
+        np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
         walk.moments @ carriage.stands,
         carriage.loose,
         fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
-        size * travel_along(walk.moves @ carriage.travel, walk.headings),
+        size * travel_along(trust[:, None] * (walk.moves @ carriage.travel), walk.headings),
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
     )
@@ -187,7 +192,7 @@ def _add_detail(
 ) -> tuple[Floats, Ints]:
     """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from.
 
-    Each joint has it as far as it is trusted to the corpus's walks.
+    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS.
     """
     between = corpus.detail.shape[1]
     if not between:
@@ -195,7 +200,7 @@ def _add_detail(
     joints = walk.poses.shape[1]
     moves = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], walk.poses[::2])
     times = subdivide_times(walk.half_steps[::2], between)
-    trust = np.repeat(walk.trust[::2], between + 1, axis=0)
+    trust = np.repeat(walk.trust[::2] ** LINGERS, between + 1, axis=0)
     detail = detail_of(corpus, moves) * np.concatenate([trust, trust[-1:]])[..., None]
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
