@@ -199,6 +199,22 @@ def test_a_tween_has_detail_but_at_its_moves_and_ends() -> None:
     assert np.median(apart[3::6]) > 0.01
 
 
+def test_detail_lingers_where_walks_are_hardly_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = recorded()
+    known = learned(clip, rate=5.0)
+    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
+    a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
+
+    def size(trust: float) -> float:
+        monkeypatch.setattr("motionmind.realise.mean_walk.trust", lambda *_: trust)
+        found, plain = (realised(one, list(range(2, 17)), a, b) for one in (known, smooth))
+        return float(np.median(rot.angle(found.rotations, plain.rotations)[3::6, carried]))
+
+    assert size(0.0) < 1e-6
+    assert size(0.01) == pytest.approx(0.01**LINGERS * size(1.0), rel=0.5)
+    assert size(0.01) > 0.3 * size(1.0)
+
+
 # --- the whole --------------------------------------------------------------------------------------------------------
 
 

@@ -123,3 +123,12 @@ def test_a_body_turns_the_near_way_round(a: float, b: float, turn: float, speeds
         headings = np.degrees(np.unwrap(rot.heading(motion.rotations[:, 0])))
         assert headings[-1] - headings[0] == pytest.approx(turn, abs=1e-6)
         assert headings.max() - headings.min() < abs(turn) + 40.0
+
+
+@pytest.mark.parametrize(("name", "row"), [("ballet", 0), ("ballet", 500), ("ballet", 2000), ("karate", 334)])
+def test_a_body_with_nowhere_to_go_stays_where_it_is_in_the_air_too(name: str, row: int) -> None:
+    engine = engine_of(name)
+    here = posture(engine, row)
+    motion = engine.tween(here, here, duration=1.5).motion
+    np.testing.assert_allclose(motion.root, np.broadcast_to(here.root, motion.root.shape), atol=1e-3)
+    assert np.degrees(rot.angle(motion.rotations, here.rotations)).max() < 0.5
