@@ -24,7 +24,7 @@ from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
-from motionmind.realise.realise import FIRMLY, realise
+from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
