@@ -27,9 +27,8 @@ from motionmind.realise.timeline import Timeline, timeline
 # Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
 # between two frames, and elsewhere.
 FIRMLY, FREELY = 0.95, 3.0
-LINGERS = (
-    0.1  # power of the trust in walks by which their detail is trusted: roughness is less particular than movement
-)
+# Power of the trust in walks by which their detail is trusted: roughness is less particular than movement.
+LINGERS = 0.1
 
 
 def realise(
