@@ -54,7 +54,8 @@ def cfn(problem: Problem, moves: int, names: Sequence[str]) -> str:
     lines = []
     for name, scope, body in functions:
         default = {"defaultcost": forbidden} if body.get("defaultcost", 0.0) is None else {}
-        lines.append(f"{json.dumps(name)}: {json.dumps({'scope': scope, **body, **default})}")
+        head = json.dumps({"scope": scope, **{key: body[key] for key in body if key != "costs"}, **default})
+        lines.append(f'{json.dumps(name)}: {head[:-1]}, "costs": {_numbers(_listed(body))}}}')
     values = [f"{json.dumps(name)}: {json.dumps(states)}" for name, states in variables.items()]
     header = {"name": f"tween_{moves}_moves", "mustbe": f"<{forbidden:.{DECIMALS}f}"}
     return (
@@ -113,9 +114,20 @@ def _flat(listed: list[tuple[int, int, float]]) -> list[float]:
 
 
 def _costs(scope: list[str], body: dict[str, object]) -> list[float]:
+    costs = _listed(body)
+    return costs[2::3] if len(scope) == 2 else costs
+
+
+def _listed(body: dict[str, object]) -> list[float]:
     costs = body["costs"]
     assert isinstance(costs, list)
-    return costs[2::3] if len(scope) == 2 else costs
+    return costs
+
+
+def _numbers(numbers: list[float]) -> str:
+    """Return a list as the format has it: numbers such as 2e-06, which JSON knows, are none to toulbar2."""
+    written = (f"{number:.{DECIMALS}f}" if isinstance(number, float) else str(number) for number in numbers)
+    return f"[{', '.join(written)}]"
 
 
 def _round(cost: float) -> float:

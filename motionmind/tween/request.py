@@ -69,7 +69,7 @@ class TweenRequest:
         tau: nats for each move.
         bridge_price: nats for each degree of an unattested move.
         guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
-            leaves their guide out. A search of whole postures has none.
+            leaves their guide out. It shrinks as novelty grows, and a search of whole postures has none.
         fps: frames a second of the motion.
 
     Raises:
@@ -197,8 +197,9 @@ class TweenRequest:
 
     @property
     def kappa(self) -> float:
-        """Factor of the guide: as asked, or 0 where whole postures are searched."""
-        return 0.0 if self.posturewise else self.guide
+        """Factor of the guide: as asked, less as novelty grows, for what walks expect is the corpus's habit; 0 where
+        whole postures are searched."""
+        return 0.0 if self.posturewise else self.guide * (1.0 - self.novelty)
 
     @property
     def coordination_factor(self) -> float:

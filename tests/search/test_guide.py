@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -293,6 +294,18 @@ def test_the_guided_optima_of_toys_are_those_of_toulbar2(tmp_path: Path) -> None
             assert toulbar2(text, tmp_path) == pytest.approx(found.cost, abs=1e-4), seed
             checked += 1
     assert checked > 10
+
+
+def test_costs_of_a_millionth_of_a_nat_are_written_as_toulbar2_reads_them(tmp_path: Path) -> None:
+    toy = random_toy(3)
+    rng = np.random.default_rng(3)
+    small = 1e-6 * rng.integers(1, 90, (MOVES - 1, sum(toy.sizes)))
+    problem = toy.problem(toy.rules(MOVES, MOVES), guide=lambda _: small)
+    found = solution(problem)
+    assert found is not None
+    text = written(problem, found, [f"chain{chain}" for chain in range(len(toy.sizes))])
+    assert not re.search(r"\de-", text)
+    assert toulbar2(text, tmp_path) == pytest.approx(found.cost, abs=1e-4)
 
 
 @pytest.mark.parametrize("guided", [False, True])

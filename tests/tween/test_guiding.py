@@ -161,7 +161,6 @@ def test_whatever_is_wished_is_judged_by_one_energy(engine: Engine) -> None:
         {"pin": {joint: "B"}},
         {"avoid": [(engine.corpus.skeleton.names[2], int(states[2]))]},
         {"via": [posture(engine, 20)]},
-        {"novelty": 0.5},
         {"sample": True},
         {"lambda_": 0.2, "beta": 2.0, "tau": 0.1},
         {"moves": 9},
@@ -169,6 +168,8 @@ def test_whatever_is_wished_is_judged_by_one_energy(engine: Engine) -> None:
     ):
         np.testing.assert_array_equal(guide_of(engine, 9, **options), plain)
     np.testing.assert_allclose(guide_of(engine, 9, guide=2.5), 2.5 * plain)
+    np.testing.assert_allclose(guide_of(engine, 9, novelty=0.5), 0.5 * plain)  # what walks expect is habit
+    assert formulated(engine, novelty=1.0).searched.guide is None
 
 
 def test_moves_in_place_of_states_are_charged_where_they_arrive() -> None:
@@ -191,7 +192,7 @@ def test_moves_in_place_of_states_are_charged_where_they_arrive() -> None:
         {"moves": 12, "duration": 0.7},
         {"guide": 0.3, "lambda_": 0.0},
         {"coordination": "none", "tau": 0.0},
-        {"novelty": 1.0},
+        {"novelty": 0.9},
     ],
 )
 def test_the_guide_s_costs_add_up_with_the_others(engine: Engine, options: dict[str, Any]) -> None:
