@@ -10,7 +10,7 @@ walks (`motionmind.realise.mean_walk`) is the movement from which the corpus's o
 Walks of the whole body keep its joints together, but whole bodies recur seldom; limbs recur often, but do not know of
 each other. They err differently, and the mean over walks of parts of all sizes errs less than that of any one size.
 
-The constants were chosen on one dancer's windows; experiments/inbetween says whose, and reports other dancers, too.
+experiments/inbetween says on which windows the constants were chosen, and what the choice is worth on other people.
 """
 
 from __future__ import annotations
