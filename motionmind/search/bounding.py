@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Int32s, Ints
-from motionmind.search import pair_chains, trws
+from motionmind.search import heuristic, pair_chains, trws
 from motionmind.search.attention import Attention
 from motionmind.search.costs import path_cost
 from motionmind.search.heuristic import Heuristic
@@ -128,7 +128,7 @@ def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
         chosen, through = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64), np.zeros(size)
         tables = state.heuristic.tables
         lower_bound = pair_chains.sweep(state.trellis, tables, through)
-        pair_chains.descend(state.trellis, tables, chosen)
+        heuristic.descend(state.trellis, Heuristic.of_pair_chains(tables), chosen)
         state.update(lower_bound, chosen)
         if state.found or not state.closed:
             trellis, tables = pair_chains.prune(state.trellis, tables, through, state.limit)

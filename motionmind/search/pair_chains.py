@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats
 from motionmind.jit import jit
 from motionmind.search.pair_chain_tables import (
     PairChains,
@@ -205,21 +205,6 @@ def step(trellis: Trellis, tables: PairChains, i: int, frontier: NDArray[np.uint
             - tables.to_go[tables.pair_ptr[c] + before * size + y]
         )
     return grown
-
-
-@jit
-def descend(trellis: Trellis, tables: PairChains, path: Ints) -> None:
-    """Write to `path` [n] the path of positions that takes the least growth at each variable."""
-    chains = trellis.chains
-    frontier = np.zeros(chains, np.uint16)
-    path[:chains] = trellis.dom_ptr[:chains]
-    for i in range(chains, len(path)):
-        before, least = path[i - chains], np.inf
-        for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
-            grown = step(trellis, tables, i, frontier, e)
-            if grown < least:
-                least, path[i] = grown, trellis.row_to[e]
-        frontier[i % chains] = path[i] - trellis.dom_ptr[i]
 
 
 # --- shares ----------------------------------------------------------------------------------------------------------

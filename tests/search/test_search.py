@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from toys import Toy, evaluate, noisy_messages, random_toy, solution, trellis_of
 
-from motionmind.search import astar, bounding, pair_chains, parts, solve, trws
+from motionmind.search import astar, bounding, heuristic, pair_chains, parts, solve, trws
 from motionmind.search.attention import Attention
 from motionmind.search.cfn import cfn
 from motionmind.search.costs import path_cost
@@ -279,7 +279,7 @@ def test_two_chains_are_one_pair_chain_and_its_bound_is_their_optimum(kind: dict
                 np.zeros((MOVES + 1) * 2, np.int64),
             )
             assert pair_chains.lower_bound(tables) == pytest.approx(optimum, abs=ROUNDING), seed
-            pair_chains.descend(trellis, tables, path)
+            heuristic.descend(trellis, Heuristic.of_pair_chains(tables), path)
             assert path_cost(trellis, path) == pytest.approx(optimum, abs=ROUNDING), seed
 
 
