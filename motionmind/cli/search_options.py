@@ -17,6 +17,7 @@ from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Nu
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.grammar.schemes import Scheme, Weights
+from motionmind.realise.corrections import Correction
 from motionmind.tween.request import TweenRequest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -181,6 +182,14 @@ SEARCH_OPTIONS = (
         NATS,
         "N",
         advanced=True,
+    ),
+    SearchOption(
+        "without",
+        "--without",
+        _MOTION,
+        "Leave out a correction of the movement. Repeatable.",
+        click.Choice(get_args(Correction)),
+        multiple=True,
     ),
     SearchOption("fps", "--fps", _MOTION, "Set the motion's frames per second.", RATE, advanced=True),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +16,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
+from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import set_on_floor
@@ -46,6 +47,7 @@ def realise(
     through: Mapping[int, Posture] = MappingProxyType({}),
     leaving: Velocity | None = None,
     arriving: Velocity | None = None,
+    without: Collection[Correction] = (),
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -76,6 +78,7 @@ def realise(
         through: postures on the way, by the number of moves that lead there, increasing.
         leaving: velocity with which the body leaves `a`; None where it is unknown.
         arriving: velocity with which it arrives at `b`.
+        without: corrections to leave out.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.

@@ -214,6 +214,7 @@ class Engine(LearnedCorpus):
             dict(zip(certificate.passed, formulation.through, strict=True)),
             formulation.leaving,
             formulation.arriving,
+            request.without,
         )
 
     def _account_for(

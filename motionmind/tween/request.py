@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, get_args
 from motionmind.body.rates import FASTEST
 from motionmind.errors import MotionMindError, did_you_mean
 from motionmind.grammar.schemes import Scheme, Weights
+from motionmind.realise.corrections import Correction
 
 if TYPE_CHECKING:
     from motionmind._typing import States
@@ -70,6 +71,7 @@ class TweenRequest:
         bridge_price: nats for each degree of an unattested move.
         guide: kappa, nats for a joint that is off what walks through the corpus expect by its tolerance for 0.2 s; 0
             leaves their guide out. It shrinks as novelty grows, and a search of whole postures has none.
+        without: corrections of the movement to leave out: see `motionmind.realise.corrections`.
         fps: frames a second of the motion.
 
     Raises:
@@ -107,12 +109,13 @@ class TweenRequest:
     tau: float = 1.0
     bridge_price: float = 1.0
     guide: float = 1.0
+    without: Sequence[Correction] = ()
     fps: float = 30.0
 
     def __post_init__(self) -> None:
         # Copies, so that what is asked stays as it was when the caller's own lists change.
         object.__setattr__(self, "pin", MappingProxyType(dict(self.pin)))
-        for name in ("hold", "avoid", "via", "unlike"):
+        for name in ("hold", "avoid", "via", "unlike", "without"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         self._check_combinations()
         _check_count("max_moves", self.max_moves, MOST_MOVES)
@@ -126,6 +129,8 @@ class TweenRequest:
             _check_count("memory", self.memory, MOST_MEMORY)
         _check_choice("coordination", self.coordination, get_args(Scheme))
         _check_choice("weights", self.weights, get_args(Weights))
+        for correction in self.without:
+            _check_choice("without", correction, get_args(Correction))
         if not _is_whole(self.seed, 0, math.inf):
             raise MotionMindError(f"seed must be a whole number of at least 0, not {self.seed}")
         if not SLOWEST <= self.fps <= FASTEST:
@@ -228,6 +233,7 @@ class TweenRequest:
             "moves": list(self.moves) if isinstance(self.moves, tuple) else self.moves,
             "pin": dict(self.pin),
             "hold": list(self.hold),
+            "without": list(self.without),
             "avoid": [list(pair) for pair in self.avoid],
             "via": [None if move is None else int(move) for _, move in self.vias],
             "unlike": len(self.unlike),
