@@ -84,18 +84,41 @@ def _point_heights(
 ) -> tuple[Floats, Indices]:
     """Return heights [..., P] of all joints, all tips and, given an anatomy with legs, both heels; and the joint [P]
     that each point belongs to."""
-    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
+    places, joints = _places(skeleton, rotations, root, anatomy)
+    return places[..., 1], joints
+
+
+def contact_points(skeleton: Skeleton, rotations: Floats, root: Floats) -> tuple[Floats, Indices]:
+    """Return the points of a body that may touch the floor: all joints, all tips and, of people, both heels.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+
+    Returns:
+        Their places [..., P, 3], metres, and the joint that each belongs to [P].
+    """
+    return _places(skeleton, rotations, root, anatomy_of(skeleton))
+
+
+def _places(
+    skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None
+) -> tuple[Floats, Indices]:
+    """Return places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint [P]
+    that each point belongs to."""
+    places = skeleton.positions_and_tips(rotations, root)
     joints = np.tile(np.arange(len(skeleton)), 2)
     if anatomy is None or anatomy.leg is None:
-        return heights, joints
+        return places, joints
     heel = np.array(anatomy.leg.heel)
     if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
         heel = heel * skeleton.height / anatomy.skeleton.height
     ankles = np.array([anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
     turned = skeleton.global_rotations(rotations)[..., ankles, :]
     heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
-    heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
-    return heights, np.concatenate([joints, ankles])
+    places = np.concatenate([places, places[..., ankles, :] + rot.mul_vec(turned, heels)], axis=-2)
+    return places, np.concatenate([joints, ankles])
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------

@@ -1,17 +1,29 @@
-"""Setting a movement on the floor: heights, the root's trajectory and planted feet together."""
+"""Setting a movement on the floor: who bears the body and where, the root's trajectory, and legs that reach the floor.
+
+Rotations come from the mean of walks; where the body is follows from what bears it. Each foot gets *stances*, with
+places on the floor (`motionmind.realise.footfalls`). The root is carried by what bears, smoothly, and so that its
+weight stays over the support (`motionmind.realise.root`). The legs then reach for the places
+(`motionmind.realise.feet`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from itertools import pairwise
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry.splines import natural_spline
-from motionmind.realise.feet import plant_feet
+from motionmind.realise.carrying import Carried, carry, foot_heights
+from motionmind.realise.corrections import Correction
+from motionmind.realise.feet import Foot, bend_legs, find_free_feet
 from motionmind.realise.minimal import departure
-from motionmind.realise.root import root_trajectory
+from motionmind.realise.root import root_trajectory, stand
+
+FLIES = 0.05  # metres above the floor from which a body that walks expect to be in the air is
 
 
 def set_on_floor(
@@ -28,6 +40,7 @@ def set_on_floor(
     drift: Floats,
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
+    without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
 
@@ -47,6 +60,7 @@ def set_on_floor(
         drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
+        without: corrections to leave out.
     """
     given = 2 * np.array(list(low))
     floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
@@ -55,17 +69,52 @@ def set_on_floor(
     at_half_steps = evenly + trust * (at_half_steps - evenly)
     at_half_steps[given] = evenly[given]
     heights = _eased(half_steps, at_half_steps, times)
-    clear = np.maximum(heights - np.interp(times, half_steps, floor), 0.0)
+    under = np.interp(times, half_steps, floor)
+    clear = np.maximum(heights - under, 0.0)
     places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
     middles = 0.5 * (times[1:] + times[:-1])
     held = np.stack([np.interp(middles, half_steps, limb) for limb in stands.T], axis=1)
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
-    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends), times, rates)
-    fps = 1.0 / (times[1] - times[0])
-    frames = fps * half_steps[given]
-    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fixed, fps, frames)
+    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1]), times, rates)
+    root = stand(skeleton, rotations, root, heights)
     root[0], root[-1] = ends
+    fps = 1.0 / (times[1] - times[0])
+    clear[clear < FLIES] = 0.0
+    firm = np.stack([np.interp(times, half_steps, limb) for limb in stands.T], axis=1)
+    feet = find_free_feet(skeleton, fixed)
+    frames = fps * half_steps[given]
+    rotations = rotations.copy()
+    for number, (start, end) in enumerate(pairwise(frames)):
+        # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
+        part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
+        if part.stop - part.start > 2:
+            moving = number == 0 and rates[0] is not None, number == len(frames) - 2 and rates[1] is not None
+            carried = carry(
+                skeleton, rotations[part], root[part], under[part], clear[part], firm[part], feet, fps, moving, without
+            )
+            rotations[part], root[part] = _reach_floor(skeleton, rotations[part], carried, feet, loose)
     return rotations, root
+
+
+def _reach_floor(
+    skeleton: Skeleton, rotations: Floats, carried: Carried, feet: list[Foot], loose: Bools
+) -> tuple[Floats, Floats]:
+    """Return rotations whose legs are where they should be, within their limits, and the root.
+
+    A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height.
+    """
+    joints = [joint for foot in feet for joint in foot.leg]
+    out, off = rotations.copy(), carried.off
+    if not joints:
+        return out, carried.root
+    for again in (True, False):
+        planted = bend_legs(skeleton, rotations, carried.root, feet, off)
+        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+        if again:
+            off = carried.off + 0.0
+            off[..., 1] += carried.heights - foot_heights(skeleton, out, carried.root, feet)
+            off[[0, -1]] = 0.0
+    return out, carried.root
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:

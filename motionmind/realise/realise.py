@@ -116,6 +116,7 @@ def realise(
         size * travel_along(trust[:, None] * (walk.moves @ carriage.travel), walk.headings),
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
+        without,
     )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 

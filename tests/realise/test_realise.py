@@ -68,7 +68,7 @@ def test_a_foot_that_stands_carries_the_body() -> None:
     rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
     feet = [stander.index("left_toes"), stander.index("right_toes")]
     seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
-    root = root_trajectory(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1])
+    root = root_trajectory(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1], 1.0)
     np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
     assert np.ptp(seen[:, 2]) > 0.1
 
@@ -95,7 +95,7 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
 def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
-    flown = root_trajectory(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b)
+    flown = root_trajectory(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0)
     missing = b - drift.sum(axis=0)
     np.testing.assert_allclose(np.diff(flown, axis=0), drift + missing / 11.0, atol=1e-9)
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
