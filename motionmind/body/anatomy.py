@@ -186,7 +186,8 @@ class Anatomy:
         """
         body = skeleton or self.skeleton
         masses, centres = self._segments
-        centres = centres * (body.height / self.skeleton.height)
+        if skeleton is not None:
+            centres = centres * (skeleton.height / self.skeleton.height)
         places = body.positions(rotations, root)
         return np.asarray(
             np.einsum("j,...jk->...k", masses, places + rot.mul_vec(body.global_rotations(rotations), centres))

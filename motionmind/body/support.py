@@ -107,7 +107,7 @@ def overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
 
 
 def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
-    """Return the number of the limb that postures stand on alone [...]; -1 where several limbs, or the trunk, are low.
+    """Return the number of the limb, or trunk, that postures stand on alone [...]; -1 where several are low.
 
     A posture has no speed: here the limb is the only one with a point near the body's lowest.
 
@@ -118,8 +118,7 @@ def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
     """
     heights = limb_heights(skeleton, rotations, root)
     low = heights <= heights.min(axis=-1, keepdims=True) + NEAR * size_of(skeleton)
-    alone = (low.sum(axis=-1) == 1) & ~low[..., -1]
-    return np.where(alone, low.argmax(axis=-1), -1)
+    return np.where(low.sum(axis=-1) == 1, low.argmax(axis=-1), -1)
 
 
 def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
