@@ -63,7 +63,9 @@ def assert_optimal(engine: Engine, a: Posture, b: Posture, folder: Path, **optio
 
 
 @pytest.mark.parametrize(("name", "count", "moves"), [("ballet", 12, 5), ("karate", 4, 4), ("walk-hexapod", 4, None)])
-def test_default_tweens_of_bundled_movement_are_optimal(name: str, count: int, moves: int | None, tmp_path: Path) -> None:
+def test_default_tweens_of_bundled_movement_are_optimal(
+    name: str, count: int, moves: int | None, tmp_path: Path
+) -> None:
     engine = engine_of(name)
     for a, b, _ in drawn(engine, count, seed=16):
         assert_optimal(engine, a, b, tmp_path, moves=moves)
