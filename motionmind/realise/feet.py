@@ -10,37 +10,57 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.legs import find_legs, reach
+from motionmind.realise.legs import find_hinge, find_legs, reach
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
+FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-LIFT = 0.08  # metres to which a step lifts a foot that the movement does not lift
+SLIDES = 2.0  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
+LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
 KNEE = 8.0  # radians a second at which knees bend at most in a step, which is lifted less if it is quick
 FAR = 0.15  # metres from its own track to which a foot must go to be lifted so far
 
 
 class Foot(NamedTuple):
-    """A leg that can be placed: its number among the limbs, its joints, and the place among them of its knee.
+    """A leg that can be placed; the part of it that stands is everything beyond the shank.
 
-    The part of it that stands is everything beyond the shank.
+    Attributes:
+        limb: its number among the limbs.
+        leg: its joints, outward.
+        knee: the place among them of its knee.
+        hinge: the axis about which that bends, in the frame of the joint above [3]; None if unknown.
     """
 
     limb: int
     leg: list[int]
     knee: int
+    hinge: Floats | None
 
     @property
     def joints(self) -> list[int]:
         """The joints of the foot itself; none if the leg ends in the shank's own tip."""
         return self.leg[self.knee + 1 :]
 
+    def chain(self, skeleton: Skeleton) -> list[int]:
+        """Return hip, knee and the point that they bring to its place, the next joint or the tip, as of points [2 J]."""
+        return [*self.leg, self.leg[-1] + len(skeleton)][self.knee - 1 : self.knee + 2]
+
+    def length(self, skeleton: Skeleton) -> float:
+        """Return the length of thigh and shank together, metres."""
+        _, knee, end = self.chain(skeleton)
+        shank = skeleton.offsets[end] if end < len(skeleton) else skeleton.tips[end - len(skeleton)]
+        return float(np.linalg.norm(skeleton.offsets[knee]) + np.linalg.norm(shank))
+
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
     """Return the feet of a body's legs, but for those with joints that must not change."""
     numbers, legs = find_legs(skeleton)
     return [
-        Foot(number, leg, knee) for number, (leg, knee) in zip(numbers, legs, strict=True) if not fixed[leg].any()
+        Foot(number, leg, knee, find_hinge(skeleton, leg[knee]))
+        for number, (leg, knee) in zip(numbers, legs, strict=True)
+        if not fixed[leg].any()
     ]
 
 
@@ -69,72 +89,98 @@ def track_of(foot: Foot, places: Floats) -> Floats:
     """
     count = places.shape[1] // 2
     ends = places[:, [foot.leg[-1], count + foot.leg[-1]]]
-    height = np.maximum(ends[1:, :, 1], ends[:-1, :, 1])
-    share = np.exp(-(height - height.min(axis=1, keepdims=True)) / GRIP)
-    share /= share.sum(axis=1, keepdims=True)
-    moved = np.einsum("np,npk->nk", share, np.diff(ends[..., [0, 2]], axis=0))
-    return np.asarray(ends[0, :, [0, 2]].mean(axis=1) + np.concatenate([np.zeros((1, 2)), np.cumsum(moved, axis=0)]))
+    height, level = ends[..., 1], ends[..., [0, 2]]
+    moved = np.einsum("np,npk->nk", _hold(np.maximum(height[1:], height[:-1])), np.diff(level, axis=0))
+    along = np.concatenate([np.zeros((1, 2)), np.cumsum(moved, axis=0)])
+    # A foot that rolls to and fro comes back to its place only roughly: on the whole, it moves as the end of it does
+    # that stands in the first and in the last frame.
+    both = _hold(height[0] + height[-1])
+    drift = both @ (level[-1] - level[0]) - along[-1]
+    along += np.linspace(0.0, 1.0, len(along))[:, None] * drift
+    return np.asarray(both @ level[0] + along)
+
+
+def _hold(height: Floats) -> Floats:
+    """Return how much each end of a foot holds on to the floor [..., 2], by its height [..., 2], metres; sums are 1."""
+    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP)
+    return np.asarray(share / share.sum(axis=-1, keepdims=True))
 
 
 def departure(
-    track: Floats, height: Floats, stances: list[Stance], leg: float, fps: float, moving: tuple[bool, bool], lifts: bool
+    places: Floats,
+    track: Floats,
+    height: Floats,
+    stances: list[Stance],
+    leg: float,
+    fps: float,
+    moving: tuple[bool, bool],
 ) -> Floats:
     """Return a foot's displacement from the movement's own track [N, 3], metres: 0 in the first and the last frame.
 
     Where the foot stands it is what keeps it in its place, on the floor; between two places it is as smooth as can be,
-    and tends to 0. A foot that swings is kept above the floor, and lifted as far as it is taken elsewhere.
+    and tends to 0. A foot that swings is kept above the floor. As far as it is taken elsewhere it is lifted, and then
+    moves level the less the lower it is.
 
     Args:
-        track: of the foot in the world [N, 2], metres, level.
+        places: of the foot where it stands [N, 2], metres, level.
+        track: where the movement has it [N, 2], metres.
         height: of its lowest point above the floor [N], metres.
-        stances: when and where it stands.
+        stances: when it stands.
         leg: length of the leg, metres.
         fps: frames a second.
         moving: whether the foot's velocity is given in the first and in the last frame.
-        lifts: whether to lift it.
     """
-    count = len(track)
-    wanted, stands = np.zeros((count, 3)), np.zeros(count)
-    bump = np.zeros(count)
-    last = 0
+    count = len(places)
+    wanted, stands, lift, slides = np.zeros((count, 3)), np.zeros(count), np.zeros(count), np.zeros(count - 1)
+    last = None
     for stance in stances:
         here = slice(stance.start, stance.end + 1)
-        share = np.linspace(0.0, 1.0, stance.end + 1 - stance.start)[:, None]
-        wanted[here][:, [0, 2]] = stance.place + share * stance.slip - track[here]
+        wanted[here, 0], wanted[here, 2] = (places[here] - track[here]).T
         wanted[here, 1] = _settled(height, stance, fps) - height[here]
         stands[here] = 1.0
-        if last < stance.start:
-            swing = np.arange(last, stance.start + 1)
-            s = (swing - swing[0]) / max(len(swing) - 1, 1)
-            bend = 0.5 * KNEE * (len(swing) - 1) / (np.pi * fps)
-            bump[swing] = np.sin(np.pi * s) ** 4 * min((1.0 - np.cos(bend)) * leg / LIFT, 1.0)
+        if last is not None:
+            far = np.linalg.norm(places[stance.start] - places[last] - track[stance.start] + track[last])
+            rises = _lift(stance.start - last, float(far), leg, fps)
+            lift[last : stance.start + 1] = rises
+            slides[last : stance.start] = (1.0 - 0.5 * (rises[1:] + rises[:-1]) / max(rises.max(), 1e-9)) ** 2
         last = stance.end
-    for end, moves in ((0, moving[0]), (-1, moving[1])):
-        if moves:  # it comes to rest within a while
-            frames = np.arange(count) if end == 0 else np.arange(count)[::-1]
-            stands *= np.minimum(frames / (BENDS * fps), 1.0)
-    out = _bend(wanted, stands, fps)
-    off = np.hypot(out[:, 0], out[:, 2])
-    low = height + out[:, 1]
+    out = _bend(wanted, np.diff(track, axis=0), stands, slides, fps)
     free = stands == 0.0
-    change = np.minimum(_greatest_change(off, free) / FAR, 1.0)
-    floor = LIFT * bump * change * lifts
-    soft = 0.01 * bump + 1e-4
-    over = (low - floor) / soft
-    lifted = floor + soft * np.where(over > 30.0, over, np.log1p(np.exp(np.minimum(over, 30.0))))
-    out[free, 1] += (lifted - low)[free]
+    above = height + out[:, 1] - lift
+    soft = 0.1 * lift + 1e-4
+    # A smooth maximum of where it is and how far it is to be lifted.
+    lifted = np.where(above > 30.0 * soft, above, soft * np.log1p(np.exp(np.minimum(above / soft, 30.0))))
+    out[free, 1] += (lifted - above)[free]
+    return out * fade_at_ends(count, moving, fps)[:, None]
+
+
+def fade_at_ends(count: int, moving: tuple[bool, bool], fps: float) -> Floats:
+    """Return a curve [count] that is 0 at both ends, and elsewhere 1; where the end moves it rises smoothly."""
+    out, frames = np.ones(count), np.arange(count)
     out[[0, -1]] = 0.0
+    for moves, away in ((moving[0], frames), (moving[1], frames[::-1])):
+        if moves:
+            s = np.minimum(away / (FADES * fps), 1.0)
+            out *= s * s * (3.0 - 2.0 * s)
     return out
 
 
-def _greatest_change(off: Floats, free: Bools) -> Floats:
-    """Return, for the frames of each swing, how much its departure from its track changes [N], metres."""
-    out = np.zeros(len(off))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.view(np.int8), [0]])))
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        around = off[max(start - 1, 0) : end + 1]
-        out[start:end] = around.max()
-    return out
+def _lift(frames: int, far: float, leg: float, fps: float) -> Floats:
+    """Return how far a step lifts a foot, from one stance to the next [frames + 1], metres.
+
+    The shorter and the quicker a step, the less: by what a knee bends from straight in the time that it rises.
+
+    Args:
+        frames: that the step takes.
+        far: how far it takes the foot from the movement's own track, metres.
+        leg: length of the leg, metres.
+        fps: frames a second.
+    """
+    bend = min(KNEE * RISES * frames / (1.5 * fps), np.pi)
+    s = np.linspace(0.0, 1.0, frames + 1)
+    s = np.minimum(np.minimum(s, 1.0 - s) / RISES, 1.0)
+    highest = min(leg * (1.0 - np.cos(0.5 * bend)), LIFT) * min(far / FAR, 1.0)
+    return np.asarray(highest * s * s * (3.0 - 2.0 * s))
 
 
 def _settled(height: Floats, stance: Stance, fps: float) -> Floats:
@@ -148,24 +194,36 @@ def _settled(height: Floats, stance: Stance, fps: float) -> Floats:
     return out
 
 
-def _bend(wanted: Floats, stands: Floats, fps: float) -> Floats:
-    """Return departures [N, 3] that are as wanted [N, 3] where a foot stands [N], smooth, and elsewhere near 0."""
+def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: float) -> Floats:
+    """Return departures [N, 3] that are as wanted where a foot stands, smooth, and elsewhere near 0.
+
+    They minimise sum_t 1e6 s^2 |d - wanted|^2 + (1 - s) |d|^2 + (BENDS^4) |d''|^2 + SLIDES^2 l |d' + track'|^2, with s how
+    much it stands, and l how low it is in a step. They are 0, and depart smoothly, at both ends.
+
+    Args:
+        wanted: displacements of a foot that stands [N, 3], metres.
+        moves: of the movement's own track from frame to frame, level [N - 1, 2], metres.
+        stands: how much it stands [N], from 0 to 1.
+        slides: how much it is to move level as little as it can [N - 1], from 0 to 1.
+        fps: frames a second.
+    """
     from scipy.linalg import solveh_banded
 
     count = len(wanted)
-    firm = 1e4 * stands**2
-    bend = (BENDS * fps) ** 4
+    firm, bend, still = 1e6 * stands**2, (BENDS * fps) ** 4, slides * (SLIDES * fps) ** 2
     diagonals = np.zeros((3, count))
-    pattern = np.array([1.0, -2.0, 1.0])
-    pull = firm + (1.0 - stands)
-    diagonals[0] += pull
-    for k, value in enumerate(pattern):
-        diagonals[0, k : count - 2 + k] += bend * value * value
-    diagonals[1, : count - 1] += bend * np.concatenate([[-2.0], np.full(count - 3, -4.0), [-2.0]])
-    diagonals[2, : count - 2] += bend
-    diagonals[0, [1, -2]] += bend  # it departs smoothly
-    diagonals[0, [0, -1]] += 1e12
+    diagonals[0] = firm + 1.0 - stands
+    for k, share in enumerate((1.0, 4.0, 1.0)):
+        diagonals[0, k : count - 2 + k] += bend * share
+    diagonals[0, [1, -2]] += bend
+    diagonals[1, : count - 1] = bend * np.concatenate([[-2.0], np.full(count - 3, -4.0), [-2.0]])
+    diagonals[2, : count - 2] = bend
     right = firm[:, None] * wanted
+    for k, sign in ((0, 1.0), (1, -1.0)):
+        diagonals[0, k : count - 1 + k] += still
+        right[k : count - 1 + k, [0, 2]] += sign * still[:, None] * moves
+    diagonals[1, :-1] -= still
+    diagonals[0, [0, -1]] += 1e12
     right[[0, -1]] = 0.0
     return np.asarray(solveh_banded(diagonals, right, lower=True))
 
@@ -183,9 +241,8 @@ def bend_legs(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Fo
     turned, places = skeleton.global_rotations(rotations), skeleton.positions_and_tips(rotations, root)
     out = rotations.copy()
     for number, foot in enumerate(feet):
-        chain = [*foot.leg, foot.leg[-1] + len(skeleton)][foot.knee - 1 : foot.knee + 2]
-        hip, knee, end = chain
-        thigh, shank = reach(turned[:, hip], places[:, chain], places[:, end] + off[:, number])
+        hip, knee, end = chain = foot.chain(skeleton)
+        thigh, shank = reach(turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge)
         thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
         out[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
         out[:, knee] = rot.inv_mul(thigh, shank)

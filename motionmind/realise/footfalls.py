@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 
 LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
@@ -41,6 +41,11 @@ class Stance(NamedTuple):
     end: int
     place: Floats
     slip: Floats
+
+    @property
+    def places(self) -> Floats:
+        """The foot's place in each of the frames [frames, 2], metres."""
+        return self.place + np.linspace(0.0, 1.0, self.end + 1 - self.start)[:, None] * self.slip
 
 
 def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
@@ -79,7 +84,7 @@ def find_stances(
     stand = np.where(flying, 1e3, stand) / fps
     origin = track - track[0]
     brief = max(2, round(BRIEF * fps))
-    parted = _part(np.ascontiguousarray(origin), outward, stand, swing, brief, fps)
+    parted = _part(np.ascontiguousarray(origin), np.ascontiguousarray(outward), stand, swing, brief, fps)
     out, last = [], len(track) - 1
     for start, end in parted:
         here, side = track[start : end + 1], outward[start : end + 1].mean(axis=0)
@@ -101,7 +106,7 @@ def find_stances(
 
 
 @jit
-def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float) -> Floats:
+def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float) -> Ints:
     """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`)."""
     count = len(track)
     stand_sum, swing_sum = np.zeros(count + 1), np.zeros(count + 1)
@@ -146,7 +151,7 @@ def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: i
                 best[0, t], came[0, t] = cost, s
         for s in range(t + 1):  # swinging from s to t
             n = t - s + 1
-            if s == 0 and stand[0] * fps < FIRM or t == last and stand[last] * fps < FIRM:
+            if (s == 0 and stand[0] * fps < FIRM) or (t == last and stand[last] * fps < FIRM):
                 continue  # it stands where it is given
             steps = s > 0 and t < last
             if n < brief and steps:

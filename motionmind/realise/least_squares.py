@@ -1,4 +1,4 @@
-"""Least squares over a trajectory in space: rows that look at three successive frames each, solved as one banded system.
+"""Least squares over a trajectory in space: rows that look at three successive frames each, in one banded system.
 
 The unknowns are x, y and z of all frames in turn, so that a row of three frames spans nine of them, and the normal
 equations have seventeen diagonals.
