@@ -169,6 +169,25 @@ def test_a_body_turns_the_near_way_round(a: float, b: float, turn: float, speeds
         assert headings.max() - headings.min() < abs(turn) + 40.0
 
 
+@pytest.mark.parametrize(
+    ("facings", "turns"),
+    [
+        ([170.0, -170.0], [20.0]),
+        ([170.0, 180.0, -170.0], [10.0, 10.0]),
+        ([0.0, 100.0, -120.0], [100.0, 140.0]),
+        ([-90.0, 160.0, -170.0, 90.0], [-110.0, 30.0, -100.0]),
+    ],
+)
+def test_from_one_posture_to_the_next_a_body_turns_the_near_way_round(facings: list[float], turns: list[float]) -> None:
+    engine = engine_of("karate")
+    a, *via, b = (turned(posture(engine, 130 + 3 * k), degrees) for k, degrees in enumerate(facings))
+    tween = engine.tween(a, b, via=via)
+    headings = np.degrees(np.unwrap(rot.heading(tween.motion.rotations[:, 0])))
+    times = tween.motion.insertions[0].times[[0, *tween.passed, tween.moves]]
+    np.testing.assert_allclose(np.diff(np.interp(times, tween.motion.times, headings)), turns, atol=3.0)
+    assert np.ptp(headings) < np.ptp(np.cumsum([0.0, *turns])) + 40.0
+
+
 @pytest.mark.parametrize(("name", "row"), [("ballet", 0), ("ballet", 500), ("ballet", 2000), ("karate", 334)])
 def test_a_body_with_nowhere_to_go_stays_where_it_is_in_the_air_too(name: str, row: int) -> None:
     engine = engine_of(name)
