@@ -38,10 +38,15 @@ def corpora(context: click.Context) -> None:
     show_help_without_command(context)
 
 
-@command("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1")
+@command("motionmind corpus build mine *.bvh --tolerance 15 --facing free --skip 1")
 @click.argument("name")
 @click.argument("files", type=FILE, nargs=-1)
-@option("--rate", section=Section.LEARN, type=RATE, help="Take N postures per second  [default: every frame]")
+@option(
+    "--rate",
+    section=Section.LEARN,
+    type=RATE,
+    help="Take N postures per second  [default: 5 of recordings, every frame of scores and keyframes]",
+)
 @option(
     "--skip",
     section=Section.LEARN,
@@ -114,6 +119,7 @@ def build(
     name: str,
     files: tuple[Path, ...],
     home: Path | None,
+    rate: float | None,
     tolerance: tuple[str, ...],
     discretize: str,
     flip_angle: float,
@@ -140,7 +146,14 @@ def build(
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
     engine = Engine.fit(
-        clips, name=name, home=home, discretization=discretization, flip_degrees=flip_angle, mix=others, **options
+        clips,
+        name=name,
+        home=home,
+        rate="auto" if rate is None else rate,
+        discretization=discretization,
+        flip_degrees=flip_angle,
+        mix=others,
+        **options,
     )
     engine.save(place)
     print_check(engine.check())

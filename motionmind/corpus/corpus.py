@@ -104,7 +104,7 @@ class Corpus:
             radians, at K evenly spaced times between each posture and the next.
         facing: "stage" if the root's full orientation is its state; "free" if its turn about the vertical is removed
             from it and is a joint chain of its own.
-        rate: postures per second; None if they are keyframes with their own times.
+        rate: postures per second of what was recorded; None if all are keyframes with their own times.
         title: a one-line description.
         author: who made it.
         source: where it comes from.
@@ -223,7 +223,14 @@ class Corpus:
     def motion(self, clip: Clip) -> Motion:
         """Return a clip's N postures as a motion."""
         here = slice(clip.start, clip.stop)
-        return Motion(self.skeleton, self.rotations[here], self.root[here], self.times[here], clip.name)
+        return Motion(
+            self.skeleton,
+            self.rotations[here],
+            self.root[here],
+            self.times[here],
+            clip.name,
+            keyframed=self.rate is None,
+        )
 
     def recording(self, clip: Clip) -> Motion:
         """Return a clip as a motion of its N postures and, if the corpus keeps detail, K frames between each two."""

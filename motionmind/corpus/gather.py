@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, subdivide_times
 from motionmind.errors import CorpusError, SkeletonError
@@ -19,19 +21,24 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 
 Flips = Literal["drop", "keep", "split"]
+Rate = float | Literal["auto"] | None
 
 FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
+# Postures a second of a recording, unless another rate is given: [O10]'s choice for motion capture.
+RECORDED_RATE = 5.0
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
 DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
 FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
 _COARSE = 20.0  # frames per second; a slower recording has no detail to keep
 
+_log = logging.getLogger(__name__)
+
 
 class Gathering(TypedDict, total=False):
     """Options of `gather`, for functions that pass them on."""
 
-    rate: float | None
+    rate: Rate
     skip: int
     facing: Facing
     flips: Flips
@@ -69,7 +76,7 @@ def gather(
     name: str,
     motions: Iterable[Motion],
     *,
-    rate: float | None = None,
+    rate: Rate = "auto",
     skip: int = 0,
     facing: Facing = "free",
     flips: Flips = "split",
@@ -88,7 +95,9 @@ def gather(
     Args:
         name: the corpus's name.
         motions: the recordings, named; repeated names are numbered.
-        rate: postures per second; None keeps every frame with its own time.
+        rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
+            recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
+            keyframes: of a motion that says so, and of one with fewer than 15 frames a second.
         skip: frames to drop at each recording's start, such as an added T-pose.
         facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
             "stage" leaves it there, and facing the wall is then another state than facing the audience.
@@ -116,42 +125,45 @@ def gather(
         SkeletonError: the body cannot be mirrored.
     """
     _check_options(skip, flips, flip_degrees, reverse)
-    _check_mix(name, mix, rate)
-    recordings, faults, body = _cut_recordings(motions, rate, skip, flips, flip_degrees)
+    given = None if rate == "auto" else rate
+    _check_mix(name, mix, given)
+    own = _cut_recordings(motions, rate, skip, flips, flip_degrees)
+    body = own.body
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
+    if rate == "auto" and own.rate is not None:
+        _log.info("corpus %s: %g postures a second of each recording; a rate sets another number", name, own.rate)
     pieces = [
         _Piece(postures, recording, Clip(postures.name, 0, 0, (about or {}).get(postures.name, "")))
-        for postures, recording in recordings
+        for postures, recording in own.parts
     ]
     for other, weight in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
-        pieces += _take_clips(other, weight, rate)
+        pieces += _take_clips(other, weight, given)
     if not pieces or body is None:
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
-    if rate is None:
-        rate = _common_rate(bool(recordings), mix)
+    common = _common_rate(own, mix) if given is None else given
     if mirror:
         pieces += _mirror_images(pieces)
-    between = max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+    between = max(round(DETAIL_RATE / common) - 1, 0) if common else 0
     return Corpus(
         name,
         body,
-        _lay_out_clips(name, pieces, rate, reverse),
+        _lay_out_clips(name, pieces, common, reverse),
         np.concatenate([piece.postures.rotations for piece in pieces]),
         np.concatenate([piece.postures.root for piece in pieces]),
         np.concatenate([piece.postures.times for piece in pieces]),
         np.concatenate([_detail(piece.postures, piece.recording, between) for piece in pieces]),
         facing,
-        rate,
+        common,
         title,
         author,
         source,
         licence,
-        tuple(faults),
+        own.faults,
     )
 
 
@@ -188,9 +200,9 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
             )
 
 
-def _common_rate(recordings: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
-    """Return the rate of corpora mixed unchanged and of recordings taken frame by frame; CorpusError if they differ."""
-    found: dict[float | None, str] = {None: "the recordings"} if recordings else {}
+def _common_rate(own: _Recordings, mix: Sequence[tuple[Corpus, float]]) -> float | None:
+    """Return the rate of recordings and of corpora mixed with them unchanged; CorpusError if they differ."""
+    found: dict[float | None, str] = {own.rate: "the recordings"} if own.body else {}
     for mixed, _ in mix:
         found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
     if len(found) > 1:
@@ -204,6 +216,22 @@ def _pace(rate: float | None) -> str:
 
 
 # --- clips without their place in the corpus --------------------------------------------------------------------------
+
+
+class _Recordings(NamedTuple):
+    """Recordings without their faults.
+
+    Attributes:
+        parts: the postures of each unbroken part, and the part itself.
+        faults: the faults, by recording and time.
+        rate: postures a second of what was resampled; None if nothing was.
+        body: the first recording's skeleton; None if there is no recording.
+    """
+
+    parts: list[tuple[Motion, Motion]]
+    faults: tuple[JointFlip, ...]
+    rate: float | None
+    body: Skeleton | None
 
 
 class _Piece(NamedTuple):
@@ -236,11 +264,12 @@ def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reve
 def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
     """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
 
-    They are 0 after the last posture, and for a joint in a move in which it departs by more than `FAULT_DEGREES`.
+    They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
+    more than `FAULT_DEGREES`.
     """
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
-    if between > 0 and count > 1 and recording.fps >= _COARSE:
+    if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
         times = subdivide_times(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
@@ -250,16 +279,12 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
     return out
 
 
-def _cut_recordings(
-    motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
-) -> tuple[list[tuple[Motion, Motion]], list[JointFlip], Skeleton | None]:
-    """Skip frames, and cut recordings at faults.
-
-    Return (postures at `rate`, recording) for each part, the faults, and the first recording's body.
-    """
+def _cut_recordings(motions: Iterable[Motion], rate: Rate, skip: int, flips: Flips, flip_degrees: float) -> _Recordings:
+    """Skip frames, cut recordings at faults, and take their postures at `rate`."""
     pieces: list[tuple[Motion, Motion]] = []
     faults: list[JointFlip] = []
     names: set[str] = set()
+    rates: set[float] = set()
     first: Motion | None = None
     for recording in motions:
         first = first or recording
@@ -279,8 +304,18 @@ def _cut_recordings(
             continue
         cuts = sorted({f.frame for f in found}) if flips == "split" else []
         parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
-        pieces += _number_parts([(part if rate is None else part.resample(rate), part) for part in parts], motion.name)
-    return pieces, faults, first.skeleton if first else None
+        wanted = _posture_rate(motion) if rate == "auto" else rate
+        if wanted is not None:
+            rates.add(wanted)
+            pieces += _number_parts([(part.resample(wanted), part) for part in parts], motion.name)
+        else:
+            pieces += _number_parts([(part, part) for part in parts], motion.name)
+    return _Recordings(pieces, tuple(faults), max(rates, default=None), first.skeleton if first else None)
+
+
+def _posture_rate(motion: Motion) -> float | None:
+    """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
+    return None if motion.keyframed or motion.fps < FILM_RATE else RECORDED_RATE
 
 
 def _take_clips(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:

@@ -87,7 +87,7 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
         skeleton: name of the body.
         joints: the joints' names.
         facing: "stage" or "free", as in Corpus.
-        rate: postures a second; None for keyframes with times of their own.
+        rate: postures a second of what was recorded; None if all are keyframes with times of their own.
         states: number of states, by chain.
         edges: number of attested moves from state to state, by chain.
     """

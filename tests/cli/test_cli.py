@@ -18,6 +18,7 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind.body.motion import Motion
+from motionmind.corpus.bundled import bundled
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 
@@ -208,10 +209,33 @@ def test_tolerances_for_all_joints_and_for_single_ones(run: Run) -> None:
 def test_skip_facing_and_keyframes(run: Run) -> None:
     write_motion("walk.bvh", clip())
     frames = len(clip())
-    found = built(run, "walk.bvh", "--skip", 4, "--facing", "stage")
+    found = built(run, "walk.bvh", "--skip", 4, "--facing", "stage", "--rate", 30)
     assert found["postures"] == frames - 4
-    assert found["rate"] is None
+    assert found["rate"] == 30.0
     assert "facing" not in found["states"]
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".json", ".npz"])
+def test_what_compose_writes_is_left_as_it_is_and_a_recording_is_not(run: Run, suffix: str) -> None:
+    score = bundled("corpora") / "ballet" / "allegro.score"
+    assert run("compose", score, "--clip", "sissonnes", "-o", f"score{suffix}").code == 0
+    keyframes = read_motion(f"score{suffix}")
+    assert built(run, f"score{suffix}")["postures"] == len(keyframes)
+    write_motion("film.bvh", clip(fps=120.0))
+    ran = run("corpus", "build", "mine", f"score{suffix}", "film.bvh", "--unit", "cm")
+    assert ran.err.count("note: corpus mine: 5 postures a second of each recording") == 1
+    found = run("corpus", "info", "mine", "--json").json
+    assert [one["postures"] for one in found["clips"]] == [len(keyframes), len(clip(fps=5.0))]
+    assert found["rate"] == 5.0
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_the_clock_of_a_file_can_be_set_right(run: Run, suffix: str) -> None:
+    write_motion(f"late{suffix}", clip(fps=30.0))
+    assert run("convert", f"late{suffix}", "right.json", "--source-fps", 60).code == 0
+    late, right = read_motion(f"late{suffix}"), read_motion("right.json")
+    np.testing.assert_allclose(right.times, late.times / 2.0, atol=1e-9)
+    assert len(right) == len(late)
 
 
 def test_flips_are_split_kept_or_dropped(run: Run) -> None:

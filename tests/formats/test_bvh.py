@@ -239,6 +239,17 @@ def test_a_small_file(tmp_path: Path) -> None:
     assert rot.angle(motion.rotations[2, 2], expected.as_quat()) < 1e-12
 
 
+def test_a_clock_that_is_wrong_can_be_set_right(tmp_path: Path) -> None:
+    path = write(tmp_path, SMALL)
+    right = read_bvh(path, unit="cm", fps=50.0)
+    np.testing.assert_allclose(right.times, [0, 0.02, 0.04])
+    np.testing.assert_array_equal(right.rotations, read_bvh(path, unit="cm").rotations)
+    np.testing.assert_array_equal(read_motion(path, fps=50.0).times, right.times)
+    for fps in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(MotionMindError, match="fps must be a positive number of frames a second"):
+            read_bvh(path, fps=fps)
+
+
 @pytest.mark.parametrize(
     "change",
     [
