@@ -127,12 +127,16 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
     np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, weights, near), expected, atol=1e-12)
 
 
-def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
-    rng = np.random.default_rng(0)
-    angles = np.radians([10.0, 30.0])
-    q = rot.about_vertical(angles)[:, None] * rng.choice([-1.0, 1.0], (2, 1, 1))
-    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.tile(rot.IDENTITY, (2, 1, 1)))
+@pytest.mark.parametrize("signs", list(product((1.0, -1.0), repeat=3)))
+def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[float, float, float]) -> None:
+    q = rot.about_vertical(np.radians([10.0, 30.0]))[:, None] * np.reshape(signs[:2], (2, 1, 1))
+    about = np.tile(signs[2] * rot.IDENTITY, (2, 1, 1))
+    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, about)
     np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(mean, axis=-1), 1.0, atol=1e-12)
+    assert np.all(np.sum(mean * about, axis=-1) > 0.0)  # in its hemisphere
+    none = mean_rotations(np.zeros((2, 2)), q, about)
+    np.testing.assert_array_equal(none, about)
 
 
 # --- detail -----------------------------------------------------------------------------------------------------------
