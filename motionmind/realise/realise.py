@@ -48,6 +48,7 @@ def realise(
     leaving: Velocity | None = None,
     arriving: Velocity | None = None,
     without: Collection[Correction] = (),
+    pace: float = 1.0,
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -79,6 +80,7 @@ def realise(
         leaving: velocity with which the body leaves `a`; None where it is unknown.
         arriving: velocity with which it arrives at `b`.
         without: corrections to leave out.
+        pace: how many times as fast as the corpus to move, where there is no `length`.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
@@ -86,7 +88,7 @@ def realise(
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
         return still, np.zeros(0, dtype=np.int64)
-    clock = timeline(path, grammar.transitions, fps, length)
+    clock = timeline(path, grammar.transitions, fps, length, pace)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
     stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
