@@ -14,7 +14,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.corpus.corpus import JointFlip
-from motionmind.corpus.gather import find_flips
+from motionmind.corpus.flips import find_flips
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
@@ -237,7 +237,7 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
 def _leading_to(learned: LearnedCorpus, a: Posture, before: Motion) -> Motion | None:
     """Return the movement before posture A on the corpus's skeleton.
 
-    As in learning, a recording counts as cut where a joint flips. None, with a warning, if one does right before A.
+    It counts from the last flip of a joint on, since A is as given. None, with a warning, if one flips right before A.
     """
     before = _on_skeleton(learned, before, "the movement before A")
     _check_posture(before.posture(-1), a, "the movement before A does not end in A")
