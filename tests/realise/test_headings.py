@@ -99,12 +99,16 @@ def test_a_body_that_turns_at_an_end_does_so(rates: tuple[float | None, float | 
 
 
 def test_the_turning_at_an_end_is_that_of_its_own_step() -> None:
-    """However the walks turn in the steps beside it."""
-    times, turn = np.linspace(0.0, 4.0, 8001), np.zeros(8000)
-    turn[[0, -1]], turn[[1, -2]] = 0.002, -0.003
-    ends = {0: rot.about_vertical(0.3), 4000: rot.about_vertical(0.3)}
-    found = turn_with_walks(turn, turn**2 + 1e-3, np.ones(8000), times, ends, (1.5, -2.0))
-    np.testing.assert_allclose(np.diff(found)[[0, -1]] / times[1], [1.5, -2.0], atol=0.01)
+    """However fast the body would turn there, and in the steps beside it."""
+    times, varies = np.linspace(0.0, 4.0, 8001), np.full(8000, 1e-3)
+    varies[[0, -1]] = 0.02  # there what is missing is turned twenty times as fast
+    ends = {0: rot.about_vertical(0.3), 4000: rot.about_vertical(1.3)}
+    free, found = (
+        turn_with_walks(np.zeros(8000), varies, np.ones(8000), times, ends, rates)
+        for rates in ((None, None), (1.5, -2.0))
+    )
+    assert np.diff(free)[0] / times[1] > 4.0
+    np.testing.assert_allclose(np.diff(found)[[0, -1]] / times[1], [1.5, -2.0], atol=0.05)
 
 
 # --- near the states of a path ----------------------------------------------------------------------------------------
