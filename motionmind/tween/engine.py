@@ -274,6 +274,7 @@ class Engine(LearnedCorpus):
             length=certificate.length,
             before=formulation.before,
             after=formulation.after,
+            plausibility=self.plausibility,
         )
 
     @cached_property

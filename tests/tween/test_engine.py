@@ -245,6 +245,7 @@ REPORT = [
     "followed",
     "sources",
     "detail",
+    "shown",
     "times",
     "names",
     "degrees",
