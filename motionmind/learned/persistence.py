@@ -31,8 +31,8 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.learning import Learned, learn
-from motionmind.learned.pace import Pace
-from motionmind.learned.plausibility import Plausibility
+from motionmind.learned.pace import Pace, learn_pace
+from motionmind.learned.plausibility import Plausibility, learn_plausibility
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
@@ -130,7 +130,9 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
-    missing = [name for name in _ARRAYS if name not in arrays]
+    # Corpora built before 0.2 keep neither of these; they take a second to learn for minutes of movement.
+    new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
+    missing = [name for name in _ARRAYS if name not in arrays and name.partition(".")[0] not in new]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
     body, states = manifest.skeleton, manifest.space
@@ -159,8 +161,13 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
         _part(Bridges, "bridges", arrays),
         _part(Coordination, "coordination", arrays),
     )
-    carriage, pace = _part(Carriage, "carriage", arrays), _part(Pace, "pace", arrays)
-    plausibility = _part(Plausibility, "plausibility", arrays)
+    carriage = _part(Carriage, "carriage", arrays)
+    pace = learn_pace(corpus) if "pace" in new else _part(Pace, "pace", arrays)
+    plausibility = (
+        learn_plausibility(corpus, pace.fastest)
+        if "plausibility" in new
+        else _part(Plausibility, "plausibility", arrays)
+    )
     return Learned(corpus, space, arrays["states"], grammar, carriage, pace, plausibility)
 
 
