@@ -41,8 +41,8 @@ def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels:
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    heights, _ = _point_heights(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
-    return np.asarray(heights.min(axis=-1))
+    places, _ = contact_points(skeleton, rotations, root, heels=heels)
+    return np.asarray(places[..., 1].min(axis=-1))
 
 
 def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
@@ -55,7 +55,8 @@ def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
-    heights, joints = _point_heights(skeleton, rotations, root, anatomy_of(skeleton))
+    places, joints = contact_points(skeleton, rotations, root)
+    heights = places[..., 1]
     limb = limb_of_points(skeleton)[joints]
     count = len(limbs_of(skeleton)) + 1
     out = np.full((*heights.shape[:-1], count), np.inf)
@@ -74,28 +75,42 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
         rotations: local rotations [T, J, 4].
         root: positions of the root [T, 3], metres.
     """
-    heights, joints = _point_heights(anatomy.skeleton, rotations, root, anatomy)
+    places, joints = _points(anatomy.skeleton, rotations, root, anatomy)
+    heights = places[..., 1]
     at = heights.argmin(axis=-1)
     return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
 
 
-def _point_heights(
-    skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None
+def contact_points(
+    skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = True
 ) -> tuple[Floats, Indices]:
-    """Return heights [..., P] of all joints, all tips and, given an anatomy with legs, both heels; and the joint [P]
-    that each point belongs to."""
-    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
+    """Return the places [..., P, 3] of all points that can touch the floor, metres, and the joint [P] of each.
+
+    They are the joints, then the tips, then the heels of a body that is known to have them.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+        heels: whether heels count besides joints and tips (see the module).
+    """
+    return _points(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
+
+
+def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
+    """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
+    [P] that each point belongs to."""
+    places = skeleton.positions_and_tips(rotations, root)
     joints = np.tile(np.arange(len(skeleton)), 2)
     if anatomy is None or anatomy.leg is None:
-        return heights, joints
+        return places, joints
     heel = np.array(anatomy.leg.heel)
     if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
         heel = heel * skeleton.height / anatomy.skeleton.height
     ankles = np.array([anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
     turned = skeleton.global_rotations(rotations)[..., ankles, :]
-    heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
-    heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
-    return heights, np.concatenate([joints, ankles])
+    heels = places[..., ankles, :] + rot.mul_vec(turned, np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])]))
+    return np.concatenate([places, heels], axis=-2), np.concatenate([joints, ankles])
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------

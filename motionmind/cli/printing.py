@@ -19,6 +19,7 @@ from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
     from motionmind.search.solve import Progress
+    from motionmind.tween.request import TweenRequest
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
 
@@ -108,20 +109,21 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
-    lines += [("without", format_what_if(one, result.request.kappa)) for one in result.what_if]
+    lines += [("without", format_what_if(one, result.request)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
 
 
-def format_what_if(one: WhatIf, kappa: float) -> str:
-    """Format what a restriction costs a tween whose guide has this factor: "hold neck: 12.400 nats and 1 move less"."""
+def format_what_if(one: WhatIf, request: TweenRequest) -> str:
+    """Format what a restriction costs a tween of such a request: "hold neck: 12.400 nats and 1 move less"."""
     nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
     if one.proven:
         nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
     moves = count(abs(one.moves), "move")
     change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
-    return f"{one.without}: {nats}{change}{' (costs without the guide)' * (kappa > 0.0 and not one.guided)}"
+    of = " (haste and pace)" if request.paced else " (costs without the guide)"
+    return f"{one.without}: {nats}{change}{of * (request.kappa > 0.0 and not one.guided)}"
 
 
 def print_written(files: Sequence[Path]) -> None:
@@ -189,7 +191,7 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
         )
         click.echo(line.rstrip())
     for one in results[0].what_if:
-        click.echo(f"without   {format_what_if(one, results[0].request.kappa)}")
+        click.echo(f"without   {format_what_if(one, results[0].request)}")
     print_written(files)
 
 

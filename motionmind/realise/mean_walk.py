@@ -165,9 +165,8 @@ def _part_marginals(
         off = squared_distances(shown, stop.chains[part])
         nearest[k] = np.sqrt(off.min())
         near[-k] = likelihood(off / variance_at_ends(off), *_rate_terms(part, rates, stop))
-    near[0] *= carriage.weights
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
-    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, near)
+    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, carriage.weights, near)
     way = np.sqrt(squared_distances(ends[0].chains[None, part], ends[1].chains[part])[0])
     return marginals, trust(nearest, float(way))
 

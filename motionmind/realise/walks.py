@@ -1,7 +1,8 @@
 """Walks through a corpus from one posture to another, part by part of the body.
 
 A walk of a part goes through the corpus's postures, from one to the next as they followed in the clips. Now and then
-it goes over to another posture of the same *cluster*, one that holds the part much alike, and continues from there. A
+it goes over to another posture of the same *cluster*, one that holds the part much alike, and continues from there;
+where corpora are mixed, it goes to those that weigh more. A
 walk is more likely the nearer its ends are to the two given postures, and its velocities there to those given, if they
 are. Given those ends and the number of moves,
 `motionmind.realise.marginals` computes how likely each of the corpus's postures is at each move, exactly. The mean over
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Floats, Int32s
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
@@ -81,22 +82,25 @@ def likelihood(*terms: Floats) -> Floats:
 
 
 @jit
-def mix_clusters(mass: Floats, clusters: Int32s, sizes: Ints) -> Floats:
-    """Return weights [N] after a share has gone over to postures of the same cluster, and a little to any posture.
+def mix_clusters(values: Floats, clusters: Int32s, weights: Floats, sums: Floats) -> Floats:
+    """Return what values [N] of postures are on average after a share of walks has gone over to others of the same
+    cluster, and a few to any posture: to each in proportion to its weight.
 
-    The operation is its own transpose, and so serves passes forward and backward.
+    Of a walk that may be in posture i with probability p[i], `weights * mix_clusters(p / weights, ...)` is where it may
+    be then: weights leave as much of each posture as they bring to it.
 
     Args:
-        mass: weights of the postures [N].
+        values: a value of each posture [N].
         clusters: cluster of each posture [N].
-        sizes: number of postures in each cluster [K].
+        weights: of the postures [N], above 0.
+        sums: of the weights in each cluster [K].
     """
-    pooled = np.zeros(len(sizes))
-    for i in range(len(mass)):
-        pooled[clusters[i]] += mass[i]
-    whole = ANYWHERE * mass.sum() / len(mass)
+    pooled = np.zeros(len(sums))
+    for i in range(len(values)):
+        pooled[clusters[i]] += weights[i] * values[i]
+    whole = ANYWHERE * pooled.sum() / sums.sum()
     over = 1.0 - STRAIGHT_ON - ANYWHERE
-    out = np.empty_like(mass)
-    for i in range(len(mass)):
-        out[i] = STRAIGHT_ON * mass[i] + over * pooled[clusters[i]] / sizes[clusters[i]] + whole
+    out = np.empty_like(values)
+    for i in range(len(values)):
+        out[i] = STRAIGHT_ON * values[i] + over * pooled[clusters[i]] / sums[clusters[i]] + whole
     return out

@@ -30,6 +30,7 @@ from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import make_guide
 from motionmind.tween.nearest_body import nearest_posture
+from motionmind.tween.pacing import UsualTime, tolls, usual_times
 from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import MOST_MOVES, TweenRequest
@@ -61,6 +62,7 @@ class Formulation:
         searched: the problem to search: `problem`, or the same with moves in place of states, where joints coordinate
             by their moves.
         coordination: the network in the costs of `searched`.
+        times: the corpus's usual time from each stop to the next [1 + K].
     """
 
     a: Posture
@@ -78,6 +80,7 @@ class Formulation:
     problem: Problem
     searched: Problem
     coordination: Coordination
+    times: tuple[UsualTime, ...]
 
     @property
     def wished(self) -> Bools:
@@ -154,6 +157,9 @@ def formulate(
         rows = problem.model.starts[:-1].repeat(np.diff(searched.model.starts)) + searched.model.place
         guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows)
         searched = replace(searched, guide=guide)
+    times = usual_times(learned, (a, *through, b))
+    if request.paced:
+        searched = replace(searched, tolls=tolls(learned, times, longest))
     return Formulation(
         a,
         b,
@@ -170,6 +176,7 @@ def formulate(
         problem,
         searched,
         coordination,
+        times,
     )
 
 
