@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.capsules import penetration
 from motionmind.body.contact import floor_height, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
 from motionmind.body.limits import find_loose
@@ -17,6 +18,7 @@ from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
+RARE = 0.01  # share of postures in which limbs may be deeper in each other than they usually are
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
 
 
@@ -39,6 +41,8 @@ class Carriage:
         stands: how firmly each limb, and last the trunk, stands [N, limbs + 1]: 1 where its lowest point does not move
             level, near 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
         loose: whether each joint breaks its limits in the corpus [J].
+        touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
+            metres.
     """
 
     orientations: Floats
@@ -52,6 +56,7 @@ class Carriage:
     clearance: Floats
     stands: Floats
     loose: Bools
+    touches: Floats
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
@@ -79,7 +84,14 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
         _standing(corpus),
         find_loose(corpus.skeleton, corpus.rotations),
+        _touching(corpus),
     )
+
+
+def _touching(corpus: Corpus) -> Floats:
+    """Return how deep pairs of limbs are in each other [P], metres, in all but RARE postures."""
+    depths = penetration(corpus.skeleton, corpus.rotations)
+    return np.array([np.quantile(depth, 1.0 - RARE) for depth in depths.values()])
 
 
 def _standing(corpus: Corpus) -> Floats:

@@ -1,4 +1,4 @@
-"""Learning from a corpus: its states, grammar and carriage."""
+"""Learning from a corpus: its states, grammar, carriage and pace."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.grammar import learn as learn_grammar
 from motionmind.learned.carriage import Carriage, learn_carriage
+from motionmind.learned.pace import Pace, learn_pace
 
 MOST_STATES_LEARNED = 10_000  # of a joint: learning its pairs takes some 6 GB
 
@@ -28,6 +29,7 @@ class Learned:
         states: states of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
         carriage: how the corpus's bodies hold themselves, travel and stand.
+        pace: how long they take for how far a way.
     """
 
     corpus: Corpus
@@ -35,6 +37,7 @@ class Learned:
     states: States
     grammar: Grammar
     carriage: Carriage
+    pace: Pace
 
 
 def learn(corpus: Corpus, discretization: Discretization) -> Learned:
@@ -68,7 +71,7 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
         weights=moves.weights,
         posture_weights=corpus.weights,
     )
-    return Learned(corpus, space, states, grammar, learn_carriage(corpus))
+    return Learned(corpus, space, states, grammar, learn_carriage(corpus), learn_pace(corpus))
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:

@@ -31,13 +31,20 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.learning import Learned, learn
+from motionmind.learned.pace import Pace, learn_pace
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
-_PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
+_PARTS = {
+    "transitions": Transitions,
+    "bridges": Bridges,
+    "coordination": Coordination,
+    "carriage": Carriage,
+    "pace": Pace,
+}
 _ARRAYS = (
     *("rotations", "root", "times", "detail", "states", "centres"),
     *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
@@ -65,7 +72,7 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
         "centres": space.centres,
     }
     for name, kind in _PARTS.items():
-        part = learned.carriage if kind is Carriage else getattr(learned.grammar, name)
+        part = getattr(learned if kind in (Carriage, Pace) else learned.grammar, name)
         arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
     skeleton = corpus.skeleton
     manifest = {
@@ -121,7 +128,7 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
-    missing = [name for name in _ARRAYS if name not in arrays]
+    missing = [name for name in _ARRAYS if name not in arrays and not name.startswith("pace.")]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
     body, states = manifest.skeleton, manifest.space
@@ -150,7 +157,10 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
         _part(Bridges, "bridges", arrays),
         _part(Coordination, "coordination", arrays),
     )
-    return Learned(corpus, space, arrays["states"], grammar, _part(Carriage, "carriage", arrays))
+    carriage = _part(Carriage, "carriage", arrays)
+    # Corpora built before 0.2 keep no pace; it takes a tenth of a second to learn for minutes of movement.
+    pace = _part(Pace, "pace", arrays) if "pace.law" in arrays else learn_pace(corpus)
+    return Learned(corpus, space, arrays["states"], grammar, carriage, pace)
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:

@@ -11,7 +11,7 @@ import numpy as np
 
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
-from motionmind.search.solve import LengthChoice
+from motionmind.search.length import LengthChoice
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.what_if import WhatIf
 

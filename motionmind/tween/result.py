@@ -9,9 +9,11 @@ from typing import Any
 from motionmind._typing import Bools, Floats, States
 from motionmind.body.motion import Motion
 from motionmind.search.cfn import cfn
+from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
-from motionmind.search.solve import LengthChoice, Status
+from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
+from motionmind.tween.pacing import UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.what_if import WhatIf
@@ -51,6 +53,7 @@ class Tween:
         search_problem: the problem that was searched.
         request: what was asked.
         length: how the number of moves was chosen; None where it was given, and without a guide.
+        times: the corpus's usual time from each posture that is passed exactly to the next.
         before: seconds of the movement before A that shows its velocity; None where A was given alone.
         after: seconds of the movement after B that shows its velocity; None where B was given alone.
 
@@ -87,6 +90,7 @@ class Tween:
     search_problem: Problem
     request: TweenRequest
     length: LengthChoice | None
+    times: tuple[UsualTime, ...]
     before: float | None
     after: float | None
 

@@ -238,22 +238,24 @@ def test_the_clock_of_a_file_can_be_set_right(run: Run, suffix: str) -> None:
     assert len(right) == len(late)
 
 
-def test_flips_are_split_kept_or_dropped(run: Run) -> None:
+def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
     write_motion("jump.bvh", flipped(60))
     write_motion("plain.bvh", clip(fps=120.0))
     names = {
         flips: [entry["name"] for entry in built(run, "jump.bvh", "plain.bvh", "--flips", flips)["clips"]]
-        for flips in ("split", "keep", "drop")
+        for flips in ("repair", "keep", "drop")
     }
-    assert names == {"split": ["jump.1", "jump.3", "plain"], "keep": ["jump", "plain"], "drop": ["plain"]}
-    faults = built(run, "jump.bvh", "plain.bvh")["faults"]
-    assert {(fault["clip"], fault["joint"], fault["frame"]) for fault in faults} == {
-        ("jump", "left_hip", 60),
-        ("jump", "left_hip", 61),
+    assert names == {"repair": ["jump", "plain"], "keep": ["jump", "plain"], "drop": ["plain"]}
+    found = built(run, "jump.bvh", "plain.bvh")
+    assert {tuple(fault[key] for key in ("clip", "joint", "frame", "repair")) for fault in found["faults"]} == {
+        ("jump", "left_hip", 60, "reconstructed"),
+        ("jump", "left_hip", 61, "reconstructed"),
     }
+    assert found["repairs"] == [{"clip": "jump", "joint": "left_hip", "start": 60, "stop": 61, "exact": False}]
     said = run("corpus", "check", "mine").out
-    assert "2 faults of the recordings" in said
-    assert re.search(r"  jump: left_hip by up to 1\d\d degrees, at frame 60, 61\n", said)
+    assert "2 flips in the recordings" in said
+    assert "  jump: 2 flips, 1 frame reconstructed (left_hip)\n" in said
+    assert "repaired   1 clip, 0 stretches put back exactly, 1 reconstructed\n" in run("corpus", "info", "mine").out
     assert built(run, "jump.bvh", "plain.bvh", "--flip-angle", 180)["faults"] == []
 
 

@@ -713,7 +713,7 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
                 if source is None:
                     assert said is None
                     continue
-                assert set(said) == {"clip", "posture", "corpus", "mirrored", "reversed", "seconds"}
+                assert set(said) == {*("clip", "posture", "corpus", "mirrored", "reversed", "seconds", "reconstructed")}
                 assert Source(**said) == source
                 assert_attested(everything, source, chain, before[chain], after[chain])
                 kinds.add((source.corpus, source.mirrored, source.reversed))

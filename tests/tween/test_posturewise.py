@@ -131,7 +131,7 @@ def test_it_goes_through_whole_postures_in_their_order_and_is_never_cheaper(inse
         assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)
         assert (tween.status, tween.lower_bound) == ("optimal", tween.cost)
         assert {bridge.joint for bridge in tween.bridges} <= {"facing"}
-        free = insects.tween(posture(insects, a), posture(insects, b))
+        free = insects.tween(posture(insects, a), posture(insects, b), without=["pace"])
         assert free.lower_bound <= tween.cost + 1e-6
         np.testing.assert_array_equal(tween.motion.rotations[[0, -1]], insects.corpus.rotations[[a, b]])
     assert joined >= 6
@@ -198,7 +198,7 @@ def test_the_nearest_posture_has_the_least_sum_of_squares() -> None:
 def test_the_command_takes_it_and_refuses_the_problem_with_it(run: Run) -> None:
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--posturewise", "--report", "-")
     assert ran.code == 0
-    free = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--report", "-")
+    free = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--without", "pace", "--report", "-")
     assert ran.json["cost"] > free.json["lower_bound"]
     both = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "--posturewise", "--problem", "a.cfn")
     assert both.code == 2
