@@ -21,24 +21,6 @@ from motionmind.metrics.measure import at_rate
 RECORDED = {"cmu-05": "*.bvh", "cmu-135": "*.amc", "bandai": "*.bvh", "indian": "*.bvh", "cmu-16": "*.amc"}
 SKIP = {"indian": 30}  # frames that lead from an added T-pose into the movement; elsewhere it is the first alone
 LEVELLED = ("indian",)  # whose floor lies up to 17 cm below 0, in each clip elsewhere
-# Poser's names for joints, of which the list of known rigs has none.
-JOINTS = {
-    "indian": {"hip": "pelvis", "abdomen": "lumbar", "chest": "thorax", "neck": "cervical", "head": "atlantal"}
-    | {
-        f"{letter}{theirs}": f"{side}_{ours}"
-        for letter, side in (("l", "left"), ("r", "right"))
-        for theirs, ours in {
-            "Thigh": "hip",
-            "Shin": "knee",
-            "Foot": "ankle",
-            "Collar": "clavicle",
-            "Shldr": "shoulder",
-            "ForeArm": "elbow",
-            "Hand": "wrist",
-            "Mid1": "fingers",
-        }.items()
-    }
-}
 TOLD_APART = ("cmu-05", "cmu-135", "bandai")  # by style, where that is the question
 RATE = 5.0  # postures a second of what was recorded, to learn from
 FPS = 30  # frames a second, to look at
@@ -54,7 +36,7 @@ def recordings(data: str, name: str) -> tuple[Motion, ...]:
     """Whole clips as they were recorded, on human23, without the T-pose that was added before them."""
     clips = []
     for path in sorted(Path(data, name).rglob(RECORDED[name])):
-        clip = own_skeleton(read_motion(path), JOINTS.get(name))
+        clip = own_skeleton(read_motion(path))
         clip = clip.slice(SKIP.get(name, 1), len(clip))
         clips.append(_levelled(clip) if name in LEVELLED else clip)
     return tuple(clips)

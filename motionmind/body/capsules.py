@@ -63,8 +63,8 @@ class Capsules(NamedTuple):
 
     Attributes:
         names: of the capsules [C], as "left_thigh".
-        points: the points between which each end lies, as `Skeleton.positions_and_tips` counts them [C, 2, 2].
-        shares: how far from the first of them to the second [C, 2].
+        points: the points between which each lies, as `Skeleton.positions_and_tips` counts them [C, 2].
+        shares: how far its ends are from the first of them to the second [C, 2].
         radii: at both ends [C, 2], metres.
     """
 
@@ -75,8 +75,8 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        first, second = positions[..., self.points[..., 0], :], positions[..., self.points[..., 1], :]
-        return np.asarray(first + self.shares[..., None] * (second - first))
+        first, second = positions[..., self.points[:, 0], :], positions[..., self.points[:, 1], :]
+        return np.asarray(first[..., None, :] + self.shares[..., None] * (second - first)[..., None, :])
 
     def pairs(self) -> Ints:
         """Return the pairs of capsules that could pass through each other [P, 2].
@@ -97,7 +97,7 @@ class Capsules(NamedTuple):
 def capsules_of(skeleton: Skeleton) -> Capsules:
     """Return the capsules of a body; none if it is no person."""
     if not set(human23().names) <= set(skeleton.names):
-        return Capsules((), np.zeros((0, 2, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
+        return Capsules((), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
     shapes = {f"{side}_{part}": (f"{side}_", shape) for side in SIDES for part, shape in _SIDED.items()}
     shapes |= {part: ("", shape) for part, shape in _MIDDLE.items()}
     points, size = [], skeleton.height / human23().height
@@ -107,7 +107,7 @@ def capsules_of(skeleton: Skeleton) -> Capsules:
             while len(below := skeleton.children(end)) == 1:
                 end = below[0]
             end += len(skeleton)
-        points.append([[start, end], [start, end]])
+        points.append([start, end])
     return Capsules(
         tuple(shapes),
         np.array(points, dtype=np.int64),
@@ -152,7 +152,7 @@ def _depths(skeleton: Skeleton, rotations: Floats, capsules: Capsules, pairs: In
     """Return the depths of pairs of capsules [..., P], metres."""
     placed = capsules.place(skeleton.positions_and_tips(rotations, np.zeros(3)))
     count = int(np.prod(shape := rotations.shape[:-2], dtype=np.int64))
-    depths = pair_depths(placed.reshape(count, len(capsules.names), 2, 3), capsules.radii, pairs)
+    depths, _ = pair_depths(placed.reshape(count, len(capsules.names), 2, 3), capsules.radii, pairs)
     return np.maximum(depths, 0.0).reshape(*shape, len(pairs))
 
 
@@ -161,19 +161,30 @@ def _sided(side: str, parts: Collection[str]) -> set[str]:
 
 
 @jit
-def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> Floats:
-    """Return by how much the radii of pairs of capsules exceed their distance [T, P], metres; negative if apart.
+def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Floats]:
+    """Return how deep pairs of capsules are in each other [T, P], metres, and in which direction the first lies.
+
+    Depths are negative where the pair is apart; directions are unit vectors from the nearest point of the second's
+    axis to the first's [T, P, 3], or 0 where they meet.
 
     Args:
         ends: of the capsules' axes [T, C, 2, 3], metres.
         radii: at both ends [C, 2], metres.
         pairs: numbers of capsules [P, 2].
     """
-    out = np.empty((len(ends), len(pairs)))
+    depths, directions = np.empty((len(ends), len(pairs))), np.zeros((len(ends), len(pairs), 3))
     for t in range(len(ends)):
         for p in range(len(pairs)):
             i, j = pairs[p]
             far, s, u = nearest_points(ends[t, i], ends[t, j])
-            out[t, p] = radii[i, 0] + s * (radii[i, 1] - radii[i, 0]) + radii[j, 0] + u * (radii[j, 1] - radii[j, 0])
-            out[t, p] -= far
-    return out
+            depths[t, p] = radius_at(radii[i], s) + radius_at(radii[j], u) - far
+            if far > 0.0:
+                one = ends[t, i, 0] + s * (ends[t, i, 1] - ends[t, i, 0])
+                directions[t, p] = (one - ends[t, j, 0] - u * (ends[t, j, 1] - ends[t, j, 0])) / far
+    return depths, directions
+
+
+@jit
+def radius_at(radii: Floats, share: float) -> float:
+    """Return a capsule's radius, metres, at a share of the way between its ends, from its radii there [2]."""
+    return float(radii[0] + share * (radii[1] - radii[0]))

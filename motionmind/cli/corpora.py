@@ -22,7 +22,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import note, print_check, print_origins, progress
+from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.errors import MotionMindError
@@ -75,9 +75,9 @@ def corpora(context: click.Context) -> None:
 @option(
     "--flips",
     section=Section.LEARN,
-    type=click.Choice(["split", "keep", "drop"]),
-    default="split",
-    help="Split a clip where a joint jumps, keep it as it is, or drop it.",
+    type=click.Choice(["repair", "keep", "drop"]),
+    default="repair",
+    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
 )
 @option(
     "--flip-angle",
@@ -223,6 +223,8 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
     for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    if found["repairs"]:
+        click.echo(f"{'repaired':10} {format_repairs(found)}")
     print_origins(found)
     width = max([16, *(len(clip["name"]) for clip in found["clips"])])
     for clip in found["clips"]:

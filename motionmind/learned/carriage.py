@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.body.capsules import penetration
 from motionmind.body.contact import contact_points, floor_height, limb_heights, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
 from motionmind.body.limits import find_loose
@@ -20,7 +21,7 @@ from motionmind.jit import jit
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
 LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
 FIRM = 0.5  # how firmly a limb stands that bears
-RARE = 99.0  # percentile of the overhang that bodies keep to
+RARE = 0.01  # share of postures in which limbs may be deeper in each other, or the weight farther out, than usual
 USUAL = 0.08  # metres of overhang, for a corpus that shows none
 MOST = 0.15  # metres of overhang at most: dancers who lean farther are moving
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
@@ -45,9 +46,11 @@ class Carriage:
         stands: how firmly each limb, and last the trunk, stands [N, limbs + 1]: 1 where its lowest point does not move
             level, near 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
         aloft: whether the body is in the air at each moment [N], 0 or 1: its lowest point is off the floor, and moves.
-        overhang: how far the centre of mass is beyond its support while one limb bears it, metres: the 99th percentile
-            [1].
+        overhang: how far the centre of mass is beyond its support while one limb bears it, but for RARE postures [1],
+            metres.
         loose: whether each joint breaks its limits in the corpus [J].
+        touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
+            metres.
     """
 
     orientations: Floats
@@ -63,6 +66,7 @@ class Carriage:
     aloft: Floats
     overhang: Floats
     loose: Bools
+    touches: Floats
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
@@ -95,7 +99,14 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         aloft,
         _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)]),
         find_loose(corpus.skeleton, corpus.rotations),
+        _touching(corpus),
     )
+
+
+def _touching(corpus: Corpus) -> Floats:
+    """Return how deep pairs of limbs are in each other [P], metres, in all but RARE postures."""
+    depths = penetration(corpus.skeleton, corpus.rotations)
+    return np.array([np.quantile(depth, 1.0 - RARE) for depth in depths.values()])
 
 
 def _standing(corpus: Corpus) -> Floats:
@@ -161,7 +172,7 @@ def _overhang(corpus: Corpus, stands: Floats, aloft: Floats) -> Floats:
     near = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
     supports = near & bears[alone][:, limb_of_points(corpus.skeleton)[joints]]
     over = overhang(places[..., [0, 2]], supports, mass[alone][:, [0, 2]])
-    return np.array([min(float(np.nanpercentile(over, RARE)), MOST * size)])
+    return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
 
 
 def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:

@@ -21,6 +21,7 @@ from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
+from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, timeline
@@ -48,6 +49,7 @@ def realise(
     leaving: Velocity | None = None,
     arriving: Velocity | None = None,
     without: Collection[Correction] = (),
+    pace: float = 1.0,
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -61,7 +63,8 @@ def realise(
     Feet that stand carry the body; where none stands it travels as the corpus's bodies do, and it ends where `b`
     stands. The legs hold what one root cannot (`motionmind.realise.feet`), but for those with `fixed` joints. The
     lowest point stays as far above the floor as in the corpus's postures; the floor is at 0, or lower under ends that
-    are lower, or higher under ends higher than the corpus knows of such postures.
+    are lower, or higher under ends higher than the corpus knows of such postures. Limbs that would then pass through
+    each other are kept apart (`motionmind.realise.limbs_apart`).
 
     Args:
         path: states of the chains [T + 1, L].
@@ -79,6 +82,7 @@ def realise(
         leaving: velocity with which the body leaves `a`; None where it is unknown.
         arriving: velocity with which it arrives at `b`.
         without: corrections to leave out.
+        pace: how many times as fast as the corpus to move, where there is no `length`.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
@@ -86,7 +90,7 @@ def realise(
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
         return still, np.zeros(0, dtype=np.int64)
-    clock = timeline(path, grammar.transitions, fps, length)
+    clock = timeline(path, grammar.transitions, fps, length, pace)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
     stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
@@ -125,6 +129,10 @@ def realise(
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         without,
     )
+    if "limbs" not in without:
+        given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
+        may_not = fixed[: len(a.skeleton)]
+        rotations = keep_limbs_apart(a.skeleton, rotations, root, clock.frames, given, may_not, carriage.touches)
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
 

@@ -48,7 +48,9 @@ def durations(path: Int32s, transitions: Transitions) -> Floats:
     return out
 
 
-def timeline(path: Int32s, transitions: Transitions, fps: float, length: float | None = None) -> Timeline:
+def timeline(
+    path: Int32s, transitions: Transitions, fps: float, length: float | None = None, pace: float = 1.0
+) -> Timeline:
     """Return the times of a path's moves and of its frames, at about `fps`; the last frame falls on the end exactly.
 
     Args:
@@ -57,10 +59,11 @@ def timeline(path: Int32s, transitions: Transitions, fps: float, length: float |
         fps: frames a second.
         length: duration of the whole, seconds, to which frames are fitted; None for as long as the corpus takes,
             stretched by less than a frame.
+        pace: how many times as fast as the corpus, where there is no `length`.
     """
     seconds = durations(path, transitions)
     usually = float(seconds.sum())
-    frames = max(1, round((length or usually) * fps))
+    frames = max(1, round((length or usually / pace) * fps))
     length = length or frames / fps
     moves = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
     moves[-1] = length

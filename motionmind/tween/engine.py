@@ -215,6 +215,7 @@ class Engine(LearnedCorpus):
             formulation.leaving,
             formulation.arriving,
             request.without,
+            request.pace,
         )
 
     def _account_for(
@@ -272,8 +273,10 @@ class Engine(LearnedCorpus):
             search_problem=searched,
             request=request,
             length=certificate.length,
+            times=formulation.times,
             before=formulation.before,
             after=formulation.after,
+            plausibility=self.plausibility,
         )
 
     @cached_property

@@ -18,7 +18,8 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
-from motionmind.corpus.gather import find_flips, gather
+from motionmind.corpus.flips import find_flips
+from motionmind.corpus.gather import gather
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.errors import CorpusError, FormatError, MotionMindError
 from motionmind.geometry import rotations as rot
@@ -86,7 +87,7 @@ def test_recordings_give_5_postures_a_second_and_keyframes_all_of_theirs(caplog:
     np.testing.assert_array_equal(corpus.times[6:37], score.times)
     assert corpus.rate == 5.0
     assert [record.getMessage() for record in caplog.records] == [
-        "corpus arms: 5 postures a second of each recording; a rate sets another number"
+        "corpus arms: 5 postures a second of each recording (--rate, or rate=, for more or fewer)"
     ]
 
 
@@ -130,13 +131,25 @@ def test_recordings_join_a_corpus_of_their_rate_and_no_other() -> None:
 # --- gather -----------------------------------------------------------------------------------------------------------
 
 
-def test_split_cuts_at_a_flip_and_learns_no_jump() -> None:
+def test_a_flip_is_repaired_and_no_jump_is_learned() -> None:
     corpus = gather("arms", [swing("a", jumps={10: 90.0, 11: -90.0, 20: 90.0}), swing("b")], rate=None)
-    # The lone frame 10 makes no move; b is whole.
-    assert bounds(corpus) == [("a.1", 10), ("a.3", 9), ("a.4", 10), ("b", 30)]
+    assert bounds(corpus) == [("a", 30), ("b", 30)]
     turned = rot.angle(corpus.rotations[corpus.begins], corpus.rotations[corpus.begins + 1])
-    assert np.degrees(turned).max() < 5.0
+    assert np.degrees(turned).max() < 10.0
     assert [(fault.clip, fault.frame) for fault in corpus.faults] == [("a", 10), ("a", 11), ("a", 20)]
+
+
+def restless(name: str) -> Motion:
+    """An arm whose elbow jumps to and fro from frame 50 to 210, for more than a second."""
+    return swing(name, 261, jumps={50 + 20 * number: 90.0 * (-1) ** number for number in range(9)})
+
+
+def test_a_recording_is_cut_where_a_joint_jumps_for_too_long_to_be_repaired() -> None:
+    corpus = gather("arms", [restless("a"), swing("b")], rate=None)
+    parts = [(f"a.{number}", 20) for number in range(2, 10)]
+    assert bounds(corpus) == [("a.1", 50), *parts, ("a.10", 51), ("b", 30)]
+    assert {fault.repair for fault in corpus.faults} == {"none"}
+    assert all(clip.repairs == () for clip in corpus.clips)
 
 
 def test_keep_takes_a_flip_as_it_is_and_drop_leaves_its_recording_out() -> None:
@@ -151,7 +164,8 @@ def test_keep_takes_a_flip_as_it_is_and_drop_leaves_its_recording_out() -> None:
 def test_frames_after_skipped_ones_keep_the_recordings_numbers() -> None:
     corpus = gather("arms", [swing("a", jumps={1: 90.0, 12: 90.0})], skip=2, rate=None)
     assert [fault.frame for fault in corpus.faults] == [12]  # the jump among what is skipped is none
-    assert bounds(corpus) == [("a.1", 10), ("a.2", 18)]
+    assert bounds(corpus) == [("a", 28)]
+    assert corpus.clips[0].repairs[0].start < 12 < corpus.clips[0].repairs[0].stop
     np.testing.assert_array_equal(corpus.times[0], 2 / 120.0)
 
 
@@ -170,8 +184,9 @@ def test_no_move_leads_from_one_clip_to_the_next() -> None:
 
 
 def test_postures_are_made_even_in_time_after_the_cut() -> None:
-    corpus = gather("arms", [swing("a", 121, jumps={50: 90.0})], rate=20.0)
-    assert bounds(corpus) == [("a.1", 9), ("a.2", 12)]
+    corpus = gather("arms", [restless("a")], rate=20.0)
+    # Parts of 20 frames have 4 postures, 6 frames apart.
+    assert bounds(corpus) == [("a.1", 9), *((f"a.{number}", 4) for number in range(2, 10)), ("a.10", 9)]
     np.testing.assert_allclose(corpus.seconds, 0.05)
     assert corpus.rate == 20.0
 
@@ -217,9 +232,8 @@ def test_nothing_is_kept_of_coarse_recordings_nor_where_every_frame_is_a_posture
         assert rot.angle(again.rotations, corpus.rotations).max() < 1e-7
 
 
-def test_a_cut_leaves_no_detail_of_the_jump() -> None:
-    jump = replace(swing("a", 241, jumps={101: 90.0}), name="jump")
-    corpus = gather("arms", [jump], rate=5.0)
+def test_a_cut_leaves_no_detail_of_the_jumps() -> None:
+    corpus = gather("arms", [restless("jump")], rate=5.0)
     assert len(corpus.clips) == 2
     assert np.abs(corpus.detail).max() < np.radians(1.0)
 
@@ -252,8 +266,7 @@ def test_chains_come_back_as_the_rotations_that_they_were_made_of() -> None:
         ([swing("a", 5)], {"skip": 5}, "a has 5 frames; skipping 5 leaves none"),
         ([swing("a")], {"skip": -1}, "frames to skip must be at least 0, not -1"),
         ([swing("a", jumps={3: 90.0})], {"flips": "drop"}, "every recording has faults"),
-        ([swing("a", 2, jumps={1: 90.0})], {"flips": "split"}, "every recording has faults"),
-        ([swing("a")], {"flips": "mend"}, "flips must be one of drop, keep, split, not 'mend'"),
+        ([swing("a")], {"flips": "mend"}, "flips must be one of drop, keep, repair, not 'mend'"),
         ([swing("a")], {"flip_degrees": np.nan}, "the angle of a flip"),
         ([swing("a")], {"flip_degrees": 0.0}, "the angle of a flip"),
         ([swing("a")], {"facing": "north"}, "facing must be 'free' or 'stage', not 'north'"),

@@ -117,27 +117,32 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
     begins, ends = np.array([0, 1, 2, 2]), np.array([1, 2, 3, 0])
     shares = np.array([1.0, 1.0, 0.3, 0.7])
     clusters = np.array([0, 1, 0, 1], dtype=np.int32)
-    near = rng.uniform(0.1, 1.0, (steps + 1, count))
+    near, weights = rng.uniform(0.1, 1.0, (steps + 1, count)), rng.uniform(0.01, 2.0, count)
     go = np.zeros((count, count))
     go[begins, ends] = shares
-    alike = (clusters[:, None] == clusters) / 2.0
-    move = go @ (
-        STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * np.full((count, count), 0.25)
-    )
+    alike = weights * (clusters[:, None] == clusters)
+    alike /= alike.sum(axis=1, keepdims=True)
+    anywhere = np.tile(weights / weights.sum(), (count, 1))
+    move = go @ (STRAIGHT_ON * np.eye(count) + (1.0 - STRAIGHT_ON - ANYWHERE) * alike + ANYWHERE * anywhere)
     expected = np.zeros((steps + 1, count))
     for walked in product(range(count), repeat=steps + 1):
-        weight = np.prod(near[np.arange(steps + 1), walked]) * np.prod([move[p] for p in pairwise(walked)])
+        weight = weights[walked[0]] * np.prod(near[np.arange(steps + 1), walked])
+        weight *= np.prod([move[p] for p in pairwise(walked)])
         expected[np.arange(steps + 1), walked] += weight
     expected /= expected.sum(axis=1, keepdims=True)
-    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, near), expected, atol=1e-12)
+    np.testing.assert_allclose(posterior_marginals(begins, ends, shares, clusters, weights, near), expected, atol=1e-12)
 
 
-def test_the_mean_of_rotations_about_one_axis_whatever_their_signs() -> None:
-    rng = np.random.default_rng(0)
-    angles = np.radians([10.0, 30.0])
-    q = rot.about_vertical(angles)[:, None] * rng.choice([-1.0, 1.0], (2, 1, 1))
-    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.tile(rot.IDENTITY, (2, 1, 1)))
+@pytest.mark.parametrize("signs", list(product((1.0, -1.0), repeat=3)))
+def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[float, float, float]) -> None:
+    q = rot.about_vertical(np.radians([10.0, 30.0]))[:, None] * np.reshape(signs[:2], (2, 1, 1))
+    about = np.tile(signs[2] * rot.IDENTITY, (2, 1, 1))
+    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.array([0]), about)
     np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(mean, axis=-1), 1.0, atol=1e-12)
+    assert np.all(np.sum(mean * about, axis=-1) > 0.0)  # in its hemisphere
+    none = mean_rotations(np.zeros((2, 2)), q, np.array([0]), about)
+    np.testing.assert_array_equal(none, about)
 
 
 # --- detail -----------------------------------------------------------------------------------------------------------

@@ -1,0 +1,330 @@
+"""Limbs kept apart: where a movement would carry limbs through each other, they pass each other instead.
+
+Limbs are capsules (`motionmind.body.capsules`). While two are in each other they are kept on either side of a plane.
+It lies between them as they meet and as they part; where these are opposite sides, as of a leg that goes from in front
+of the other to behind it, the plane turns on the way by the line from one hip (or shoulder) to the other, so that the
+limbs open. Each limb turns as a whole about its hip or shoulder, as little as will do, and smoothly in time; feet keep
+their orientations, and a foot that stands its place: such a leg turns about the line from hip to ankle alone. The
+given postures do not change, and what they have in each other, or the corpus usually has, stays.
+
+Constants were chosen on random pairs of `cmu-05` and ballet.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy import SIDES
+from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths, radius_at
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.segments import nearest_points
+from motionmind.jit import jit
+
+ROUNDS = 8  # corrections, each of what those before it have left
+TOUCHES = 0.005  # metres that any two limbs may be in each other
+LEAST = 1e-4  # metres that are not corrected
+SPREADS = 0.12  # seconds in which a correction begins and ends
+FIRMLY = 100.0  # weight of a correction where it is needed, that of none being 1
+PLACE = 1000.0  # weight of a standing foot's place
+LEVER = 0.1  # metres: touched so near to its joint, a limb turns half as far as it would have to
+MOST = 0.3  # radians that a limb turns in one correction
+STEADY = 0.08  # metres a second at which a foot stands half as firmly as one at rest
+LOW = 0.04  # metres above the body's lowest point at which it stands half as firmly as one there
+
+
+class _Limbs(NamedTuple):
+    """The limbs of a person that turn about their first joints: left and right leg, left and right arm.
+
+    Attributes:
+        first: the joint that each turns about [4].
+        last: the joint that keeps its orientation, a leg's ankle; an arm has its first joint here [4].
+        owner: the limb that each capsule belongs to, -1 for trunk and head [C].
+        carried: whether it belongs to what keeps its orientation: foot and toes [C].
+    """
+
+    first: Ints
+    last: Ints
+    owner: Ints
+    carried: Bools
+
+
+class _Placed(NamedTuple):
+    """A movement's limbs in the world, the root being in the origin; metres.
+
+    Attributes:
+        ends: of the capsules' axes [N, C, 2, 3].
+        pivots: places of the limbs' first joints [N, 4, 3].
+        anchors: places of their last [N, 4, 3].
+        still: how firmly each limb stands where it is [N, 4], from 0 to 1.
+    """
+
+    ends: Floats
+    pivots: Floats
+    anchors: Floats
+    still: Floats
+
+
+def keep_limbs_apart(
+    skeleton: Skeleton,
+    rotations: Floats,
+    root: Floats,
+    times: Floats,
+    given: Floats,
+    fixed: Bools,
+    usual: Floats,
+) -> Floats:
+    """Return local rotations [N, J, 4] in which limbs do not pass through each other.
+
+    Args:
+        skeleton: the body; if it has no capsules, nothing changes.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        times: of the frames [N], seconds, evenly spaced.
+        given: times of postures that must not change, in frames, whole or not, from the first to the last [G]. The
+            frames next to them do not change either.
+        fixed: joints that must not change [J]; nor do their limbs.
+        usual: how deep the corpus has each pair of `Capsules.pairs` in each other [P], metres.
+    """
+    capsules = capsules_of(skeleton)
+    pairs = capsules.pairs()
+    if not len(pairs):
+        return rotations
+    places = skeleton.positions_and_tips(rotations, np.zeros(3))
+    ends = np.ascontiguousarray(capsules.place(places))
+    depths, directions = pair_depths(ends, capsules.radii, pairs)
+    frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
+    held = np.unique(np.concatenate([np.floor(given + 1e-6), np.ceil(given - 1e-6)])).astype(np.int64)
+    allowed = np.stack([np.interp(frames, held, depth[held]) for depth in depths.T], axis=1)
+    allowed = np.maximum(allowed, np.maximum(usual, TOUCHES))
+    if not np.any(depths > allowed + LEAST):
+        return rotations
+    limbs = _limbs_of(skeleton, capsules)
+    still = np.zeros((len(rotations), 4))
+    still[:, :2] = _standing(capsules, places + root[:, None], fps)
+    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], still)
+    sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
+    frozen = np.isin(frames, held + np.array([[-1], [0], [1]]))
+    free = ~(fixed[limbs.first] | fixed[limbs.last])
+    turned = np.tile(rot.IDENTITY, (len(rotations), 4, 1))
+    for _ in range(ROUNDS):
+        needed, steps = _steps(placed, limbs, capsules.radii, pairs, allowed, sides)
+        needed &= free & ~frozen[:, None]
+        if not needed.any():
+            break
+        turns = np.zeros_like(steps)
+        for limb in np.flatnonzero(needed.any(axis=0)):
+            axis = placed.anchors[:, limb] - placed.pivots[:, limb]
+            axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+            turns[:, limb] = _smooth(steps[:, limb], needed[:, limb], axis, still[:, limb], frozen, SPREADS * fps)
+        _turn(placed, limbs, turns)
+        turned = rot.mul(rot.exp(turns), turned)
+    return _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+
+
+def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> _Limbs:
+    """Return the limbs of a person."""
+    first = [skeleton.index(f"{side}_{joint}") for joint in ("hip", "shoulder") for side in SIDES]
+    ankles = [skeleton.index(f"{side}_ankle") for side in SIDES]
+    owner = np.full(len(capsules.names), -1)
+    for number, (parts, side) in enumerate((parts, side) for parts in (LEG, ARM) for side in SIDES):
+        owner[[capsules.names.index(f"{side}_{part}") for part in parts]] = number
+    carried = np.array([name.endswith(("foot", "toes")) for name in capsules.names])
+    return _Limbs(np.array(first), np.array(ankles + first[2:]), owner, carried)
+
+
+def _standing(capsules: Capsules, places: Floats, fps: float) -> Floats:
+    """Return how firmly each foot of a person stands [N, 2], from 0 to 1.
+
+    It is 1 / (1 + (h / LOW)^4) / (1 + (v / STEADY)^4), of the end of the last bone that stands more firmly, with h its
+    height above the body's lowest point and v its level speed.
+
+    Args:
+        capsules: of the person.
+        places: of the joints and tips [N, 2 J, 3], metres.
+        fps: frames a second.
+    """
+    lowest = places[..., 1].min(axis=1, keepdims=True)
+    tips = [capsules.points[capsules.names.index(f"{side}_toes"), 1] for side in SIDES]
+    ends = places[:, [[tip - places.shape[1] // 2, tip] for tip in tips]]
+    speed = fps * np.linalg.norm(np.gradient(ends[..., [0, 2]], axis=0), axis=-1)
+    low = (ends[..., 1] - lowest[..., None]) / LOW
+    return np.asarray((1.0 / (1.0 + low**4) / (1.0 + (speed / STEADY) ** 4)).max(axis=2))
+
+
+def _with_turned(skeleton: Skeleton, rotations: Floats, limbs: _Limbs, turned: Floats, changes: Bools) -> Floats:
+    """Return local rotations [N, J, 4] with limbs turned in the world by `turned` [N, 4, 4] where a frame `changes`."""
+    world, out = skeleton.global_rotations(rotations), rotations.copy()
+    for limb, (first, last) in enumerate(zip(limbs.first, limbs.last, strict=True)):
+        if np.all(turned[:, limb] == rot.IDENTITY):
+            continue
+        turn = turned[changes, limb]
+        above = world[changes, skeleton.parents[first]]
+        out[changes, first] = rot.inv_mul(above, rot.mul(turn, world[changes, first]))
+        if last != first:
+            above = rot.mul(turn, world[changes, skeleton.parents[last]])
+            out[changes, last] = rot.inv_mul(above, world[changes, last])
+    return out
+
+
+def _smooth(steps: Floats, needed: Bools, axis: Floats, still: Floats, frozen: Bools, spread: float) -> Floats:
+    """Return rotation vectors d [N, 3] that are near `steps` [N, 3] where needed, and smooth in time.
+
+    They minimise sum_t n |d - step|^2 + |d|^2 + PLACE still |d - (d . axis) axis|^2 + spread^4 |d''|^2, with n FIRMLY
+    where needed and 0 elsewhere, and d = 0 in frozen frames.
+
+    Args:
+        steps: wanted rotation vectors [N, 3], radians.
+        needed: where they are wanted [N].
+        axis: unit vectors about which a limb that stands may turn [N, 3].
+        still: how firmly it stands [N].
+        frozen: frames that must not change [N].
+        spread: frames in which a correction begins and ends.
+    """
+    from scipy.linalg import solveh_banded
+
+    pull = FIRMLY * needed
+    blocks = (PLACE * still)[:, None, None] * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
+    blocks += (1.0 + pull)[:, None, None] * np.eye(3)
+    # Second differences: three frames each, so that unknowns, which are three a frame, are coupled over six rows.
+    second = np.diff(np.eye(len(steps)), 2, axis=0)
+    bend = spread**4 * second.T @ second
+    diagonals = np.zeros((7, len(steps), 3))
+    for above in range(3):
+        for column in range(above, 3):
+            diagonals[6 - above, :, column] = blocks[:, column - above, column]
+    for later in range(3):
+        diagonals[6 - 3 * later, later:] += np.diagonal(bend, later)[:, None]
+    diagonals[:, frozen] = 0.0
+    diagonals[6, frozen] = 1.0
+    for later in (1, 2):
+        diagonals[6 - 3 * later, later:][frozen[:-later]] = 0.0
+    pulled = np.where(frozen[:, None], 0.0, pull[:, None] * steps)
+    return np.asarray(solveh_banded(diagonals.reshape(7, -1), pulled.ravel()).reshape(-1, 3))
+
+
+@jit
+def _sides(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, pivots: Floats) -> Floats:
+    """Return normals of the planes that keep pairs apart, towards the first [N, P, 3]; 0 where no plane is needed.
+
+    Args:
+        inside: whether the pair is too deep in each other [N, P].
+        directions: of the first from the second [N, P, 3].
+        pairs: numbers of capsules [P, 2].
+        owner: the limb that each capsule belongs to, or -1 [C].
+        pivots: of the limbs [N, 4, 3], metres.
+    """
+    sides = np.zeros_like(directions)
+    for p in range(len(pairs)):
+        one, other = owner[pairs[p, 0]], owner[pairs[p, 1]]
+        end = 0
+        for begin in range(len(inside)):
+            if begin < end or not inside[begin, p]:
+                continue
+            end = begin
+            while end < len(inside) and inside[end, p]:
+                end += 1
+            before, after = max(begin - 1, 0), min(end, len(inside) - 1)
+            meet, part = directions[before, p], directions[after, p]
+            opposite = 1.0 - np.sum(meet * part)  # 0 where they meet and part on the same side, 2 on opposite ones
+            for t in range(begin, end):
+                share = (t - before) / max(after - before, 1)
+                side = (1.0 - share) * meet + share * part
+                if other >= 0:
+                    across = pivots[t, one] - pivots[t, other]
+                    side += 2.0 * share * (1.0 - share) * opposite * across / np.sqrt(np.sum(across**2))
+                sides[t, p] = side / max(np.sqrt(np.sum(side**2)), 1e-9)
+    return sides
+
+
+@jit
+def _steps(
+    placed: _Placed, limbs: _Limbs, radii: Floats, pairs: Ints, allowed: Floats, sides: Floats
+) -> tuple[Bools, Floats]:
+    """Return which limbs have to turn [N, 4], and the least rotation vectors that part them [N, 4, 3].
+
+    Of several pairs that a limb is in, the deepest counts. Where a pair has a plane, its ends are to be on either side
+    of it; elsewhere its nearest points are to move apart.
+
+    Args:
+        placed: the limbs as they are.
+        limbs: which limbs there are.
+        radii: of the capsules [C, 2], metres.
+        pairs: numbers of capsules [P, 2].
+        allowed: how deep each pair may be in each other [N, P], metres.
+        sides: normals of planes, 0 where there is none [N, P, 3].
+    """
+    count = len(placed.ends)
+    needed, steps = np.zeros((count, 4), np.bool_), np.zeros((count, 4, 3))
+    points, levers, gives = np.empty((2, 3)), np.empty((2, 3)), np.empty(2, np.bool_)
+    for t in range(count):
+        worst = np.zeros(4)
+        for p in range(len(pairs)):
+            one, other = placed.ends[t, pairs[p, 0]], placed.ends[t, pairs[p, 1]]
+            gap, s, u = nearest_points(one, other)
+            reach = radius_at(radii[pairs[p, 0]], s) + radius_at(radii[pairs[p, 1]], u)
+            points[0] = one[0] + s * (one[1] - one[0])
+            points[1] = other[0] + u * (other[1] - other[0])
+            side = sides[t, p]
+            if np.any(side != 0.0):
+                ahead, behind = one @ side, other @ side
+                points[0], points[1] = one[ahead.argmin()], other[behind.argmax()]
+                gap = ahead.min() - behind.max()
+            else:
+                side = (points[0] - points[1]) / max(gap, 1e-9)
+            excess = reach - gap - allowed[t, p]
+            if excess <= LEAST:
+                continue
+            size = LEVER**2
+            for k in range(2):
+                limb, against = limbs.owner[pairs[p, k]], limbs.owner[pairs[p, 1 - k]]
+                gives[k] = limb > 1 or (limb >= 0 and against < 2)  # a leg does not give way to an arm
+                if not gives[k]:
+                    continue
+                touched = placed.anchors[t, limb] if limbs.carried[pairs[p, k]] else points[k]
+                lever = np.cross(touched - placed.pivots[t, limb], side) * (1.0 - 2.0 * k)
+                axis = placed.anchors[t, limb] - placed.pivots[t, limb]
+                along = np.sum(lever * axis) / max(np.sum(axis**2), 1e-9) * axis
+                still = placed.still[t, limb]
+                levers[k] = (1.0 - still) * lever + still * along
+                size += np.sum(lever * levers[k])
+            for k in range(2):
+                limb = limbs.owner[pairs[p, k]]
+                if gives[k] and excess > worst[limb]:
+                    worst[limb], needed[t, limb] = excess, True
+                    step = levers[k] * excess / size
+                    steps[t, limb] = step * min(1.0, MOST / max(np.sqrt(np.sum(step**2)), 1e-9))
+    return needed, steps
+
+
+@jit
+def _turn(placed: _Placed, limbs: _Limbs, turns: Floats) -> None:
+    """Turn limbs about their first joints by rotation vectors [N, 4, 3]; what is carried moves along."""
+    for t in range(len(turns)):
+        for limb in range(4):
+            vector, pivot = turns[t, limb], placed.pivots[t, limb]
+            angle = np.sqrt(np.sum(vector**2))
+            if angle < 1e-12:
+                continue
+            moved = pivot + _turned(placed.anchors[t, limb] - pivot, vector, angle) - placed.anchors[t, limb]
+            placed.anchors[t, limb] += moved
+            for capsule in range(len(limbs.owner)):
+                if limbs.owner[capsule] != limb:
+                    continue
+                for end in range(2):
+                    point = placed.ends[t, capsule, end]
+                    if limbs.carried[capsule]:
+                        point += moved
+                    else:
+                        point[:] = pivot + _turned(point - pivot, vector, angle)
+
+
+@jit
+def _turned(arm: Floats, vector: Floats, angle: float) -> Floats:
+    """Return a vector [3] turned by a rotation vector [3] of some length, by Rodrigues' formula."""
+    across = np.cross(vector, arm)
+    turned: Floats = arm + np.sin(angle) / angle * across + (1.0 - np.cos(angle)) / angle**2 * np.cross(vector, across)
+    return turned

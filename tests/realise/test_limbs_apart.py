@@ -1,0 +1,165 @@
+"""Limbs kept apart: legs that change places pass each other, smoothly, and nothing else moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import insect
+
+from motionmind._typing import Floats
+from motionmind.body.capsules import capsules_of, legs_depth, penetration
+from motionmind.body.human import human23
+from motionmind.body.motion import Posture
+from motionmind.geometry import rotations as rot
+from motionmind.realise.limbs_apart import keep_limbs_apart
+from motionmind.tween.engine import Engine
+
+BODY = human23()
+FRAMES = 31
+TIMES = np.arange(FRAMES) / 30.0
+ENDS = np.array([0.0, FRAMES - 1.0])
+FREE = np.zeros(len(BODY), dtype=np.bool_)
+UNUSUAL = np.zeros(len(capsules_of(BODY).pairs()))
+LEGS = [BODY.index(f"{side}_{joint}") for side in ("left", "right") for joint in ("hip", "ankle")]
+
+
+def posture(**turned: tuple[float, float, float]) -> Floats:
+    """Local rotations [J, 4] at rest, but for the rotation vectors of some joints."""
+    out = np.tile(rot.IDENTITY, (len(BODY), 1))
+    for joint, vector in turned.items():
+        out[BODY.index(joint)] = rot.exp(np.array(vector))
+    return out
+
+
+def crossed(forward: float, inward: float = 0.2) -> Floats:
+    """A posture with shanks crossed, the left leg swung so far forward and the right one backward, radians."""
+    return posture(left_hip=(-forward, 0.0, -inward), right_hip=(forward, 0.0, inward))
+
+
+def between(a: Floats, b: Floats) -> Floats:
+    """The shortest way from one posture to another [FRAMES, J, 4], eased in and out."""
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, FRAMES))
+    return rot.slerp(a[None], b[None], share[:, None])
+
+
+def apart(rotations: Floats, root: Floats | None = None, **options: Floats) -> Floats:
+    """The movement with limbs kept apart, on a body in the air unless its root's places are given."""
+    flying = np.stack([np.zeros(FRAMES), np.arange(FRAMES), np.arange(FRAMES)], axis=1)
+    given = {"given": ENDS, "fixed": FREE, "usual": UNUSUAL} | options
+    return keep_limbs_apart(BODY, rotations, flying if root is None else root, TIMES, **given)
+
+
+THROUGH = between(crossed(0.2), crossed(-0.2))
+IN_PASSING = between(
+    posture(left_hip=(-0.5, 0.0, -0.18), right_hip=(0.5, 0.0, 0.0)), posture(left_hip=(0.5, 0.0, -0.18))
+)
+
+
+@pytest.mark.parametrize("movement", [THROUGH, IN_PASSING], ids=["to the other side", "in passing"])
+def test_legs_do_not_pass_through_each_other(movement: Floats) -> None:
+    assert legs_depth(BODY, movement[[0, -1]]).max() == 0.0
+    assert legs_depth(BODY, movement).max() > 0.035
+    assert legs_depth(BODY, apart(movement)).max() < 0.01
+
+
+@pytest.mark.parametrize("movement", [THROUGH, IN_PASSING], ids=["to the other side", "in passing"])
+def test_ends_and_other_joints_stay_to_the_bit(movement: Floats) -> None:
+    out = apart(movement)
+    np.testing.assert_array_equal(out[[0, 1, -2, -1]], movement[[0, 1, -2, -1]])
+    others = np.delete(np.arange(len(BODY)), LEGS)
+    np.testing.assert_array_equal(out[:, others], movement[:, others])
+
+
+def test_feet_keep_their_orientations() -> None:
+    ankles = [BODY.index("left_ankle"), BODY.index("right_ankle")]
+    before, after = (BODY.global_rotations(each)[:, ankles] for each in (THROUGH, apart(THROUGH)))
+    assert rot.angle(before, after).max() < 1e-6
+
+
+def test_the_movement_stays_smooth() -> None:
+    """No joint turns from frame to frame by much more than before, nor changes how fast it turns."""
+    before, after = (rot.log(rot.inv_mul(each[:-1], each[1:]))[:, LEGS] for each in (THROUGH, apart(THROUGH)))
+    assert np.abs(np.diff(after, axis=0)).max() < np.abs(np.diff(before, axis=0)).max() + np.radians(3.0)
+
+
+def test_what_the_ends_have_in_each_other_stays() -> None:
+    deep = crossed(0.05)
+    assert legs_depth(BODY, deep) > 0.03
+    still = np.tile(deep, (FRAMES, 1, 1))
+    np.testing.assert_array_equal(apart(still), still)
+
+
+def test_what_the_corpus_has_in_each_other_stays() -> None:
+    np.testing.assert_array_equal(apart(THROUGH, usual=np.full(len(UNUSUAL), 0.2)), THROUGH)
+
+
+def test_postures_on_the_way_stay() -> None:
+    out = apart(THROUGH, given=np.array([0.0, 9.5, FRAMES - 1.0]))
+    np.testing.assert_array_equal(out[8:12], THROUGH[8:12])
+    assert legs_depth(BODY, out).max() < legs_depth(BODY, THROUGH).max()
+
+
+def test_a_fixed_leg_stays_and_the_other_gives_way() -> None:
+    fixed = FREE.copy()
+    fixed[BODY.index("left_hip")] = True
+    out = apart(THROUGH, fixed=fixed)
+    np.testing.assert_array_equal(out[:, LEGS[:2]], THROUGH[:, LEGS[:2]])
+    assert legs_depth(BODY, out).max() < 0.02
+
+
+def test_a_standing_foot_stays_where_it_stands() -> None:
+    """The left leg stands straight; the right one swings through it."""
+    swing = between(posture(right_hip=(-0.6, 0.0, 0.28)), posture(right_hip=(0.6, 0.0, 0.28)))
+    root = np.zeros((FRAMES, 3))
+    assert legs_depth(BODY, swing).max() > 0.05
+    out = apart(swing, root)
+    assert legs_depth(BODY, out).max() < 0.01
+    left, right = BODY.index("left_ankle"), BODY.index("right_ankle")
+    moved = np.linalg.norm(BODY.positions(out, root) - BODY.positions(swing, root), axis=-1)
+    assert moved[:, left].max() < 0.005
+    assert moved[:, right].max() > 0.05
+
+
+def test_a_hand_goes_round_the_thigh() -> None:
+    """An arm that hangs down, a little inwards, swings from in front of the thigh to behind it."""
+
+    def hanging(forward: float) -> Floats:
+        out = posture()
+        swung = rot.mul(rot.exp(np.array([-forward, 0.0, 0.0])), rot.exp(np.array([0.0, 0.0, -1.7])))
+        out[BODY.index("left_shoulder")] = swung
+        return out
+
+    swing = between(hanging(0.5), hanging(-0.5))
+    depths = penetration(BODY, swing)
+    assert max(depth[[0, -1]].max() for depth in depths.values()) == 0.0
+    assert depths["left_hand", "left_thigh"].max() > 0.03
+    out = apart(swing)
+    assert max(depth.max() for depth in penetration(BODY, out).values()) < 0.01
+    assert np.all(out[:, BODY.index("left_hip")] == swing[:, BODY.index("left_hip")])
+
+
+def test_limbs_that_are_apart_do_not_change() -> None:
+    wide = between(posture(left_hip=(0.5, 0.0, 0.3)), posture(left_hip=(-0.5, 0.0, 0.3)))
+    assert apart(wide) is wide
+
+
+def test_a_body_without_capsules_does_not_change() -> None:
+    body, rng = insect(), np.random.default_rng(0)
+    rotations = rot.normalise(rng.normal(size=(FRAMES, len(body), 4)))
+    fixed = np.zeros(len(body), dtype=np.bool_)
+    out = keep_limbs_apart(body, rotations, np.zeros((FRAMES, 3)), TIMES, ENDS, fixed, np.zeros(0))
+    assert out is rotations
+
+
+def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
+    """Random pairs of ballet postures; without the correction some legs pass through each other."""
+    engine = Engine.load("ballet")
+    corpus, body = engine.corpus, engine.corpus.skeleton
+    kept, left = [], []
+    for ends in np.random.default_rng(3).integers(len(corpus), size=(12, 2)):
+        a, b = (Posture(body, corpus.rotations[end], corpus.root[end]) for end in ends)
+        own = legs_depth(body, np.stack([a.rotations, b.rotations])).max()
+        kept.append(legs_depth(body, engine.tween(a, b).motion.rotations).max() - own)
+        left.append(legs_depth(body, engine.tween(a, b, without=["limbs"]).motion.rotations).max() - own)
+    assert max(left) > 0.03
+    assert max(kept) < 0.03
