@@ -107,12 +107,13 @@ def realise(
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
+    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
-        np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
+        trusted,
         walk.moments @ carriage.stands,
-        aloft,
+        trusted * aloft,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel_along(trust[:, None] * (walk.moves @ carriage.travel), walk.headings),
         size * float(carriage.overhang[0]),
