@@ -1,4 +1,4 @@
-"""Bearing: what bears a body at each frame, and where on the floor: feet by their stances, other parts where they are."""
+"""Bearing: what bears a body at each frame, and where: feet by their stances, other parts where they are."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def find_bearing(
 
 
 def find_staying(shape: Shape, root: Floats) -> int | None:
-    """Return the foot that stays where it stands: one that bears alone in the first and in the last frame, in one place.
+    """Return the foot that stays where it stands: one that bears alone in the first and the last frame, in one place.
 
     Args:
         shape: the body.
