@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
@@ -18,10 +18,14 @@ import click
 from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
+    from motionmind.learned.plausibility import Sighting
     from motionmind.search.solve import Progress
     from motionmind.tween.request import TweenRequest
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
+
+
+MOST_CLIPS = 30  # whose faults are printed
 
 
 class Notes(logging.Handler):
@@ -109,10 +113,26 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+    lines += [("seen", sentence) for sentence in _beyond(result.shown)]
     lines += [("without", format_what_if(one, result.request)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
+
+
+# What is said of what a viewer sees, with the greatest value, the corpus's greatest and the part of the body.
+_SEEN = {
+    "balance": "it leans {0:.2f} m over what it stands on, in the corpus {1:.2f} at most",
+    "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
+    "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
+    "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
+    "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
+}
+
+
+def _beyond(shown: Mapping[str, Sighting]) -> list[str]:
+    """Say in words what a viewer sees in a movement that goes beyond all that the corpus shows."""
+    return [_SEEN[name].format(one.value, one.most, one.part) for name, one in shown.items() if one.is_beyond]
 
 
 def format_what_if(one: WhatIf, request: TweenRequest) -> str:
@@ -305,7 +325,8 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
         click.echo(
             f"{count(len(faults), 'flip')} in the recordings, where a joint turns too far in one frame (all: --json):"
         )
-    for clip in dict.fromkeys(fault["clip"] for fault in faults):
+    clips = list(dict.fromkeys(fault["clip"] for fault in faults))
+    for clip in clips[:MOST_CLIPS]:
         ends = Counter(fault["repair"] for fault in faults if fault["clip"] == clip)
         parts = [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
         parts += [f"{ends['none']} left"] * (ends["none"] > 0)
@@ -316,6 +337,8 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
             joints = enumerated(dict.fromkeys(one["joint"] for one in stretches), 4)
             parts.append(f"{count(len(frames), 'frame')} reconstructed ({joints})")
         click.echo(f"  {clip}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
+    if len(clips) > MOST_CLIPS:
+        click.echo(f"  and {count(len(clips) - MOST_CLIPS, 'more clip')}")
 
 
 def show_warning(

@@ -100,5 +100,6 @@ class LearnedCorpus(Learned):
             learned.grammar,
             learned.carriage,
             learned.pace,
+            learned.plausibility,
             load_seconds=load_seconds,
         )

@@ -32,10 +32,11 @@ from motionmind.grammar.transitions import Transitions
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.learning import Learned, learn
 from motionmind.learned.pace import Pace, learn_pace
+from motionmind.learned.plausibility import Plausibility, learn_plausibility
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
 _PARTS = {
@@ -44,6 +45,7 @@ _PARTS = {
     "coordination": Coordination,
     "carriage": Carriage,
     "pace": Pace,
+    "plausibility": Plausibility,
 }
 _ARRAYS = (
     *("rotations", "root", "times", "detail", "states", "centres"),
@@ -72,7 +74,7 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
         "centres": space.centres,
     }
     for name, kind in _PARTS.items():
-        part = getattr(learned if kind in (Carriage, Pace) else learned.grammar, name)
+        part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
         arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
     skeleton = corpus.skeleton
     manifest = {
@@ -128,7 +130,9 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
-    missing = [name for name in _ARRAYS if name not in arrays and not name.startswith("pace.")]
+    # Corpora built before 0.2 keep neither of these; they take a second to learn for minutes of movement.
+    new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
+    missing = [name for name in _ARRAYS if name not in arrays and name.partition(".")[0] not in new]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
     body, states = manifest.skeleton, manifest.space
@@ -158,9 +162,13 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     carriage = _part(Carriage, "carriage", arrays)
-    # Corpora built before 0.2 keep no pace; it takes a tenth of a second to learn for minutes of movement.
-    pace = _part(Pace, "pace", arrays) if "pace.law" in arrays else learn_pace(corpus)
-    return Learned(corpus, space, arrays["states"], grammar, carriage, pace)
+    pace = learn_pace(corpus) if "pace" in new else _part(Pace, "pace", arrays)
+    plausibility = (
+        learn_plausibility(corpus, pace.fastest)
+        if "plausibility" in new
+        else _part(Plausibility, "plausibility", arrays)
+    )
+    return Learned(corpus, space, arrays["states"], grammar, carriage, pace, plausibility)
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:

@@ -277,6 +277,7 @@ class Engine(LearnedCorpus):
             times=formulation.times,
             before=formulation.before,
             after=formulation.after,
+            plausibility=self.plausibility,
         )
 
     @cached_property

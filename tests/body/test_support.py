@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import insect
 from scipy.spatial import ConvexHull
 
 from motionmind._typing import Floats
@@ -23,7 +24,6 @@ from motionmind.body.support import (
     stands_alone,
 )
 from motionmind.geometry import rotations as rot
-from tests.bodies import insect
 
 FPS = 30.0
 BODY = human23()

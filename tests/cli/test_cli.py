@@ -18,9 +18,11 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind.body.motion import Motion
+from motionmind.cli.printing import print_tween
 from motionmind.corpus.bundled import bundled
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
+from motionmind.tween.engine import Engine
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
@@ -28,7 +30,7 @@ REPORT = {
     *("asked", "status", "cost", "lower_bound", "gap", "moves", "length"),
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
-    *("sources", "detail", "times", "names", "degrees", "likelihood", "costs"),
+    *("sources", "detail", "shown", "times", "names", "degrees", "likelihood", "costs"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 
@@ -81,6 +83,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert ran.err.count("\n") == 1
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
+    table.pop("seen", None)  # where it goes beyond the corpus
     assert list(table) == ["moves", "cost", "proven", "attested", "bridged", "waited", "A", "B", "motion", "written"]
     assert f" {report['moves']}, in " in table["moves"]
     assert f"{report['cost']:.3f}" in table["cost"]
@@ -91,6 +94,21 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert np.allclose(rot.angle(motion.rotations[-1], read_posture(FIFTH).rotations), 0.0, atol=1e-6)
     problem = json.loads(Path("problem.cfn").read_text("utf-8"))
     assert {"problem", "variables", "functions"} <= set(problem)
+
+
+def test_a_tween_says_what_a_viewer_sees_beyond_the_corpus(capsys: pytest.CaptureFixture[str]) -> None:
+    engine = Engine.load("ballet")
+    motion = engine.corpus.motion(engine.corpus.clips[0])
+    tween = engine.tween(motion.posture(0), motion.posture(1))
+    print_tween(tween, [])
+    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("seen")]
+    away = np.linspace(0.0, 9.0, len(tween.motion))[:, None] * [1.0, 0.0, 0.0]
+    carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + away))
+    print_tween(carried, [])
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("seen"))
+    pace = carried.report()["shown"]["pace"]
+    assert line.startswith(f"seen      travel is {pace['value']:.1f} times as fast as")
+    assert line.endswith(f"more than {pace['most']:.1f} times")
 
 
 def test_the_report_has_the_keys_that_are_promised(run: Run) -> None:

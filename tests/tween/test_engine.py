@@ -247,6 +247,7 @@ REPORT = [
     "followed",
     "sources",
     "detail",
+    "shown",
     "times",
     "names",
     "degrees",
