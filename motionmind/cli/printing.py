@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from motionmind.tween.what_if import WhatIf
 
 
+MOST_CLIPS = 30  # whose faults are printed
+
+
 class Notes(logging.Handler):
     """Prints each assumption that was logged, such as a file's unit, for the first file that it is made for."""
 
@@ -322,7 +325,8 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
         click.echo(
             f"{count(len(faults), 'flip')} in the recordings, where a joint turns too far in one frame (all: --json):"
         )
-    for clip in dict.fromkeys(fault["clip"] for fault in faults):
+    clips = list(dict.fromkeys(fault["clip"] for fault in faults))
+    for clip in clips[:MOST_CLIPS]:
         ends = Counter(fault["repair"] for fault in faults if fault["clip"] == clip)
         parts = [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
         parts += [f"{ends['none']} left"] * (ends["none"] > 0)
@@ -333,6 +337,8 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
             joints = enumerated(dict.fromkeys(one["joint"] for one in stretches), 4)
             parts.append(f"{count(len(frames), 'frame')} reconstructed ({joints})")
         click.echo(f"  {clip}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
+    if len(clips) > MOST_CLIPS:
+        click.echo(f"  and {count(len(clips) - MOST_CLIPS, 'more clip')}")
 
 
 def show_warning(

@@ -101,11 +101,17 @@ def repair_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> Mended:
 
 
 def _what_became_of(flip: JointFlip, repairs: list[JointRepair]) -> Repair:
-    """Return which repair a flip had: the last of those that change a frame beside it."""
-    mended = [one for one in repairs if one.joint == flip.joint and one.start <= flip.frame <= one.stop]
+    """Return which repair a flip had: the last of those that change a frame beside it.
+
+    A half turn that took some frames is put back, though those frames themselves are not.
+    """
+    own = [one for one in repairs if one.joint == flip.joint]
+    mended = [one for one in own if one.start <= flip.frame <= one.stop]
     if not mended:
         return "none"
-    return "put back" if mended[-1].exact else "reconstructed"
+    last = mended[-1]
+    exact = last.exact or any(one.exact and (one.start == last.stop or one.stop == last.start) for one in own)
+    return "put back" if exact else "reconstructed"
 
 
 def _turned(motion: Motion) -> Floats:

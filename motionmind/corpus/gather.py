@@ -112,7 +112,9 @@ def gather(
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
     if rate == "auto" and own.rate is not None:
-        _log.info("corpus %s: %g postures a second of each recording; a rate sets another number", name, own.rate)
+        _log.info(
+            "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, own.rate
+        )
     pieces = [
         piece._replace(clip=replace(piece.clip, about=(about or {}).get(piece.clip.name, ""))) for piece in own.pieces
     ]
@@ -127,7 +129,7 @@ def gather(
     common = _common_rate(own, mix) if given is None else given
     if mirror:
         pieces += _mirror_images(pieces)
-    between = max(round(DETAIL_RATE / common) - 1, 0) if common else 0
+    between = _frames_between(common)
     return Corpus(
         name,
         body,
@@ -240,6 +242,11 @@ def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reve
     )
 
 
+def _frames_between(rate: float | None) -> int:
+    """Return how many frames of detail there are between two postures."""
+    return max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+
+
 def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
     """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
 
@@ -307,8 +314,16 @@ def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, repairs: tuple
         if len(postures) > 1 or not cuts:
             first, last = part.times[0], part.times[-1]
             within = tuple(one for one in repairs if one.seconds[0] <= last and first <= one.seconds[1])
-            pieces.append(_Piece(postures, part, Clip(name, 0, 0, repairs=within)))
+            pieces.append(_Piece(postures, _with_detail(postures, part, rate), Clip(name, 0, 0, repairs=within)))
     return pieces
+
+
+def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
+    """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
+    between = _frames_between(rate)
+    if between == 0 or len(postures) == 1 or part.fps < _COARSE:
+        return postures
+    return part.at(subdivide_times(postures.times, between))
 
 
 def _later(repairs: Iterable[JointRepair], frames: int) -> tuple[JointRepair, ...]:

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s
-from motionmind.geometry.distances import squared_distance
+from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
 # How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
@@ -36,17 +35,23 @@ ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some
 
 
 @jit
-def squared_distances(orientations: Floats, posture: Floats) -> Floats:
-    """Return the squared distance of each of a part's orientations from a posture, mean over joints [N], radians^2.
+def squared_distances(orientations: Floats, part: Ints, posture: Floats) -> Floats:
+    """Return the squared distance of a part of the body from a posture, mean over its joints [N], radians^2.
 
     Args:
-        orientations: of the part's m joints in the corpus's moments [N, m, 4].
-        posture: orientations that distances are measured from [m, 4].
+        orientations: of all chains in the corpus's moments [N, L, 4].
+        part: the part's m joints.
+        posture: orientations of these that distances are measured from [m, 4].
     """
     out = np.empty(len(orientations))
     for i in range(len(orientations)):
-        out[i] = squared_distance(orientations[i], posture)
-    return out / len(posture)
+        total = 0.0
+        for k in range(len(part)):
+            here, there = orientations[i, part[k]], posture[k]
+            cosine = here[0] * there[0] + here[1] * there[1] + here[2] * there[2] + here[3] * there[3]
+            total += 4.0 * max(1.0 - cosine * cosine, 0.0)  # sin^2 of half the angle: its square where it is small
+        out[i] = total / len(part)
+    return out
 
 
 @jit
@@ -79,28 +84,3 @@ def likelihood(*terms: Floats) -> Floats:
     """
     exponent = 0.5 * np.sum(terms, axis=0)
     return np.asarray(np.exp(exponent.min() - exponent))
-
-
-@jit
-def mix_clusters(values: Floats, clusters: Int32s, weights: Floats, sums: Floats) -> Floats:
-    """Return what values [N] of postures are on average after a share of walks has gone over to others of the same
-    cluster, and a few to any posture: to each in proportion to its weight.
-
-    Of a walk that may be in posture i with probability p[i], `weights * mix_clusters(p / weights, ...)` is where it may
-    be then: weights leave as much of each posture as they bring to it.
-
-    Args:
-        values: a value of each posture [N].
-        clusters: cluster of each posture [N].
-        weights: of the postures [N], above 0.
-        sums: of the weights in each cluster [K].
-    """
-    pooled = np.zeros(len(sums))
-    for i in range(len(values)):
-        pooled[clusters[i]] += weights[i] * values[i]
-    whole = ANYWHERE * pooled.sum() / sums.sum()
-    over = 1.0 - STRAIGHT_ON - ANYWHERE
-    out = np.empty_like(values)
-    for i in range(len(values)):
-        out[i] = STRAIGHT_ON * values[i] + over * pooled[clusters[i]] / sums[clusters[i]] + whole
-    return out

@@ -38,7 +38,7 @@ from motionmind.retarget.joint_mapping import (
     known_rig,
     read_joint_mapping,
 )
-from motionmind.retarget.rigs import Rig
+from motionmind.retarget.rigs import Rig, plain_names
 
 __all__ = ["filled_joints", "joint_mapping", "read_joint_mapping", "to_human23"]
 
@@ -383,7 +383,8 @@ def _vertical(fit: _Fit, movement: Motion | Posture) -> str:
 def _lies(skeleton: Skeleton) -> bool:
     """Return whether the zero pose of human23's or human44's joints stands along z, as Blender writes it."""
     zero = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
-    up = _unit(zero[skeleton.index("atlantal")] - zero[skeleton.index("pelvis")])
+    names = plain_names(skeleton.names)
+    up = _unit(zero[names.index("atlantal")] - zero[names.index("pelvis")])
     return bool(up[2] >= _STANDS)
 
 

@@ -87,7 +87,7 @@ def test_recordings_give_5_postures_a_second_and_keyframes_all_of_theirs(caplog:
     np.testing.assert_array_equal(corpus.times[6:37], score.times)
     assert corpus.rate == 5.0
     assert [record.getMessage() for record in caplog.records] == [
-        "corpus arms: 5 postures a second of each recording; a rate sets another number"
+        "corpus arms: 5 postures a second of each recording (--rate, or rate=, for more or fewer)"
     ]
 
 

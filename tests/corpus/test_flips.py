@@ -130,6 +130,7 @@ def test_a_half_turn_spread_over_some_frames_is_put_back_but_for_those() -> None
     exact = [(one.start, one.stop) for one in mended.repairs if one.exact]
     guessed = [(one.start, one.stop) for one in mended.repairs if not one.exact]
     assert (exact, guessed) == ([(62, 89)], [(60, 62), (89, 91)])
+    assert {flip.repair for flip in mended.flips} == {"put back"}
 
 
 # --- reconstructing ---------------------------------------------------------------------------------------------------

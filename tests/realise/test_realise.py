@@ -131,11 +131,11 @@ def test_posterior_marginals_are_sums_over_all_walks(seed: int) -> None:
 def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[float, float, float]) -> None:
     q = rot.about_vertical(np.radians([10.0, 30.0]))[:, None] * np.reshape(signs[:2], (2, 1, 1))
     about = np.tile(signs[2] * rot.IDENTITY, (2, 1, 1))
-    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, about)
+    mean = mean_rotations(np.array([[0.5, 0.5], [1.0, 0.0]]), q, np.array([0]), about)
     np.testing.assert_allclose(rot.heading(mean[:, 0]), np.radians([20.0, 10.0]), atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(mean, axis=-1), 1.0, atol=1e-12)
     assert np.all(np.sum(mean * about, axis=-1) > 0.0)  # in its hemisphere
-    none = mean_rotations(np.zeros((2, 2)), q, about)
+    none = mean_rotations(np.zeros((2, 2)), q, np.array([0]), about)
     np.testing.assert_array_equal(none, about)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from bundled_clips import BALLET
 from command_line import Run
-from toys import random_toy
+from toys import Toy, random_toy
 
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import InfeasibleError, MotionMindError, NoPathError
@@ -94,6 +94,19 @@ def test_the_optimum_is_that_of_all_walks_through_the_bodies(seed: int) -> None:
         assert toy.cost(found.path) == pytest.approx(found.cost, abs=1e-9)
         assert found.status == "optimal"
         assert solve(problem).lower_bound <= found.cost + 1e-6
+
+
+def test_a_long_way_may_be_the_cheapest_where_moves_cost_less_than_nothing() -> None:
+    """From 0 to 5 at once, or by five moves of which only the last is dear."""
+    table = np.full((6, 6), np.inf)
+    table[0, 5], table[4, 5] = 0.5, 4.0
+    table[np.arange(4), np.arange(1, 5)] = -2.0
+    none = np.zeros(6)
+    toy = Toy((-1,), (table,), (none,), (none,), (np.zeros((1, 6)),), (0,), (5,), wait=9.0, per_move=0.5)
+    states, begins = np.array([[0], [1], [2], [3], [4], [5], [0], [5]], dtype=np.int32), np.array([0, 1, 2, 3, 4, 6])
+    found = solve_posturewise(toy.problem(toy.rules(1, 8)), find_bodies(states, begins, begins + 1))
+    assert found.path[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
+    assert found.cost == pytest.approx(4.0 - 8.0 + 5 * 0.5)
 
 
 # --- recorded bodies --------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from motionmind.cli.printing import format_what_if
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
+from motionmind.realise.timeline import usual
 from motionmind.search.bounding import PROVEN
 from motionmind.search.length import choose_length
 from motionmind.search.solve import solve
@@ -121,6 +122,29 @@ def test_a_price_is_the_difference_to_the_tween_without_the_restriction(
         assert 0.0 <= one.least <= one.most
         assert one.least - SAME <= difference <= one.most + SAME
         assert one.proven == (one.most - one.least <= 2 * PROVEN)
+
+
+def test_a_duration_of_as_many_moves_is_priced_without_the_guide(ballet: Engine) -> None:
+    """In another time walks expect something else, so that costs with the guide do not compare."""
+    free = ballet.tween(*ENDS)
+    seconds = usual(ballet.grammar.transitions)
+    found = ballet.tween(*ENDS, duration=(free.moves + 0.3) * seconds, what_if=True)
+    assert found.moves == free.moves
+    (one,) = found.what_if
+    assert (one.moves, one.guided, one.proven) == (0, False, True)
+    assert one.most == pytest.approx(0.0, abs=SAME)
+
+
+def test_vias_are_named_by_their_moves_where_they_have_one(ballet: Engine) -> None:
+    passe = read_posture(PASSE)
+    found = ballet.tween(*ENDS, via=[passe, (passe, 9)], moves=14, what_if=True)
+    assert [one.without for one in found.what_if] == ["via 1", "via 2 at move 9", "moves 14"]
+
+
+def test_without_a_given_number_of_moves_as_many_are_searched_at_least(ballet: Engine) -> None:
+    found = ballet.tween(*ENDS, moves=9, max_moves=2, what_if=True, strict=True)
+    (one,) = found.what_if
+    assert one.moves == ballet.tween(*ENDS, max_moves=9, strict=True).moves - 9
 
 
 def test_a_held_joint_has_its_price(ballet: Engine) -> None:
