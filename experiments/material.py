@@ -13,7 +13,7 @@ import numpy as np
 
 from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Ints
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.corpus.gather import gather
 from motionmind.metrics import find_floor
 from motionmind.metrics.measure import at_rate
@@ -21,24 +21,6 @@ from motionmind.metrics.measure import at_rate
 RECORDED = {"cmu-05": "*.bvh", "cmu-135": "*.amc", "bandai": "*.bvh", "indian": "*.bvh", "cmu-16": "*.amc"}
 SKIP = {"indian": 30}  # frames that lead from an added T-pose into the movement; elsewhere it is the first alone
 LEVELLED = ("indian",)  # whose floor lies up to 17 cm below 0, in each clip elsewhere
-# Poser's names for joints, of which the list of known rigs has none.
-JOINTS = {
-    "indian": {"hip": "pelvis", "abdomen": "lumbar", "chest": "thorax", "neck": "cervical", "head": "atlantal"}
-    | {
-        f"{letter}{theirs}": f"{side}_{ours}"
-        for letter, side in (("l", "left"), ("r", "right"))
-        for theirs, ours in {
-            "Thigh": "hip",
-            "Shin": "knee",
-            "Foot": "ankle",
-            "Collar": "clavicle",
-            "Shldr": "shoulder",
-            "ForeArm": "elbow",
-            "Hand": "wrist",
-            "Mid1": "fingers",
-        }.items()
-    }
-}
 TOLD_APART = ("cmu-05", "cmu-135", "bandai")  # by style, where that is the question
 RATE = 5.0  # postures a second of what was recorded, to learn from
 FPS = 30  # frames a second, to look at
@@ -54,7 +36,7 @@ def recordings(data: str, name: str) -> tuple[Motion, ...]:
     """Whole clips as they were recorded, on human23, without the T-pose that was added before them."""
     clips = []
     for path in sorted(Path(data, name).rglob(RECORDED[name])):
-        clip = own_skeleton(read_motion(path), JOINTS.get(name))
+        clip = own_skeleton(read_motion(path))
         clip = clip.slice(SKIP.get(name, 1), len(clip))
         clips.append(_levelled(clip) if name in LEVELLED else clip)
     return tuple(clips)
@@ -97,11 +79,14 @@ def part(whole: Corpus, clips: Sequence[int], mirror: bool = False) -> Corpus:
 
 @lru_cache(maxsize=24)
 def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]]:
-    """The unbroken pieces of each sequence of a corpus that has one of more than so many frames, at 30 a second."""
+    """The unbroken pieces of each sequence of a corpus that has one of more than so many frames, at 30 a second.
+
+    Where a recording was reconstructed nobody knows what was danced: it is left out.
+    """
     if name in RECORDED:
         assert data is not None
         whole = gather(name, recordings(data, name), rate=FPS)
-        pieces = [whole.motion(clip) for clip in whole.clips]
+        pieces = [piece for clip in whole.clips for piece in as_recorded(whole.motion(clip), clip)]
     else:
         whole = corpus(data, name)
         pieces = [at_rate(whole.recording(clip)) for clip in whole.clips]
@@ -109,6 +94,16 @@ def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]
     for piece in pieces:
         out.setdefault(take_of(piece.name), []).append(piece)
     return {name: pieces for name, pieces in out.items() if any(len(piece) > frames for piece in pieces)}
+
+
+def as_recorded(motion: Motion, clip: Clip) -> list[Motion]:
+    """The pieces of a clip between the frames that were reconstructed."""
+    step, known = 1.0 / FPS, np.ones(len(motion) + 2, dtype=bool)
+    known[[0, -1]] = False
+    for first, last in (repair.seconds for repair in clip.repairs if not repair.exact):
+        known[1:-1] &= (motion.times < first - step) | (motion.times > last + step)
+    edges = np.flatnonzero(np.diff(known))
+    return [motion.slice(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
 def take_of(name: str) -> str:

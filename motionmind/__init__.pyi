@@ -23,6 +23,7 @@ from .formats import read_motion as read_motion
 from .formats import read_posture as read_posture
 from .formats import write_motion as write_motion
 from .formats import write_posture as write_posture
+from .learned.plausibility import Sighting as Sighting
 from .metrics.measure import Figure as Figure
 from .metrics.measure import measure as measure
 from .notation.compose import compose as compose
@@ -69,6 +70,7 @@ __all__ = [
     "Piece",
     "Posture",
     "Seam",
+    "Sighting",
     "Skeleton",
     "SkeletonError",
     "Source",

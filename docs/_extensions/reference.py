@@ -22,7 +22,7 @@ from sphinx.util.docutils import SphinxDirective
 _log = logging.getLogger(__name__)
 
 SUBJECTS = {
-    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "list_corpora"),
+    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "Sighting", "list_corpora"),
     "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure"),
     "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
     "Files": ("read_motion", "read_posture", "write_motion", "write_posture", "lossy_fields"),

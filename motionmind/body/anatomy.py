@@ -171,12 +171,27 @@ class Anatomy:
             )
         return out
 
-    def centre_of_mass(self, rotations: Floats, root: Floats) -> Floats:
-        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3]."""
-        turned = self.skeleton.global_rotations(rotations)
-        places = self.skeleton.positions(rotations, root)
+    @property
+    def has_masses(self) -> bool:
+        """Whether the weight of its parts is known."""
+        return bool(self._segments[0].any())
+
+    def centre_of_mass(self, rotations: Floats, root: Floats, skeleton: Skeleton | None = None) -> Floats:
+        """Return the centre of mass [..., 3], metres, for local rotations [..., J, 4] and root positions [..., 3].
+
+        Args:
+            rotations: local rotations [..., J, 4].
+            root: positions of the root [..., 3], metres.
+            skeleton: the body, where it has other proportions than the anatomy's own.
+        """
+        body = skeleton or self.skeleton
         masses, centres = self._segments
-        return np.asarray(np.einsum("j,...jk->...k", masses, places + rot.mul_vec(turned, centres)))
+        if skeleton is not None:
+            centres = centres * (skeleton.height / self.skeleton.height)
+        places = body.positions(rotations, root)
+        return np.asarray(
+            np.einsum("j,...jk->...k", masses, places + rot.mul_vec(body.global_rotations(rotations), centres))
+        )
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:

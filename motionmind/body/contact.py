@@ -41,8 +41,8 @@ def lowest_height(skeleton: Skeleton, rotations: Floats, root: Floats, *, heels:
         root: positions of the root [..., 3], metres.
         heels: whether heels count besides joints and tips (see the module).
     """
-    heights, _ = _point_heights(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
-    return np.asarray(heights.min(axis=-1))
+    places, _ = contact_points(skeleton, rotations, root, heels=heels)
+    return np.asarray(places[..., 1].min(axis=-1))
 
 
 def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
@@ -55,7 +55,8 @@ def limb_heights(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats:
         rotations: local rotations [..., J, 4].
         root: positions of the root [..., 3], metres.
     """
-    heights, joints = _point_heights(skeleton, rotations, root, anatomy_of(skeleton))
+    places, joints = contact_points(skeleton, rotations, root)
+    heights = places[..., 1]
     limb = limb_of_points(skeleton)[joints]
     count = len(limbs_of(skeleton)) + 1
     out = np.full((*heights.shape[:-1], count), np.inf)
@@ -74,28 +75,42 @@ def lowest_point(anatomy: Anatomy, rotations: Floats, root: Floats) -> tuple[Flo
         rotations: local rotations [T, J, 4].
         root: positions of the root [T, 3], metres.
     """
-    heights, joints = _point_heights(anatomy.skeleton, rotations, root, anatomy)
+    places, joints = _points(anatomy.skeleton, rotations, root, anatomy)
+    heights = places[..., 1]
     at = heights.argmin(axis=-1)
     return np.take_along_axis(heights, at[..., None], axis=-1)[..., 0], joints[at]
 
 
-def _point_heights(
-    skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None
+def contact_points(
+    skeleton: Skeleton, rotations: Floats, root: Floats, *, heels: bool = True
 ) -> tuple[Floats, Indices]:
-    """Return heights [..., P] of all joints, all tips and, given an anatomy with legs, both heels; and the joint [P]
-    that each point belongs to."""
-    heights = skeleton.positions_and_tips(rotations, root)[..., 1]
+    """Return the places [..., P, 3] of all points that can touch the floor, metres, and the joint [P] of each.
+
+    They are the joints, then the tips, then the heels of a body that is known to have them.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+        heels: whether heels count besides joints and tips (see the module).
+    """
+    return _points(skeleton, rotations, root, anatomy_of(skeleton) if heels else None)
+
+
+def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
+    """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
+    [P] that each point belongs to."""
+    places = skeleton.positions_and_tips(rotations, root)
     joints = np.tile(np.arange(len(skeleton)), 2)
     if anatomy is None or anatomy.leg is None:
-        return heights, joints
+        return places, joints
     heel = np.array(anatomy.leg.heel)
     if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
         heel = heel * skeleton.height / anatomy.skeleton.height
     ankles = np.array([anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
     turned = skeleton.global_rotations(rotations)[..., ankles, :]
-    heels = np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])])
-    heights = np.concatenate([heights, heights[..., ankles] + rot.mul_vec(turned, heels)[..., 1]], axis=-1)
-    return heights, np.concatenate([joints, ankles])
+    heels = places[..., ankles, :] + rot.mul_vec(turned, np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])]))
+    return np.concatenate([places, heels], axis=-2), np.concatenate([joints, ankles])
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------
@@ -151,10 +166,25 @@ def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
+    slides = foot_slides(skeleton, rotations, root, floor)
+    return float((slides > FAR).any(axis=-1).mean()) if len(slides) else 0.0
+
+
+def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats = 0.0) -> Floats:
+    """Return how far each foot near the floor slides to the next frame [T - 1, feet], metres; 0 where it is higher.
+
+    A foot is near the floor where one of its ends (see `skating`) is below 5 cm in both frames; of two such ends that
+    counts which moves least, level.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root joint [T, 3], metres.
+        floor: height of the floor, or in each frame [T], metres.
+    """
     moved, height = _foot_ends(skeleton, rotations, root, floor)
-    down = height < LOW
-    skates = np.any(down, axis=-1) & np.all(~down | (moved > FAR), axis=-1)
-    return float(skates.any(axis=-1).mean()) if len(moved) else 0.0
+    least = np.where(height < LOW, moved, np.inf).min(axis=-1)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
@@ -177,11 +207,11 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 
 
-def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float) -> tuple[Floats, Floats]:
+def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
     """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
     heights above the floor in the two frames: [T - 1, feet, 2] each, metres."""
     feet = np.array(find_feet(skeleton), dtype=np.intp)
     places = skeleton.positions_and_tips(rotations, root)[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
     moved = np.hypot(np.diff(places[..., 0], axis=0), np.diff(places[..., 2], axis=0))
-    height = places[..., 1] - floor
+    height = places[..., 1] - np.reshape(floor, (-1, 1, 1))
     return moved, np.maximum(height[1:], height[:-1])

@@ -95,6 +95,8 @@ class Motion:
         times: seconds, strictly increasing [T].
         name: the clip's name.
         insertions: the stretches that the engine made, in order of time; empty for movement that is all recorded.
+        keyframed: whether each frame is a posture that someone chose, as in a score; False for frames of a recording,
+            and for movement between keyframes.
 
     >>> import numpy as np
     >>> from motionmind import Motion, Posture, human23
@@ -111,6 +113,7 @@ class Motion:
     times: Floats
     name: str = ""
     insertions: tuple[Insertion, ...] = ()
+    keyframed: bool = False
 
     def __post_init__(self) -> None:
         times = np.array(self.times, dtype=np.float64)
@@ -202,7 +205,7 @@ class Motion:
         """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it."""
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
-            return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times)
+            return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times, keyframed=False)
         after = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self) - 1)
         before = after - 1
         share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
@@ -211,6 +214,7 @@ class Motion:
             rotations=rot.normalise(rot.slerp(self.rotations[before], self.rotations[after], share[:, None])),
             root=self.root[before] + share[:, None] * (self.root[after] - self.root[before]),
             times=times,
+            keyframed=False,
         )
 
 

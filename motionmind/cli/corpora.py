@@ -22,7 +22,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import note, print_check, print_origins, progress
+from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.errors import MotionMindError
@@ -38,10 +38,15 @@ def corpora(context: click.Context) -> None:
     show_help_without_command(context)
 
 
-@command("motionmind corpus build mine *.bvh --rate 5 --tolerance 15 --facing free --skip 1")
+@command("motionmind corpus build mine *.bvh --tolerance 15 --facing free --skip 1")
 @click.argument("name")
 @click.argument("files", type=FILE, nargs=-1)
-@option("--rate", section=Section.LEARN, type=RATE, help="Take N postures per second  [default: every frame]")
+@option(
+    "--rate",
+    section=Section.LEARN,
+    type=RATE,
+    help="Take N postures per second  [default: 5 of recordings, every frame of scores and keyframes]",
+)
 @option(
     "--skip",
     section=Section.LEARN,
@@ -70,9 +75,9 @@ def corpora(context: click.Context) -> None:
 @option(
     "--flips",
     section=Section.LEARN,
-    type=click.Choice(["split", "keep", "drop"]),
-    default="split",
-    help="Split a clip where a joint jumps, keep it as it is, or drop it.",
+    type=click.Choice(["repair", "keep", "drop"]),
+    default="repair",
+    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
 )
 @option(
     "--flip-angle",
@@ -114,6 +119,7 @@ def build(
     name: str,
     files: tuple[Path, ...],
     home: Path | None,
+    rate: float | None,
     tolerance: tuple[str, ...],
     discretize: str,
     flip_angle: float,
@@ -140,7 +146,14 @@ def build(
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
     engine = Engine.fit(
-        clips, name=name, home=home, discretization=discretization, flip_degrees=flip_angle, mix=others, **options
+        clips,
+        name=name,
+        home=home,
+        rate="auto" if rate is None else rate,
+        discretization=discretization,
+        flip_degrees=flip_angle,
+        mix=others,
+        **options,
     )
     engine.save(place)
     print_check(engine.check())
@@ -210,6 +223,8 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
     for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    if found["repairs"]:
+        click.echo(f"{'repaired':10} {format_repairs(found)}")
     print_origins(found)
     width = max([16, *(len(clip["name"]) for clip in found["clips"])])
     for clip in found["clips"]:

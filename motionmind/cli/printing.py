@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 import signal
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from motionmind.errors import MotionMindWarning
+from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
+    from motionmind.learned.plausibility import Sighting
     from motionmind.search.solve import Progress
+    from motionmind.tween.request import TweenRequest
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
+
+
+MOST_CLIPS = 30  # whose faults are printed
 
 
 class Notes(logging.Handler):
@@ -107,20 +113,37 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
-    lines += [("without", format_what_if(one, result.request.kappa)) for one in result.what_if]
+    lines += [("seen", sentence) for sentence in _beyond(result.shown)]
+    lines += [("without", format_what_if(one, result.request)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
 
 
-def format_what_if(one: WhatIf, kappa: float) -> str:
-    """Format what a restriction costs a tween whose guide has this factor: "hold neck: 12.400 nats and 1 move less"."""
+# What is said of what a viewer sees, with the greatest value, the corpus's greatest and the part of the body.
+_SEEN = {
+    "balance": "it leans {0:.2f} m over what it stands on, in the corpus {1:.2f} at most",
+    "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
+    "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
+    "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
+    "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
+}
+
+
+def _beyond(shown: Mapping[str, Sighting]) -> list[str]:
+    """Say in words what a viewer sees in a movement that goes beyond all that the corpus shows."""
+    return [_SEEN[name].format(one.value, one.most, one.part) for name, one in shown.items() if one.is_beyond]
+
+
+def format_what_if(one: WhatIf, request: TweenRequest) -> str:
+    """Format what a restriction costs a tween of such a request: "hold neck: 12.400 nats and 1 move less"."""
     nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
     if one.proven:
         nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
     moves = count(abs(one.moves), "move")
     change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
-    return f"{one.without}: {nats}{change}{' (costs without the guide)' * (kappa > 0.0 and not one.guided)}"
+    of = " (haste and pace)" if request.paced else " (costs without the guide)"
+    return f"{one.without}: {nats}{change}{of * (request.kappa > 0.0 and not one.guided)}"
 
 
 def print_written(files: Sequence[Path]) -> None:
@@ -188,7 +211,7 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
         )
         click.echo(line.rstrip())
     for one in results[0].what_if:
-        click.echo(f"without   {format_what_if(one, results[0].request.kappa)}")
+        click.echo(f"without   {format_what_if(one, results[0].request)}")
     print_written(files)
 
 
@@ -286,24 +309,36 @@ def print_check(check: dict[str, Any]) -> None:
     for joint, states in check["states"].items():
         click.echo(f"{joint:{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}")
     click.echo(f"{check['joinable']:.1%} of {check['pairs']} random pairs of postures can be joined without a bridge")
-    _print_faults(check["faults"])
+    _print_faults(check["faults"], check["repairs"])
 
 
-def _print_faults(faults: Sequence[dict[str, Any]]) -> None:
-    """Print where joints jump in the recordings, by clip and joint."""
-    by_joint: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for fault in faults:
-        by_joint.setdefault((fault["clip"], fault["joint"]), []).append(fault)
+def format_repairs(summary: dict[str, Any]) -> str:
+    """Format how many stretches of a corpus's recordings were mended: "12 put back exactly, 30 reconstructed"."""
+    exact = sum(one["exact"] for one in summary["repairs"])
+    clips = count(len({one["clip"] for one in summary["repairs"]}), "clip")
+    return f"{clips}, {exact} stretches put back exactly, {len(summary['repairs']) - exact} reconstructed"
+
+
+def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, Any]]) -> None:
+    """Print how often joints jump in each recording, and what became of it."""
     if faults:
         click.echo(
-            f"{count(len(faults), 'fault')} of the recordings, where a joint turns too far in one frame "
-            "(all with --json):"
+            f"{count(len(faults), 'flip')} in the recordings, where a joint turns too far in one frame (all: --json):"
         )
-    for (clip, joint), jumps in by_joint.items():
-        frames = ", ".join(str(jump["frame"]) for jump in jumps[:3])
-        more = f" and {len(jumps) - 3} more" if len(jumps) > 3 else ""
-        most = max(jump["degrees"] for jump in jumps)
-        click.echo(f"  {clip}: {joint} by up to {most:.0f} degrees, at frame {frames}{more}")
+    clips = list(dict.fromkeys(fault["clip"] for fault in faults))
+    for clip in clips[:MOST_CLIPS]:
+        ends = Counter(fault["repair"] for fault in faults if fault["clip"] == clip)
+        parts = [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
+        parts += [f"{ends['none']} left"] * (ends["none"] > 0)
+        parts_of_clip = re.compile(rf"{re.escape(clip)}(\.\d+)?")
+        stretches = [one for one in repairs if parts_of_clip.fullmatch(one["clip"]) and not one["exact"]]
+        frames = {frame for one in stretches for frame in range(one["start"], one["stop"])}
+        if frames:
+            joints = enumerated(dict.fromkeys(one["joint"] for one in stretches), 4)
+            parts.append(f"{count(len(frames), 'frame')} reconstructed ({joints})")
+        click.echo(f"  {clip}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
+    if len(clips) > MOST_CLIPS:
+        click.echo(f"  and {count(len(clips) - MOST_CLIPS, 'more clip')}")
 
 
 def show_warning(

@@ -103,6 +103,14 @@ SEARCH_OPTIONS = (
         POSITIVE,
         "SECONDS",
     ),
+    SearchOption(
+        "pace",
+        "--pace",
+        _SEARCH,
+        "Move this many times as fast as the corpus would, unless --duration is given.",
+        POSITIVE,
+        "FACTOR",
+    ),
     SearchOption("strict", "--strict", _SEARCH, "Make only moves that the corpus attests: no bridges.", bool),
     SearchOption(
         "posturewise",

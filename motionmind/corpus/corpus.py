@@ -19,9 +19,29 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
 Facing = Literal["free", "stage"]
+Repair = Literal["put back", "reconstructed", "none"]
 
 FACING = "facing"  # the joint chain of the body's turn about the vertical
 MAX_PRICE = 100.0  # nats per move backwards; no search will use a count of exp(-100)
+
+
+@dataclass(frozen=True)
+class JointRepair:
+    """Frames of a recording in which a joint was mended.
+
+    Attributes:
+        joint: the joint.
+        start: the first of the frames.
+        stop: the frame after the last.
+        seconds: times of the first and of the last of them, in the recording.
+        exact: whether a half turn was undone; otherwise the joint was interpolated, and what it did is not known.
+    """
+
+    joint: str
+    start: int
+    stop: int
+    seconds: tuple[float, float]
+    exact: bool
 
 
 @dataclass(frozen=True)
@@ -37,6 +57,7 @@ class Clip:
         weight: count of each of its postures and moves; the heaviest clip has 1.
         mirrored: whether left and right are exchanged.
         reverse: the price, in nats per move, of learning it backwards too; None if it is not.
+        repairs: what was mended of its recording.
     """
 
     name: str
@@ -47,6 +68,7 @@ class Clip:
     weight: float = 1.0
     mirrored: bool = False
     reverse: float | None = None
+    repairs: tuple[JointRepair, ...] = ()
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -60,6 +82,13 @@ class Clip:
     def reverse_weight(self) -> float:
         """Count of each of its moves backwards; 0 if it is not learned backwards."""
         return 0.0 if self.reverse is None else self.weight * math.exp(-self.reverse)
+
+    def is_reconstructed(self, joint: str, start: float, stop: float) -> bool:
+        """Return whether a joint was interpolated somewhere from one time of the recording to another, seconds."""
+        return any(
+            repair.joint == joint and not repair.exact and repair.seconds[0] <= stop and start <= repair.seconds[1]
+            for repair in self.repairs
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +110,22 @@ class Moves:
 
 @dataclass(frozen=True)
 class JointFlip:
-    """A fault of a recording: a joint turns by `degrees` up to `frame` from the one before, faster than a body can."""
+    """A fault of a recording: a joint turns by `degrees` up to `frame` from the one before, faster than a body can.
+
+    Attributes:
+        clip: the recording's name.
+        joint: the joint.
+        frame: the first frame after the flip.
+        degrees: its angle.
+        repair: "put back" if a half turn was undone, "reconstructed" if the joint was interpolated, "none" if the flip
+            was left as it is, or the recording cut there.
+    """
 
     clip: str
     joint: str
     frame: int
     degrees: float
+    repair: Repair = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +143,7 @@ class Corpus:
             radians, at K evenly spaced times between each posture and the next.
         facing: "stage" if the root's full orientation is its state; "free" if its turn about the vertical is removed
             from it and is a joint chain of its own.
-        rate: postures per second; None if they are keyframes with their own times.
+        rate: postures per second of what was recorded; None if all are keyframes with their own times.
         title: a one-line description.
         author: who made it.
         source: where it comes from.
@@ -223,7 +262,14 @@ class Corpus:
     def motion(self, clip: Clip) -> Motion:
         """Return a clip's N postures as a motion."""
         here = slice(clip.start, clip.stop)
-        return Motion(self.skeleton, self.rotations[here], self.root[here], self.times[here], clip.name)
+        return Motion(
+            self.skeleton,
+            self.rotations[here],
+            self.root[here],
+            self.times[here],
+            clip.name,
+            keyframed=self.rate is None,
+        )
 
     def recording(self, clip: Clip) -> Motion:
         """Return a clip as a motion of its N postures and, if the corpus keeps detail, K frames between each two."""

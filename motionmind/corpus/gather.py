@@ -1,37 +1,44 @@
-"""Gathers recordings and other corpora into a corpus: cuts them at faults, resamples them, mirrors them."""
+"""Gathers recordings and other corpora into a corpus: repairs them, resamples them, mirrors them."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, count
+from itertools import chain, count, pairwise
 from typing import Literal, NamedTuple, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind.body.mirror import mirrored
+from motionmind._typing import Ints
+from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, subdivide_times
+from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, JointRepair, subdivide_times
+from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 
-Flips = Literal["drop", "keep", "split"]
+Flips = Literal["drop", "keep", "repair"]
+Rate = float | Literal["auto"] | None
 
-FLIP_DEGREES = 45.0
-FLIP_SPEED = 3000.0  # degrees a second
+# Postures a second of a recording, unless another rate is given: [O10]'s choice for motion capture.
+RECORDED_RATE = 5.0
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
 DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
 FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
 _COARSE = 20.0  # frames per second; a slower recording has no detail to keep
 
+_log = logging.getLogger(__name__)
+
 
 class Gathering(TypedDict, total=False):
     """Options of `gather`, for functions that pass them on."""
 
-    rate: float | None
+    rate: Rate
     skip: int
     facing: Facing
     flips: Flips
@@ -45,34 +52,14 @@ class Gathering(TypedDict, total=False):
     licence: str
 
 
-def find_flips(motion: Motion, degrees: float = FLIP_DEGREES) -> tuple[JointFlip, ...]:
-    """Find joints that turn by more than `degrees` between consecutive frames, and faster than 3,000 degrees a second.
-
-    The second condition spares keyframes and slow cameras, whose frames are far apart, and quick throws and kicks.
-
-    Args:
-        motion: the recording.
-        degrees: the largest credible turn between two frames.
-
-    Returns:
-        The flips in order of time, each with the first frame after it.
-    """
-    turned = np.degrees(rot.angle(motion.rotations[:-1], motion.rotations[1:]))
-    speed = turned / np.diff(motion.times)[:, None]
-    return tuple(
-        JointFlip(motion.name, motion.skeleton.names[joint], int(frame) + 1, float(turned[frame, joint]))
-        for frame, joint in np.argwhere((turned > degrees) & (speed > FLIP_SPEED))
-    )
-
-
 def gather(
     name: str,
     motions: Iterable[Motion],
     *,
-    rate: float | None = None,
+    rate: Rate = "auto",
     skip: int = 0,
     facing: Facing = "free",
-    flips: Flips = "split",
+    flips: Flips = "repair",
     flip_degrees: float = FLIP_DEGREES,
     mirror: bool = False,
     reverse: float | None = None,
@@ -88,12 +75,14 @@ def gather(
     Args:
         name: the corpus's name.
         motions: the recordings, named; repeated names are numbered.
-        rate: postures per second; None keeps every frame with its own time.
+        rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
+            recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
+            keyframes: of a motion that says so, and of one with fewer than 15 frames a second.
         skip: frames to drop at each recording's start, such as an added T-pose.
         facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
             "stage" leaves it there, and facing the wall is then another state than facing the audience.
-        flips: treatment of a recording with flips (`find_flips`): `split` cuts it there, and no flip is learned, `keep`
-            takes it unchanged, `drop` leaves it out.
+        flips: treatment of a recording with flips (`find_flips`): `repair` mends them (`repair_flips`), and cuts the
+            recording where it cannot, so no flip is learned; `keep` takes it unchanged, `drop` leaves it out.
         flip_degrees: the turn in one frame that counts as a flip.
         mirror: whether to learn from the mirror images of all clips, too.
         reverse: the price, in nats per move, of learning from all clips backwards, too: there each move counts
@@ -116,42 +105,46 @@ def gather(
         SkeletonError: the body cannot be mirrored.
     """
     _check_options(skip, flips, flip_degrees, reverse)
-    _check_mix(name, mix, rate)
-    recordings, faults, body = _cut_recordings(motions, rate, skip, flips, flip_degrees)
+    given = None if rate == "auto" else rate
+    _check_mix(name, mix, given)
+    own = _take_recordings(motions, rate, skip, flips, flip_degrees)
+    body = own.body
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
+    if rate == "auto" and own.rate is not None:
+        _log.info(
+            "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, own.rate
+        )
     pieces = [
-        _Piece(postures, recording, Clip(postures.name, 0, 0, (about or {}).get(postures.name, "")))
-        for postures, recording in recordings
+        piece._replace(clip=replace(piece.clip, about=(about or {}).get(piece.clip.name, ""))) for piece in own.pieces
     ]
     for other, weight in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
-        pieces += _take_clips(other, weight, rate)
+        pieces += _take_clips(other, weight, given)
     if not pieces or body is None:
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
-    if rate is None:
-        rate = _common_rate(bool(recordings), mix)
+    common = _common_rate(own, mix) if given is None else given
     if mirror:
         pieces += _mirror_images(pieces)
-    between = max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+    between = _frames_between(common)
     return Corpus(
         name,
         body,
-        _lay_out_clips(name, pieces, rate, reverse),
+        _lay_out_clips(name, pieces, common, reverse),
         np.concatenate([piece.postures.rotations for piece in pieces]),
         np.concatenate([piece.postures.root for piece in pieces]),
         np.concatenate([piece.postures.times for piece in pieces]),
         np.concatenate([_detail(piece.postures, piece.recording, between) for piece in pieces]),
         facing,
-        rate,
+        common,
         title,
         author,
         source,
         licence,
-        tuple(faults),
+        own.faults,
     )
 
 
@@ -188,9 +181,9 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
             )
 
 
-def _common_rate(recordings: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
-    """Return the rate of corpora mixed unchanged and of recordings taken frame by frame; CorpusError if they differ."""
-    found: dict[float | None, str] = {None: "the recordings"} if recordings else {}
+def _common_rate(own: _Recordings, mix: Sequence[tuple[Corpus, float]]) -> float | None:
+    """Return the rate of recordings and of corpora mixed with them unchanged; CorpusError if they differ."""
+    found: dict[float | None, str] = {own.rate: "the recordings"} if own.body else {}
     for mixed, _ in mix:
         found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
     if len(found) > 1:
@@ -204,6 +197,22 @@ def _pace(rate: float | None) -> str:
 
 
 # --- clips without their place in the corpus --------------------------------------------------------------------------
+
+
+class _Recordings(NamedTuple):
+    """Recordings without their faults.
+
+    Attributes:
+        pieces: their unbroken parts.
+        faults: the faults, by recording and time.
+        rate: postures a second of what was resampled; None if nothing was.
+        body: the first recording's skeleton; None if there is no recording.
+    """
+
+    pieces: list[_Piece]
+    faults: tuple[JointFlip, ...]
+    rate: float | None
+    body: Skeleton | None
 
 
 class _Piece(NamedTuple):
@@ -233,14 +242,20 @@ def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reve
     )
 
 
+def _frames_between(rate: float | None) -> int:
+    """Return how many frames of detail there are between two postures."""
+    return max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+
+
 def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
     """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
 
-    They are 0 after the last posture, and for a joint in a move in which it departs by more than `FAULT_DEGREES`.
+    They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
+    more than `FAULT_DEGREES`.
     """
     count, joints = len(postures), len(postures.skeleton)
     out = np.zeros((count, between, joints, 3), np.float16)
-    if between > 0 and count > 1 and recording.fps >= _COARSE:
+    if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
         times = subdivide_times(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
         detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
@@ -250,16 +265,14 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
     return out
 
 
-def _cut_recordings(
-    motions: Iterable[Motion], rate: float | None, skip: int, flips: Flips, flip_degrees: float
-) -> tuple[list[tuple[Motion, Motion]], list[JointFlip], Skeleton | None]:
-    """Skip frames, and cut recordings at faults.
-
-    Return (postures at `rate`, recording) for each part, the faults, and the first recording's body.
-    """
-    pieces: list[tuple[Motion, Motion]] = []
+def _take_recordings(
+    motions: Iterable[Motion], rate: Rate, skip: int, flips: Flips, flip_degrees: float
+) -> _Recordings:
+    """Skip frames, repair recordings or cut them at faults, and take their postures at `rate`."""
+    pieces: list[_Piece] = []
     faults: list[JointFlip] = []
     names: set[str] = set()
+    rates: set[float] = set()
     first: Motion | None = None
     for recording in motions:
         first = first or recording
@@ -273,14 +286,54 @@ def _cut_recordings(
             raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
         motion = replace(recording.slice(skip, len(recording)), name=_free_name(recording.name or "clip", names))
         names.add(motion.name)
-        found = find_flips(motion, flip_degrees)
-        faults += [JointFlip(f.clip, f.joint, f.frame + skip, f.degrees) for f in found]
+        found, cuts = find_flips(motion, flip_degrees), list[int]()
+        repairs: tuple[JointRepair, ...] = ()
+        if found and flips == "repair":
+            motion, found, repairs = repair_flips(motion, flip_degrees)
+            cuts = sorted({flip.frame for flip in find_flips(motion, flip_degrees)})
+        faults += [replace(flip, frame=flip.frame + skip) for flip in found]
         if found and flips == "drop":
             continue
-        cuts = sorted({f.frame for f in found}) if flips == "split" else []
-        parts = [motion.slice(a, b) for a, b in zip([0, *cuts], [*cuts, len(motion)], strict=True)]
-        pieces += _number_parts([(part if rate is None else part.resample(rate), part) for part in parts], motion.name)
-    return pieces, faults, first.skeleton if first else None
+        wanted = _posture_rate(motion) if rate == "auto" else rate
+        if wanted is not None:
+            rates.add(wanted)
+        pieces += _cut(motion, cuts, wanted, _later(repairs, skip))
+    return _Recordings(pieces, tuple(faults), max(rates, default=None), first.skeleton if first else None)
+
+
+def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, repairs: tuple[JointRepair, ...]) -> list[_Piece]:
+    """Cut a recording before the frames `cuts`, and take its parts' postures.
+
+    Parts are numbered, and those of a single posture, which have no move, are dropped.
+    """
+    parts = [motion.slice(start, stop) for start, stop in pairwise([0, *cuts, len(motion)])]
+    pieces = []
+    for number, part in enumerate(parts, start=1):
+        name = f"{motion.name}.{number}" if cuts else motion.name
+        postures = replace(part if rate is None else part.resample(rate), name=name)
+        if len(postures) > 1 or not cuts:
+            first, last = part.times[0], part.times[-1]
+            within = tuple(one for one in repairs if one.seconds[0] <= last and first <= one.seconds[1])
+            pieces.append(_Piece(postures, _with_detail(postures, part, rate), Clip(name, 0, 0, repairs=within)))
+    return pieces
+
+
+def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
+    """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
+    between = _frames_between(rate)
+    if between == 0 or len(postures) == 1 or part.fps < _COARSE:
+        return postures
+    return part.at(subdivide_times(postures.times, between))
+
+
+def _later(repairs: Iterable[JointRepair], frames: int) -> tuple[JointRepair, ...]:
+    """Return the same repairs, numbered from so many frames before."""
+    return tuple(replace(one, start=one.start + frames, stop=one.stop + frames) for one in repairs)
+
+
+def _posture_rate(motion: Motion) -> float | None:
+    """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
+    return None if motion.keyframed or motion.fps < FILM_RATE else RECORDED_RATE
 
 
 def _take_clips(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
@@ -302,21 +355,19 @@ def _mirror_images(pieces: Sequence[_Piece]) -> list[_Piece]:
     for postures, recording, clip in pieces:
         if (clip.corpus, clip.name) not in present:
             try:
-                out.append(_Piece(mirrored(postures), mirrored(recording), replace(clip, mirrored=True)))
+                partners = find_sides(postures.skeleton).partners
+                out.append(_Piece(mirrored(postures), mirrored(recording), _mirror_image(clip, postures, partners)))
             except SkeletonError as error:
                 raise SkeletonError(f"{clip.label}: {error}") from None
     return out
 
 
-def _number_parts(parts: list[tuple[Motion, Motion]], name: str) -> list[tuple[Motion, Motion]]:
-    """Number the parts of a recording that was cut, and drop those of a single posture, which have no move."""
-    if len(parts) == 1:
-        return parts
-    return [
-        (replace(postures, name=f"{name}.{i}"), recording)
-        for i, (postures, recording) in enumerate(parts, start=1)
-        if len(postures) > 1
-    ]
+def _mirror_image(clip: Clip, postures: Motion, partners: Ints) -> Clip:
+    """Return a clip with left and right exchanged; `partners` are the joints' on the other side [J]."""
+    names = postures.skeleton.names
+    opposite = {name: names[partner] for name, partner in zip(names, partners, strict=True)}
+    repairs = tuple(replace(repair, joint=opposite[repair.joint]) for repair in clip.repairs)
+    return replace(clip, mirrored=True, repairs=repairs)
 
 
 def _free_name(name: str, taken: set[str]) -> str:

@@ -45,8 +45,8 @@ def read_motion(
         path: the file; its suffix determines the format.
         unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
-        fps: frames per second where the file does not record them: AMC (default 120), the papers' notation
-            (default 1), `.npz` without a rate (no default).
+        fps: frames per second: of AMC (default 120) and the papers' notation (default 1), which do not record them, and
+            of BVH and `.npz` in place of those that the file states. JSON's frames have times of their own.
         skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
 
     Returns:
@@ -68,7 +68,7 @@ def read_motion(
     if suffix == ".bvh":
         from motionmind.formats.bvh import read_bvh
 
-        return read_bvh(path, unit=unit)
+        return read_bvh(path, unit=unit, fps=fps)
     if suffix == ".amc":
         from motionmind.formats.asf_amc import read_amc
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, write_atomically
@@ -34,7 +35,7 @@ _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _log = logging.getLogger(__name__)
 
 
-def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
+def read_bvh(path: FilePath, *, unit: str | float | None = None, fps: float | None = None) -> Motion:
     """Read a motion from a BVH file, on the file's own tree of joints.
 
     Each joint has its own channels, in any order. Blank lines among the frames, and lines that begin with # or //,
@@ -50,17 +51,22 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
         path: the file; its stem becomes the name of the skeleton and of the motion.
         unit: a name in `UNITS`, or metres in one unit of the file; None takes the unit that `guess_unit` infers from
             the skeleton, and logs it (logger "motionmind.formats.bvh", level INFO).
+        fps: frames per second in place of the header's, which some converters copy from another file.
 
     Returns:
         The motion, in metres and seconds, starting at time 0.
 
     Raises:
         FormatError: the file does not exist, or is not a complete BVH; the message names file and line.
+        MotionMindError: `unit` or `fps` is invalid.
 
     Warns:
         MotionMindWarning: something was repaired, as described above.
     """
-    body, times = _read_body(path)
+    if fps is not None and not 0.0 < fps <= FASTEST:
+        raise MotionMindError(f"fps must be a positive number of frames a second, {FASTEST:g} at most, not {fps}")
+    body, stated = _read_body(path)
+    frame_time = stated if fps is None else 1.0 / fps
     if unit is None:
         name, scale = guess_unit(body.skeleton)
         _log.info("%s: one unit taken as %.5g m (%s), by the height of the body", path, scale, name)
@@ -73,7 +79,7 @@ def read_bvh(path: FilePath, *, unit: str | float | None = None) -> Motion:
         Skeleton(raw.name, raw.names, raw.parents, raw.offsets * scale, raw.tips * scale),
         body.rotations,
         body.root * scale,
-        times,
+        np.arange(len(body.root), dtype=np.float64) * frame_time,
         name=raw.name,
     )
 
@@ -83,8 +89,8 @@ def bvh_unit(path: FilePath) -> tuple[str, float]:
     return guess_unit(_read_body(path)[0].skeleton)
 
 
-def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
-    """Read the file in its own unit, and the frames' times [T] in seconds."""
+def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
+    """Read the file in its own unit, and its seconds per frame."""
     lines = read_lines(path)
     start = next((i for i, line in enumerate(lines) if line.strip().upper() == "MOTION"), None)
     joints = read_hierarchy(lines[:start], path)
@@ -100,7 +106,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, Floats]:
         body.notes.append(
             f"the header says {declared} frames, the file holds {len(values)}; all {len(values)} are read"
         )
-    return body, np.arange(len(values), dtype=np.float64) * frame_time
+    return body, frame_time
 
 
 # --- the frames ----------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.files import FilePath
@@ -51,6 +52,8 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         lossy.append("where the body is")
     elif abs(motion.times[0]) > _TINY:
         lossy.append(f"the time when it begins, {motion.times[0]:.6g} s")
+    if motion.keyframed and motion.fps >= FILM_RATE:
+        lossy.append("that its frames are postures of a score, not of a recording")
     lossy += _lossy_body(motion, suffix)
     inserted = int(motion.inserted().sum())
     if inserted:

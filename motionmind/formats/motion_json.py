@@ -23,6 +23,8 @@ joints' moves that no corpus attests (bridges):
 
     "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
 
+`"keyframed": true` says that each frame is a posture that someone chose, as in a score.
+
 A variation's file is its current movement with one more field, `variation`, which holds the rest
 (`motionmind.variation.variation_json`).
 """
@@ -57,6 +59,7 @@ class FramesSchema(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     rotations: list[list[_json.Quaternion]]
     name: str = ""
     insertions: list[InsertionSchema] = []
+    keyframed: bool = False
 
 
 class MotionSchema(FramesSchema, forbid_unknown_fields=True, kw_only=True):
@@ -136,7 +139,7 @@ def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend:
         rotations = _json.unit_rotations(rotations, skeleton.names, path)
     try:
         insertions = tuple(Insertion(np.array(one.times), tuple(one.bridged)) for one in schema.insertions)
-        return Motion(skeleton, rotations, root, times, schema.name, insertions)
+        return Motion(skeleton, rotations, root, times, schema.name, insertions, schema.keyframed)
     except FormatError:
         raise
     except MotionMindError as error:
@@ -178,6 +181,8 @@ def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] 
         f'"skeleton": {_json.skeleton_text(motion.skeleton, "")}',
         f'"times": {_compact(times.tolist())}',
     ]
+    if motion.keyframed:
+        fields.append('"keyframed": true')
     if motion.insertions:
         insertions = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
         fields.append(f'"insertions": {msgspec.json.encode(insertions).decode()}')

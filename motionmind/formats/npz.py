@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import io
 import logging
-import math
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,7 @@ def read_npz(path: FilePath, *, fps: float | None = None) -> Motion:
 
     Args:
         path: the file; its stem becomes the motion's name.
-        fps: frames per second if the file has no rate.
+        fps: frames per second in place of the file's.
 
     Returns:
         The motion, in metres and seconds, y up.
@@ -159,11 +158,11 @@ def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Floats:
 
 
 def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float:
-    """Return the file's frames per second, or else `fps`."""
-    name = next((name for name in _RATES if name in arrays), "fps")
-    rate = arrays.get(name, np.array(math.nan if fps is None else fps))
-    if name == "fps" and fps is None:
+    """Return `fps`, or the file's frames per second if it is None."""
+    name = "fps" if fps is not None else next((name for name in _RATES if name in arrays), None)
+    if name is None:
         raise FormatError(f"no array {_RATES[0]!r}: say how many frames per second there are", path=path)
+    rate = arrays.get(name, np.array(fps, dtype=np.float64))
     if rate.size != 1 or not 0.0 < rate.item() <= FASTEST:
         raise FormatError(f"{name!r} must be one number of frames per second, not {_in_one_line(rate)}", path=path)
     return float(rate.item())

@@ -1,4 +1,4 @@
-"""Learning from a corpus: its states, grammar and carriage."""
+"""Learning from a corpus: its states, grammar, carriage, pace and limits of plausibility."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.grammar import learn as learn_grammar
 from motionmind.learned.carriage import Carriage, learn_carriage
+from motionmind.learned.pace import Pace, learn_pace
+from motionmind.learned.plausibility import Plausibility, learn_plausibility
 
 MOST_STATES_LEARNED = 10_000  # of a joint: learning its pairs takes some 6 GB
 
@@ -28,6 +30,8 @@ class Learned:
         states: states of the corpus's postures [N, L].
         grammar: joint graphs, bridges and coordination.
         carriage: how the corpus's bodies hold themselves, travel and stand.
+        pace: how long they take for how far a way.
+        plausibility: what their movement shows a viewer at most.
     """
 
     corpus: Corpus
@@ -35,6 +39,8 @@ class Learned:
     states: States
     grammar: Grammar
     carriage: Carriage
+    pace: Pace
+    plausibility: Plausibility
 
 
 def learn(corpus: Corpus, discretization: Discretization) -> Learned:
@@ -68,7 +74,9 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
         weights=moves.weights,
         posture_weights=corpus.weights,
     )
-    return Learned(corpus, space, states, grammar, learn_carriage(corpus))
+    pace = learn_pace(corpus)
+    plausibility = learn_plausibility(corpus, pace.fastest)
+    return Learned(corpus, space, states, grammar, learn_carriage(corpus), pace, plausibility)
 
 
 def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:

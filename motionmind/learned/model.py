@@ -94,5 +94,12 @@ class LearnedCorpus(Learned):
     @classmethod
     def _of(cls, learned: Learned, load_seconds: float = 0.0) -> Self:
         return cls(
-            learned.corpus, learned.space, learned.states, learned.grammar, learned.carriage, load_seconds=load_seconds
+            learned.corpus,
+            learned.space,
+            learned.states,
+            learned.grammar,
+            learned.carriage,
+            learned.pace,
+            learned.plausibility,
+            load_seconds=load_seconds,
         )

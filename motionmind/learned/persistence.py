@@ -29,20 +29,30 @@ from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.learning import Learned, learn
+from motionmind.learned.pace import Pace, learn_pace
+from motionmind.learned.plausibility import Plausibility, learn_plausibility
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
-_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage)
+_Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility)
 
 _CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
-_PARTS = {"transitions": Transitions, "bridges": Bridges, "coordination": Coordination, "carriage": Carriage}
+_PARTS = {
+    "transitions": Transitions,
+    "bridges": Bridges,
+    "coordination": Coordination,
+    "carriage": Carriage,
+    "pace": Pace,
+    "plausibility": Plausibility,
+}
 _ARRAYS = (
     *("rotations", "root", "times", "detail", "states", "centres"),
     *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
 )
 _RENAMED = {"carriage.kinds": "carriage.clusters"}  # arrays of corpora built by 0.1: old name -> new
+_ADDED = {"carriage.aloft", "carriage.overhang", "carriage.touches"}  # arrays that corpora built by 0.1 lack
 
 
 def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
@@ -65,7 +75,7 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
         "centres": space.centres,
     }
     for name, kind in _PARTS.items():
-        part = learned.carriage if kind is Carriage else getattr(learned.grammar, name)
+        part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
         arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
     skeleton = corpus.skeleton
     manifest = {
@@ -121,7 +131,10 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
-    missing = [name for name in _ARRAYS if name not in arrays]
+    # Corpora built before 0.2 keep none of these; they take a second to learn for minutes of movement.
+    new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
+    new |= set() if _ADDED & arrays.keys() else {"carriage"}
+    missing = [name for name in _ARRAYS if name not in arrays and name.partition(".")[0] not in new]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
     body, states = manifest.skeleton, manifest.space
@@ -150,7 +163,14 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
         _part(Bridges, "bridges", arrays),
         _part(Coordination, "coordination", arrays),
     )
-    return Learned(corpus, space, arrays["states"], grammar, _part(Carriage, "carriage", arrays))
+    carriage = learn_carriage(corpus) if "carriage" in new else _part(Carriage, "carriage", arrays)
+    pace = learn_pace(corpus) if "pace" in new else _part(Pace, "pace", arrays)
+    plausibility = (
+        learn_plausibility(corpus, pace.fastest)
+        if "plausibility" in new
+        else _part(Plausibility, "plausibility", arrays)
+    )
+    return Learned(corpus, space, arrays["states"], grammar, carriage, pace, plausibility)
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:

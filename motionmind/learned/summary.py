@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Int32s
-from motionmind.corpus.corpus import Clip, Corpus, Facing
+from motionmind.corpus.corpus import Clip, Corpus, Facing, Repair
 from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
 
@@ -63,12 +63,33 @@ class FlipReport(msgspec.Struct, frozen=True):
         joint: name of the joint.
         frame: the first frame after the flip.
         degrees: angle of the flip, rounded to a tenth.
+        repair: "put back" if a half turn was undone, "reconstructed" if the joint was interpolated, "none" if the flip
+            was left as it is, or the recording cut there.
     """
 
     clip: str
     joint: str
     frame: int
     degrees: float
+    repair: Repair
+
+
+class RepairReport(msgspec.Struct, frozen=True):
+    """Frames of a recording in which a joint was mended.
+
+    Attributes:
+        clip: label of the clip.
+        joint: name of the joint.
+        start: the first of the frames.
+        stop: the frame after the last.
+        exact: whether a half turn was undone; otherwise the joint was interpolated.
+    """
+
+    clip: str
+    joint: str
+    start: int
+    stop: int
+    exact: bool
 
 
 class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
@@ -87,9 +108,10 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
         skeleton: name of the body.
         joints: the joints' names.
         facing: "stage" or "free", as in Corpus.
-        rate: postures a second; None for keyframes with times of their own.
+        rate: postures a second of what was recorded; None if all are keyframes with times of their own.
         states: number of states, by chain.
         edges: number of attested moves from state to state, by chain.
+        repairs: what was mended of its recordings.
     """
 
     name: str
@@ -107,6 +129,7 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
     rate: float | None
     states: dict[str, int]
     edges: dict[str, int]
+    repairs: list[RepairReport]
 
 
 class CorpusCheck(CorpusSummary, frozen=True, kw_only=True):
@@ -158,7 +181,7 @@ def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 
         pairs=pairs,
         seed=seed,
         out_degree=_by_chain(grammar, np.round(degree, 3)),
-        faults=[FlipReport(f.clip, f.joint, f.frame, round(f.degrees, 1)) for f in corpus.faults],
+        faults=[FlipReport(f.clip, f.joint, f.frame, round(f.degrees, 1), f.repair) for f in corpus.faults],
     )
 
 
@@ -194,6 +217,12 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "rate": corpus.rate,
         "states": _by_chain(grammar, graph.sizes()),
         "edges": _by_chain(grammar, np.diff(graph.indptr[graph.starts])),
+        "repairs": [
+            RepairReport(clip.label, one.joint, one.start, one.stop, one.exact)
+            for clip in corpus.clips
+            for one in clip.repairs
+            if not clip.mirrored
+        ],
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats, States
 from motionmind.body.contact import RATE, find_feet, find_floor, foot_slide, skating
 from motionmind.body.motion import Motion
+from motionmind.body.plausibility import at_rate
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError, SkeletonError
-from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.model import LearnedCorpus
+from motionmind.learned.plausibility import ABOUT, MEASURES, summarise_shown
 from motionmind.metrics.paths import Habits, arrival_spread, learn_habits
 from motionmind.metrics.smoothness import angular_jerk, angular_speed, sparc
 from motionmind.metrics.style import WINDOW, Styles, features, learn_styles
@@ -104,6 +105,7 @@ _ABOUT: Mapping[str, tuple[str, str]] = {
     "style": ("", "how far from how the corpus's joints move: squared Mahalanobis distance"),
     "skating": ("", "share of frames in which a foot that is low moves far"),
     "slide": ("cm", "how far a foot near the floor slides, a frame"),
+    **ABOUT,
     "moves": ("", "number of moves"),
     "arrival_spread": ("moves", "how far apart joints arrive for good"),
     "attested": ("", "share of the joints' transitions that were seen in the corpus"),
@@ -162,10 +164,12 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     habits, phrases = learn_habits(learned.grammar), learn_phrases(corpus, np.asarray(learned.states))
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
-    own = _motion_figures(sampled, _style(seen, None)) | _path_figures(path, habits, phrases, None)
+    fastest = learned.plausibility.fastest
+    fastest = learned.plausibility.fastest
+    own = _motion_figures(sampled, _style(seen, None), fastest) | _path_figures(path, habits, phrases, None)
     frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
     postures = min(len(path), max(len(corpus) // _PARTS, 2))
-    rows = [*_usual_motion(clips, seen, frames), *_usual_paths(learned, postures, habits, phrases)]
+    rows = [*_usual_motion(clips, seen, frames, fastest), *_usual_paths(learned, postures, habits, phrases)]
     return _beside_range(own, rows)
 
 
@@ -178,16 +182,6 @@ def _beside_range(own: Mapping[str, float], rows: Sequence[Mapping[str, float]])
         low, high = np.percentile(known, RANGE) if len(known) else (np.nan, np.nan)
         figures[name] = Figure(value, float(low), float(high), *_ABOUT[name])
     return figures
-
-
-def at_rate(motion: Motion) -> Motion:
-    """Return the movement at 30 frames a second: coarser movement is interpolated by splines, finer is thinned."""
-    if motion.fps >= RATE or len(motion) < 2:
-        return motion.resample(RATE)
-    start, keys = motion.times[0], motion.times
-    times = start + np.arange(int(np.floor((keys[-1] - start) * RATE + 1e-3)) + 1) / RATE
-    rotations, root = rotation_spline(keys, motion.rotations, times), natural_spline(keys, motion.root, times)
-    return replace(motion, rotations=rotations, root=root, times=times, insertions=())
 
 
 def _on(skeleton: Skeleton, motion: Motion) -> Motion:
@@ -212,8 +206,8 @@ def _path(motion: Motion, learned: LearnedCorpus, step: float) -> States:
     return learned.space.assign(learned.corpus.to_chains(postures.rotations))
 
 
-def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
-    """Kinematic measures of movement at 30 frames a second, and its distance from a style."""
+def _motion_figures(motion: Motion, style: Styles | None, fastest: Floats) -> dict[str, float]:
+    """Measures of movement at 30 frames a second, its distance from a style, its pace beside `fastest` [J + 2]."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
     speed = angular_speed(rotations, RATE)
     out = {
@@ -223,6 +217,8 @@ def _motion_figures(motion: Motion, style: Styles | None) -> dict[str, float]:
     }
     if style is not None and len(motion) >= WINDOW:
         out["style"] = float(style.distances(rotations)[0])
+    lowest = find_floor(body, rotations, root, heels=True)
+    out |= zip(MEASURES, summarise_shown(motion, fastest, lowest).tolist(), strict=True)
     if body.height >= _HUMAN and find_feet(body):
         floor = find_floor(body, rotations, root)
         out["skating"] = skating(body, rotations, root, floor)
@@ -255,12 +251,14 @@ def _style(seen: Sequence[Floats], besides: int | None) -> Styles | None:
     return learn_styles({"own": np.concatenate(rows)}) if rows else None
 
 
-def _usual_motion(clips: Sequence[Motion], seen: Sequence[Floats], frames: int) -> Iterator[dict[str, float]]:
+def _usual_motion(
+    clips: Sequence[Motion], seen: Sequence[Floats], frames: int, fastest: Floats
+) -> Iterator[dict[str, float]]:
     """Kinematic measures of pieces of a corpus's clips at 30 frames a second, the style beside the other clips."""
     pieces = _pieces([len(clip) for clip in clips], frames, _SHORTEST)
     styles = {number: _style(seen, number) for number, _ in pieces}
     for number, start in pieces:
-        yield _motion_figures(clips[number].slice(start, start + frames), styles[number])
+        yield _motion_figures(clips[number].slice(start, start + frames), styles[number], fastest)
 
 
 def _usual_paths(

@@ -322,4 +322,5 @@ def _join_moves(body: Anatomy, name: str, rows: list[Row], placed: _Placed) -> M
         np.round(root + moved, 5) + 0.0,
         np.round(times, 4),
         name,
+        keyframed=True,
     )

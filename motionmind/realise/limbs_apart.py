@@ -240,14 +240,14 @@ def _smooth(steps: Floats, needed: Bools, axis: Floats, still: Floats, frozen: B
     blocks = (PLACE * still)[:, None, None] * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
     blocks += (1.0 + pull)[:, None, None] * np.eye(3)
     # Second differences: three frames each, so that unknowns, which are three a frame, are coupled over six rows.
-    second = np.diff(np.eye(len(steps)), 2, axis=0)
-    bend = spread**4 * second.T @ second
+    outer = np.ones(len(steps) - 2)
+    bends = [np.convolve(outer, kernel) for kernel in ([1.0, 4.0, 1.0], [-2.0, -2.0], [1.0])]
     diagonals = np.zeros((7, len(steps), 3))
     for above in range(3):
         for column in range(above, 3):
             diagonals[6 - above, :, column] = blocks[:, column - above, column]
     for later in range(3):
-        diagonals[6 - 3 * later, later:] += np.diagonal(bend, later)[:, None]
+        diagonals[6 - 3 * later, later:] += spread**4 * bends[later][:, None]
     diagonals[:, frozen] = 0.0
     diagonals[6, frozen] = 1.0
     for later in (1, 2):

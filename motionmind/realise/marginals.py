@@ -10,53 +10,102 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.jit import jit
-from motionmind.realise.walks import mix_clusters
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 
 @jit
-def posterior_marginals(begins: Ints, ends: Ints, shares: Floats, clusters: Int32s, near: Floats) -> Floats:
+def posterior_marginals(
+    begins: Ints, ends: Ints, shares: Floats, clusters: Int32s, weights: Floats, near: Floats
+) -> Floats:
     """Return the probability that a walk is in each posture at each step [S + 1, N]; rows sum to 1.
 
-    The chance of a walk is proportional to the product of the shares of its steps, the mixing after each, and the
-    nearness of its postures.
+    The chance of a walk is proportional to the product of the weight of its first posture, the shares of its steps, the
+    mixing after each, and the nearness of its postures.
 
     Args:
         begins: postures from which the corpus's steps lead [M].
         ends: postures that they lead to [M].
         shares: share of each step among those that leave the same posture [M]; they add up to 1.
         clusters: cluster of each posture [N].
+        weights: of the postures [N], above 0.
         near: a weight of each posture at each step [S + 1, N].
     """
-    sizes = np.bincount(clusters)
-    out = _forward_messages(begins, ends, shares, clusters, sizes, near)
-    out *= _backward_messages(begins, ends, shares, clusters, sizes, near)
-    for t in range(len(near)):
-        out[t] /= out[t].sum()
+    over = (1.0 - STRAIGHT_ON - ANYWHERE) / np.bincount(clusters, weights)
+    anywhere = ANYWHERE / weights.sum()
+    out = _forward_messages(begins, ends, shares, clusters, weights, over, anywhere, near)
+    _times_backward_messages(out, begins, ends, shares, clusters, weights, over, anywhere, near)
     return out
 
 
 @jit
-def _forward_messages(begins: Ints, ends: Ints, shares: Floats, clusters: Int32s, sizes: Ints, near: Floats) -> Floats:
-    """Return alpha [S + 1, N] with alpha[t] = near[t] * mix(alpha[t - 1] moved on by a step), rows scaled to sum 1."""
-    forward = near.copy()
-    forward[0] /= forward[0].sum()
-    for t in range(1, len(near)):
-        came = np.zeros(near.shape[1])
-        for m in range(len(begins)):
-            came[ends[m]] += shares[m] * forward[t - 1, begins[m]]
-        forward[t] *= mix_clusters(came, clusters, sizes)
-        forward[t] /= forward[t].sum()
-    return forward
+def _forward_messages(
+    begins: Ints,
+    ends: Ints,
+    shares: Floats,
+    clusters: Int32s,
+    weights: Floats,
+    over: Floats,
+    anywhere: float,
+    near: Floats,
+) -> Floats:
+    """Return alpha [S + 1, N] with alpha[t] = near[t] * mixed(alpha[t - 1] moved on by a step), rows scaled to sum 1.
+
+    Of mass that comes to posture i, the share STRAIGHT_ON stays; over[k] of that in cluster k, and `anywhere` of all,
+    goes to each posture in proportion to its weight.
+    """
+    out = np.empty_like(near)
+    came, pooled = weights.copy(), np.empty(len(over))
+    for t in range(len(near)):
+        total = 0.0
+        if t == 0:
+            for i in range(len(came)):
+                out[t, i] = near[t, i] * came[i]
+                total += out[t, i]
+        else:
+            came[:] = 0.0
+            for m in range(len(begins)):
+                came[ends[m]] += shares[m] * out[t - 1, begins[m]]
+            pooled[:] = 0.0
+            for i in range(len(came)):
+                pooled[clusters[i]] += came[i]
+            whole = anywhere * pooled.sum()
+            pooled *= over
+            for i in range(len(came)):
+                mixed = STRAIGHT_ON * came[i] + weights[i] * (pooled[clusters[i]] + whole)
+                out[t, i] = near[t, i] * mixed
+                total += out[t, i]
+        out[t] /= total
+    return out
 
 
 @jit
-def _backward_messages(begins: Ints, ends: Ints, shares: Floats, clusters: Int32s, sizes: Ints, near: Floats) -> Floats:
-    """Return beta [S + 1, N] with beta[t] = mix(beta[t + 1] * near[t + 1]) moved back by a step, rows summing to 1."""
-    backward = np.ones_like(near)
+def _times_backward_messages(
+    out: Floats,
+    begins: Ints,
+    ends: Ints,
+    shares: Floats,
+    clusters: Int32s,
+    weights: Floats,
+    over: Floats,
+    anywhere: float,
+    near: Floats,
+) -> None:
+    """Multiply rows [S + 1, N] by beta with beta[t] = mixed(beta[t + 1] * near[t + 1]) moved back by a step, and scale
+    them to sum 1."""
+    back, on, pooled = np.ones(near.shape[1]), np.empty(near.shape[1]), np.empty(len(over))
+    out[-1] /= out[-1].sum()
     for t in range(len(near) - 2, -1, -1):
-        on = mix_clusters(backward[t + 1] * near[t + 1], clusters, sizes)
-        backward[t] = 0.0
+        pooled[:] = 0.0
+        for i in range(len(on)):
+            on[i] = back[i] * near[t + 1, i]
+            pooled[clusters[i]] += weights[i] * on[i]
+        whole = anywhere * pooled.sum()
+        pooled *= over
+        for i in range(len(on)):
+            on[i] = STRAIGHT_ON * on[i] + pooled[clusters[i]] + whole
+        back[:] = 0.0
         for m in range(len(begins)):
-            backward[t, begins[m]] += shares[m] * on[ends[m]]
-        backward[t] /= backward[t].sum()
-    return backward
+            back[begins[m]] += shares[m] * on[ends[m]]
+        back /= back.sum()
+        out[t] *= back
+        out[t] /= out[t].sum()

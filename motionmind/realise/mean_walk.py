@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -28,6 +30,8 @@ from motionmind.realise.walks import (
     squared_distances,
     variance_at_ends,
 )
+
+THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on
 
 
 class MeanWalk(NamedTuple):
@@ -107,31 +111,33 @@ def _mean_between(
     orientations = np.stack([stop.chains[:joints] for stop in ends])
     leaving, arriving = (None if stop.rates is None else stop.rates.joints for stop in ends)
     minimal = minimal_movement(orientations, times, leaving, arriving)
-    groups = _joints_by_parts(parts, joints)
-    shared = {number for numbers in groups for number in numbers[:-1]}
-    whole, half, limb = SIZES
     poses, trusted = np.empty_like(minimal), np.empty(joints)
-    marginals: dict[int, Floats] = {}
-    trusts: dict[int, float] = {}
-    sums: dict[tuple[int, ...], Floats] = {}
-    for number, part in enumerate(parts):
-        marginals[number], trusts[number] = _part_marginals(number, part, carriage, rates, ends, len(times), path)
-        for numbers, mine in groups.items():
-            if numbers[-1] != number:
-                continue
-            larger = numbers[:-1]
-            if larger not in sums:
-                sums[larger] = whole * marginals[larger[0]] + half * marginals[larger[1]]
-            weights = sums[larger] + limb * marginals[number]
-            about = np.ascontiguousarray(minimal[:, mine])
-            shown = np.ascontiguousarray(carriage.orientations[:, mine])
-            off = rot.log(rot.inv_mul(about, mean_rotations(weights, shown, about)))
-            off = _without_ends(off, times, leaving is not None, arriving is not None)
-            trusted[mine] = np.dot(SIZES, [trusts[n] for n in numbers])
-            poses[:, mine] = rot.mul(about, rot.exp(trusted[mine, None] * off))
-        if number not in shared:
-            del marginals[number]  # a large corpus's are large
-    return poses, 0.5 * (marginals[0] + marginals[1]), trusted
+
+    def walk(number: int) -> tuple[Floats, float]:
+        return _part_marginals(number, parts[number], carriage, rates, ends, len(times), path)
+
+    groups = _joints_by_parts(parts, joints)
+    larger = sorted({number for numbers in groups for number in numbers[:-1]})
+    # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
+    # belongs to a limb alone is not: of a large corpus it is large.
+    with ThreadPoolExecutor(THREADS) as pool:
+        known = dict(zip(larger, pool.map(walk, larger), strict=True))
+
+        def move(number: int) -> None:
+            mine, trust_in_mine = known[number] if number in known else walk(number)
+            for numbers, here in groups.items():
+                if numbers[-1] != number:
+                    continue
+                (whole, _), (half, _) = (known[n] for n in numbers[:-1])
+                weights = SIZES[0] * whole + SIZES[1] * half + SIZES[2] * mine
+                about = np.ascontiguousarray(minimal[:, here])
+                off = rot.log(rot.inv_mul(about, mean_rotations(weights, carriage.orientations, np.array(here), about)))
+                off = _without_ends(off, times, leaving is not None, arriving is not None)
+                trusted[here] = np.dot(SIZES, [*(known[n][1] for n in numbers[:-1]), trust_in_mine])
+                poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
+
+        list(pool.map(move, sorted({numbers[-1] for numbers in groups})))
+    return poses, 0.5 * (known[0][0] + known[1][0]), trusted
 
 
 def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
@@ -156,19 +162,19 @@ def _part_marginals(
 
     Arguments are those of `_mean_between`.
     """
-    shown = np.ascontiguousarray(carriage.orientations[:, part])
+    shown = carriage.orientations
     near = np.ones((count, len(carriage.weights)))
     if path is not None:
-        near[2:-2:2] = [likelihood(squared_distances(shown, pose) / FOLLOWS_WITHIN**2) for pose in path[:, part]]
+        followed = (squared_distances(shown, part, pose) for pose in path[:, part])
+        near[2:-2:2] = [likelihood(off / FOLLOWS_WITHIN**2) for off in followed]
     nearest = np.empty(2)
     for k, stop in enumerate(ends):
-        off = squared_distances(shown, stop.chains[part])
+        off = squared_distances(shown, part, stop.chains[part])
         nearest[k] = np.sqrt(off.min())
         near[-k] = likelihood(off / variance_at_ends(off), *_rate_terms(part, rates, stop))
-    near[0] *= carriage.weights
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
-    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, near)
-    way = np.sqrt(squared_distances(ends[0].chains[None, part], ends[1].chains[part])[0])
+    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, carriage.weights, near)
+    way = np.sqrt(squared_distances(ends[0].chains[None], part, ends[1].chains[part])[0])
     return marginals, trust(nearest, float(way))
 
 
@@ -196,15 +202,16 @@ def _joints_by_parts(parts: tuple[Ints, ...], joints: int) -> dict[tuple[int, ..
 
 
 @jit
-def mean_rotations(weights: Floats, orientations: Floats, about: Floats) -> Floats:
-    """Return weighted means [S, m, 4] of orientations, in the hemisphere of `about`.
+def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
+    """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
 
     The mean is the normalised sum of quaternions of one sign, which is within a few thousandths of the mean rotation
     where they lie within a right angle. Source: Gramkow, "On averaging rotations", IJCV 42 (2001).
 
     Args:
         weights: of the orientations in each mean [S, N].
-        orientations: of m joints [N, m, 4].
+        orientations: of all chains [N, L, 4].
+        joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
     out = np.zeros_like(about)
@@ -215,11 +222,12 @@ def mean_rotations(weights: Floats, orientations: Floats, about: Floats) -> Floa
                 continue
             for j in range(about.shape[1]):
                 side = 0.0
+                shown = orientations[i, joints[j]]
                 for k in range(4):
-                    side += about[t, j, k] * orientations[i, j, k]
+                    side += about[t, j, k] * shown[k]
                 signed = -weight if side < 0.0 else weight
                 for k in range(4):
-                    out[t, j, k] += signed * orientations[i, j, k]
+                    out[t, j, k] += signed * shown[k]
         for j in range(about.shape[1]):
             length = np.sqrt(np.sum(out[t, j] ** 2))
             if length > 1e-6:

@@ -1,7 +1,8 @@
 """Walks through a corpus from one posture to another, part by part of the body.
 
 A walk of a part goes through the corpus's postures, from one to the next as they followed in the clips. Now and then
-it goes over to another posture of the same *cluster*, one that holds the part much alike, and continues from there. A
+it goes over to another posture of the same *cluster*, one that holds the part much alike, and continues from there;
+where corpora are mixed, it goes to those that weigh more. A
 walk is more likely the nearer its ends are to the two given postures, and its velocities there to those given, if they
 are. Given those ends and the number of moves,
 `motionmind.realise.marginals` computes how likely each of the corpus's postures is at each move, exactly. The mean over
@@ -17,8 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Int32s, Ints
-from motionmind.geometry.distances import squared_distance
+from motionmind._typing import Floats, Ints
 from motionmind.jit import jit
 
 # How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
@@ -35,17 +35,23 @@ ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some
 
 
 @jit
-def squared_distances(orientations: Floats, posture: Floats) -> Floats:
-    """Return the squared distance of each of a part's orientations from a posture, mean over joints [N], radians^2.
+def squared_distances(orientations: Floats, part: Ints, posture: Floats) -> Floats:
+    """Return the squared distance of a part of the body from a posture, mean over its joints [N], radians^2.
 
     Args:
-        orientations: of the part's m joints in the corpus's moments [N, m, 4].
-        posture: orientations that distances are measured from [m, 4].
+        orientations: of all chains in the corpus's moments [N, L, 4].
+        part: the part's m joints.
+        posture: orientations of these that distances are measured from [m, 4].
     """
     out = np.empty(len(orientations))
     for i in range(len(orientations)):
-        out[i] = squared_distance(orientations[i], posture)
-    return out / len(posture)
+        total = 0.0
+        for k in range(len(part)):
+            here, there = orientations[i, part[k]], posture[k]
+            cosine = here[0] * there[0] + here[1] * there[1] + here[2] * there[2] + here[3] * there[3]
+            total += 4.0 * max(1.0 - cosine * cosine, 0.0)  # sin^2 of half the angle: its square where it is small
+        out[i] = total / len(part)
+    return out
 
 
 @jit
@@ -78,25 +84,3 @@ def likelihood(*terms: Floats) -> Floats:
     """
     exponent = 0.5 * np.sum(terms, axis=0)
     return np.asarray(np.exp(exponent.min() - exponent))
-
-
-@jit
-def mix_clusters(mass: Floats, clusters: Int32s, sizes: Ints) -> Floats:
-    """Return weights [N] after a share has gone over to postures of the same cluster, and a little to any posture.
-
-    The operation is its own transpose, and so serves passes forward and backward.
-
-    Args:
-        mass: weights of the postures [N].
-        clusters: cluster of each posture [N].
-        sizes: number of postures in each cluster [K].
-    """
-    pooled = np.zeros(len(sizes))
-    for i in range(len(mass)):
-        pooled[clusters[i]] += mass[i]
-    whole = ANYWHERE * mass.sum() / len(mass)
-    over = 1.0 - STRAIGHT_ON - ANYWHERE
-    out = np.empty_like(mass)
-    for i in range(len(mass)):
-        out[i] = STRAIGHT_ON * mass[i] + over * pooled[clusters[i]] / sizes[clusters[i]] + whole
-    return out

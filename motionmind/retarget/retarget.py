@@ -38,7 +38,7 @@ from motionmind.retarget.joint_mapping import (
     known_rig,
     read_joint_mapping,
 )
-from motionmind.retarget.rigs import Rig
+from motionmind.retarget.rigs import Rig, plain_names
 
 __all__ = ["filled_joints", "joint_mapping", "read_joint_mapping", "to_human23"]
 
@@ -48,6 +48,8 @@ _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist",
 
 _SAME_PLACE = 1e-6  # metres below which two joints coincide
 _LEANS = np.radians(25.0)  # the largest lean of a trunk that counts as upright
+_STANDS = 0.7  # cosine between the trunk and the vertical of a body that stands
+_AT_FLOOR = 0.15  # share of a body's height by which the lowest point of one that stands may be off the floor
 _POINTED = 0.4  # the share of a foot's length that lies across the shank if the foot stands on its sole
 
 _UP = np.array([0.0, 1.0, 0.0])
@@ -70,7 +72,7 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         movement: a motion or posture on the file's own skeleton.
         joints: {file's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
         up: "y" or "z", the vertical in the file. None takes z if the zero pose stands along z, unless the movement
-            itself stands along y; y otherwise.
+            itself stands along y; and if the movement stands along z on a floor at 0. Otherwise it takes y.
 
     Returns:
         The movement on human23, y up, in metres.
@@ -87,7 +89,12 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     """
     if up not in (None, "y", "z"):
         raise MotionMindError(f'up must be "y" or "z", not {up!r}')
-    if joints is None and up != "z" and human23().difference(movement.skeleton) is None:
+    if (
+        joints is None
+        and up != "z"
+        and human23().difference(movement.skeleton) is None
+        and not _lies(movement.skeleton)
+    ):
         return movement
     fit = _fit_human23(movement.skeleton, joints)
     renamed: dict[str, Any] = {}
@@ -111,7 +118,7 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
 
     Returns:
         The movement on human23 or on its own skeleton. On human44, which has joints that human23 lacks, it stays
-        unless `joints` is given.
+        unless `joints` is given; with z up, it is turned.
 
     Raises:
         SkeletonError: as `to_human23`.
@@ -123,7 +130,9 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
     >>> own_skeleton(posture).skeleton.name
     'human23'
     """
-    known = joint_mapping(movement.skeleton) is not None and not is_human44(movement.skeleton)
+    if joints is None and is_human44(movement.skeleton):
+        return _turned_up(movement) if _lies(movement.skeleton) else movement
+    known = joint_mapping(movement.skeleton) is not None
     return to_human23(movement, joints) if known or joints is not None else movement
 
 
@@ -136,7 +145,7 @@ class _Fit:
         pelvis: index of the file's joint at the pelvis's place.
         alignment: orientation of human23's axes in the frames of those joints, quaternions [23, 4].
         skeleton: human23 with the file's proportions.
-        up: direction of the trunk in the frame of the pelvis's source [3]; 0 if the zero pose does not stand.
+        up: direction of the trunk in the frame of the pelvis's source [3].
     """
 
     turns: Indices
@@ -191,15 +200,13 @@ def _fit_human23(skeleton: Skeleton, joints: Mapping[str, str] | None) -> _Fit:
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
         alignment = _inherit_alignments({name: rig.frames[name] for name in rig.frames if name in mapping.values()})
-        up = np.zeros(3)
     else:
-        body_axes = _body_axes(sources)
-        alignment = _align_standing(sources, body_axes, rig)
-        up = rot.mul_vec(body_axes, _UP)
+        alignment = _align_standing(sources, _body_axes(sources), rig)
     turns = list(sources.turns)
     for i, parent in enumerate(human23().parents):
         turns[i] = turns[parent] if turns[i] < 0 else turns[i]
-    return _Fit(np.array(turns), sources.stands[0], alignment, _proportions(sources, alignment), up)
+    body, up = _proportions(sources, alignment), rot.mul_vec(alignment[0], _UP)
+    return _Fit(np.array(turns), sources.stands[0], alignment, body, up)
 
 
 def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
@@ -360,12 +367,33 @@ def _proportions(sources: _Sources, alignment: Floats) -> Skeleton:
 
 
 def _vertical(fit: _Fit, movement: Motion | Posture) -> str:
-    """Return "z" if the zero pose stands along z, unless the movement stands along y; else "y"."""
-    if fit.up[2] < 0.7:
-        return "y"
-    turned = movement.skeleton.global_rotations(movement.rotations)[..., fit.turns[0], :]
+    """Return "z" if the zero pose or the movement stands along z, as `to_human23` says, else "y"."""
+    skeleton = movement.skeleton
+    turned = skeleton.global_rotations(movement.rotations)[..., fit.turns[0], :]
     mean = rot.mul_vec(turned, fit.up).reshape(-1, 3).mean(axis=0)
-    return "y" if mean[1] > 0.5 and mean[1] > mean[2] else "z"
+    if fit.up[2] >= _STANDS:
+        return "y" if mean[1] > 0.5 and mean[1] > mean[2] else "z"
+    if mean[2] < _STANDS:
+        return "y"
+    # A body that lies on its back has its lowest point along z wherever the room begins.
+    lowest = np.median(skeleton.positions_and_tips(movement.rotations, movement.root)[..., 2].min(axis=-1))
+    return "z" if abs(lowest) < _AT_FLOOR * fit.skeleton.height else "y"
+
+
+def _lies(skeleton: Skeleton) -> bool:
+    """Return whether the zero pose of human23's or human44's joints stands along z, as Blender writes it."""
+    zero = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+    names = plain_names(skeleton.names)
+    up = _unit(zero[names.index("atlantal")] - zero[names.index("pelvis")])
+    return bool(up[2] >= _STANDS)
+
+
+def _turned_up(movement: Movement) -> Movement:
+    """Return movement with z up, zero pose and all, with y up."""
+    body = movement.skeleton
+    skeleton = replace(body, offsets=rot.mul_vec(_Z_UP, body.offsets), tips=rot.mul_vec(_Z_UP, body.tips))
+    rotations = rot.mul_inv(rot.mul(_Z_UP, movement.rotations), _Z_UP)
+    return replace(movement, skeleton=skeleton, rotations=rotations, root=rot.mul_vec(_Z_UP, movement.root))
 
 
 def _unit(v: Floats) -> Floats:

@@ -5,8 +5,9 @@ Names are written here without case, punctuation or namespace, as `plain_names` 
 from the last.
 
 Sources of the names: the CMU Motion Capture Database's ASF files and their conversion to BVH by B. Hahne
-(cgspeed.com); Mixamo's and Autodesk HumanIK's rigs (the same but for the namespace); Biovision's own names, in use
-since the format's first files; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its variants.
+(cgspeed.com), also to the figures of Poser and DAZ Studio; Mixamo's and Autodesk HumanIK's rigs (the same but for the
+namespace); Biovision's own names, in use since the format's first files; Bandai-Namco-Research-Motiondataset; the
+published code of SMPL and its variants.
 """
 
 from __future__ import annotations
@@ -195,6 +196,22 @@ _BANDAI_FRAMES = (
 # degrees, and forward by as much in all movement; subject 135's is straight.
 _CMU_TWISTS = {f"{side}_{joint}": np.radians(-30.0) for side in ("left", "right") for joint in ("shoulder", "elbow")}
 
+# Poser's figures, in the conversions of CMU's recordings: they keep CMU's elbows, and the buttocks between hip and
+# thigh are at rest.
+_POSER = {"hip": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{s}thigh": "hip",
+        "{s}shin": "knee",
+        "{s}foot": "ankle",
+        "{s}toe": "toes",
+        "{s}collar": "clavicle",
+        "{s}shldr": "shoulder",
+        "{s}forearm": "elbow",
+        "{s}hand": "wrist",
+        "{s}mid1": "fingers",
+    }
+)
+
 # At rest SMPL stands like human23, all axes the world's. spine2 is as high above the pelvis as human23's thorax; the
 # middle finger represents all four.
 _SMPL = {
@@ -240,6 +257,7 @@ RIGS: tuple[Rig, ...] = (
     Rig("CMU, ASF", _CMU_ASF, ("lowerback", "upperback", "thorax"), neck_leans=True, twists=_CMU_TWISTS),
     Rig("Mixamo", _HUMANIK, _HUMANIK_SPINE),
     Rig("Biovision", _BIOVISION, ("lowerback", "ab", "abdomen", "chest", "chest2", "chest3", "chest4")),
+    Rig("Poser", _POSER, ("abdomen", "chest"), frozenset({"abdomen", "lshldr"}), twists=_CMU_TWISTS),
     Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
     Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
 )

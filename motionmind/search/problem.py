@@ -106,6 +106,9 @@ class Problem:
         guide: returns, for a path of T moves, the cost of being in each state after moves 1 to T - 1, nats [T - 1, G];
             finite, of either sign. It says where to be when, not how many moves to make: `solve` compares numbers of
             moves by what paths cost without it.
+        tolls: nats for a number of moves, for each segment from stop to stop and each number up to the greatest
+            [K, N + 1]; finite, of either sign. They say how many moves to make, and nothing else: where that is given,
+            and once it is chosen (`motionmind.search.length`), nothing is paid for it. None for no tolls.
     """
 
     model: Model
@@ -114,6 +117,7 @@ class Problem:
     rules: Rules
     vias: Sequence[Via] = ()
     guide: Callable[[int], Floats] | None = None
+    tolls: Floats | None = None
 
     @property
     def stops(self) -> list[Ints]:

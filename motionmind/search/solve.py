@@ -14,8 +14,9 @@ from motionmind.search import bounding, parts, trws
 from motionmind.search.attention import Attention, Clock
 from motionmind.search.bounding import HAIR, PROVEN, Bounded, tighten
 from motionmind.search.heuristic import Heuristic
+from motionmind.search.length import LengthChoice, choose_length
 from motionmind.search.pieces import Pieces
-from motionmind.search.problem import Problem, Rules
+from motionmind.search.problem import Problem, Rules, Via
 from motionmind.search.segments import Piece, Segments
 
 MOST_STATES_OF_CHAIN = 1 << 16  # A* numbers the states of a chain in 16 bits
@@ -40,26 +41,6 @@ class Progress(NamedTuple):
 Watch = Callable[[Progress], bool | None]
 
 
-@dataclass(frozen=True)
-class LengthChoice:
-    """The choice of a number of moves, by what paths cost without the guide.
-
-    Attributes:
-        moves: the number of moves of the cheapest path known without the guide.
-        cost: its cost, nats.
-        lower_bound: no path costs less than this without the guide, nats.
-        lower_bound_elsewhere: no path of another number of moves does, nats; the choice is proven where this is no less
-            than `cost`, to 1e-6 nats.
-        expansions: nodes that A* expanded for the choice.
-    """
-
-    moves: int
-    cost: float
-    lower_bound: float
-    lower_bound_elsewhere: float
-    expansions: int
-
-
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """The best path found, and how close to optimal it provably is.
@@ -74,7 +55,7 @@ class Certificate:
         peak_nodes: the greatest number of nodes held at once.
         seconds: time spent on "problem", "bound" and "search"; a measurement, and no part of the proof.
         passed: the moves at which the path passes its vias [K].
-        length: how its number of moves was chosen, where a guide led the search; None where the number was given.
+        length: how its number of moves was chosen, where there are tolls or a guide; None where the number was given.
     """
 
     path: Int32s
@@ -100,6 +81,7 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
 
     A guide says how to move in a number of moves, not how many to make. So where the rules leave a choice the number
     of moves is that of the cheapest path without the guide, and the certificate is that of the guided problem in it.
+    With tolls it is chosen by them and by haste (`motionmind.search.length`), with the moves at which vias are passed.
 
     Args:
         problem: what to solve.
@@ -114,9 +96,14 @@ def solve(problem: Problem, watch: Watch | None = None) -> Certificate:
     if states > MOST_STATES_OF_CHAIN:
         raise ValueError(f"a chain has {states} states; the search takes up to {MOST_STATES_OF_CHAIN}")
     solver, rules, length = _Solver(watch), problem.rules, None
-    if problem.guide is not None and rules.shortest < rules.longest:
+    if rules.shortest < rules.longest and problem.tolls is not None:
+        length = choose_length(problem)
+        vias = [Via(via.states, move) for via, move in zip(problem.vias, length.passed, strict=True)]
+        problem = replace(problem, vias=vias)
+    elif rules.shortest < rules.longest and problem.guide is not None:
         solver.start(replace(problem, guide=None))
         length = solver.choose_length()
+    if length is not None:
         problem = replace(problem, rules=replace(rules, shortest=length.moves, longest=length.moves))
     solver.start(problem)
     solver.run()
@@ -163,7 +150,7 @@ class _Solver:
                 self._search_piece(piece, self.segments.cost(piece) + 2.0 * HAIR)
 
     def choose_length(self) -> LengthChoice:
-        """Search until the number of moves of the best path is proven, and return it."""
+        """Search until the number of moves of the best path is proven, and return it: the choice without tolls."""
         self._bound(self._length_is_proven)
         self._search(self._length_is_proven)
         cost, lower_bound = self._result()

@@ -138,6 +138,7 @@ class Source:
         mirrored: whether the clip was learned with left and right exchanged.
         reversed: whether the clip was learned backwards: the move leads to the posture before.
         seconds: that posture's time in its recording.
+        reconstructed: whether the joint was not recorded right there, and was interpolated when the corpus was built.
 
     >>> from motionmind import Source
     >>> Source("plies", posture=12, corpus="ballet", seconds=4.8).clip
@@ -150,6 +151,7 @@ class Source:
     mirrored: bool = False
     reversed: bool = False
     seconds: float = 0.0
+    reconstructed: bool = False
 
 
 def trace_path(
@@ -174,7 +176,8 @@ def trace_path(
         row: list[Source | None] = []
         for chain, joint in enumerate(grammar.chains):
             edge = graph.edge(chain, before[chain], after[chain])
-            row.append(source_of(corpus, int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None)
+            seen = (int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None
+            row.append(source_of(corpus, *seen, joint) if seen else None)
             holds_goal = before[chain] == after[chain] == path[-1, chain]
             if holds_goal and (edge < 0 or wait < weights[edge]):
                 waits.append(Wait(joint, move, wait))
@@ -186,9 +189,16 @@ def trace_path(
     return float(np.mean(attested)) if attested else 1.0, tuple(bridges), tuple(waits), tuple(sources)
 
 
-def source_of(corpus: Corpus, posture: int, to: int) -> Source:
-    """Return the place in a corpus where a move leads from posture `posture` to posture `to`, by their numbers."""
-    clip = corpus.clip_of(posture)
+def source_of(corpus: Corpus, posture: int, to: int, joint: str = "") -> Source:
+    """Return the place in a corpus where a move leads from posture `posture` to posture `to`, by their numbers.
+
+    Args:
+        corpus: the corpus.
+        posture: number of the posture.
+        to: number of the posture that follows.
+        joint: the joint that moves; "" for the whole body.
+    """
+    clip, times = corpus.clip_of(posture), sorted(corpus.times[[posture, to]].tolist())
     return Source(
         clip.name,
         posture - clip.start,
@@ -196,6 +206,7 @@ def source_of(corpus: Corpus, posture: int, to: int) -> Source:
         clip.mirrored,
         to < posture,
         float(corpus.times[posture]),
+        clip.is_reconstructed(joint, *times),
     )
 
 

@@ -215,6 +215,8 @@ class Engine(LearnedCorpus):
             formulation.leaving,
             formulation.arriving,
             request.without,
+            request.pace,
+            self.pace.fastest if request.paced and not request.fixes_length else None,
         )
 
     def _account_for(
@@ -272,8 +274,10 @@ class Engine(LearnedCorpus):
             search_problem=searched,
             request=request,
             length=certificate.length,
+            times=formulation.times,
             before=formulation.before,
             after=formulation.after,
+            plausibility=self.plausibility,
         )
 
     @cached_property

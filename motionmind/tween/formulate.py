@@ -14,7 +14,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.corpus.corpus import JointFlip
-from motionmind.corpus.gather import find_flips
+from motionmind.corpus.flips import find_flips
 from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.coordination import Coordination
@@ -30,6 +30,7 @@ from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
 from motionmind.tween.guide import make_guide
 from motionmind.tween.nearest_body import nearest_posture
+from motionmind.tween.pacing import UsualTime, tolls, usual_times
 from motionmind.tween.problem import build_model
 from motionmind.tween.progression import lift_to_moves
 from motionmind.tween.request import MOST_MOVES, TweenRequest
@@ -61,6 +62,7 @@ class Formulation:
         searched: the problem to search: `problem`, or the same with moves in place of states, where joints coordinate
             by their moves.
         coordination: the network in the costs of `searched`.
+        times: the corpus's usual time from each stop to the next [1 + K].
     """
 
     a: Posture
@@ -78,6 +80,7 @@ class Formulation:
     problem: Problem
     searched: Problem
     coordination: Coordination
+    times: tuple[UsualTime, ...]
 
     @property
     def wished(self) -> Bools:
@@ -154,6 +157,9 @@ def formulate(
         rows = problem.model.starts[:-1].repeat(np.diff(searched.model.starts)) + searched.model.place
         guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows)
         searched = replace(searched, guide=guide)
+    times = usual_times(learned, (a, *through, b))
+    if request.paced:
+        searched = replace(searched, tolls=tolls(learned, times, longest))
     return Formulation(
         a,
         b,
@@ -170,6 +176,7 @@ def formulate(
         problem,
         searched,
         coordination,
+        times,
     )
 
 
@@ -230,7 +237,7 @@ def _lifted(learned: LearnedCorpus, problem: Problem, factor: float) -> tuple[Pr
 def _leading_to(learned: LearnedCorpus, a: Posture, before: Motion) -> Motion | None:
     """Return the movement before posture A on the corpus's skeleton.
 
-    As in learning, a recording counts as cut where a joint flips. None, with a warning, if one does right before A.
+    It counts from the last flip of a joint on, since A is as given. None, with a warning, if one flips right before A.
     """
     before = _on_skeleton(learned, before, "the movement before A")
     _check_posture(before.posture(-1), a, "the movement before A does not end in A")

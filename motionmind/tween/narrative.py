@@ -210,7 +210,8 @@ def _place(step: JointStep) -> str:
     """Return the place where a move was recorded."""
     if step.source is None:
         return "bridge" if step.how == "bridge" else "wait" if step.how == "wait" else "the motion passes it by"
-    return f"{_clip(step.source)}, posture {step.source.posture} ({step.source.seconds:.2f} s)"
+    mended = ", reconstructed" * step.source.reconstructed
+    return f"{_clip(step.source)}, posture {step.source.posture} ({step.source.seconds:.2f} s{mended})"
 
 
 def _clip(source: Source) -> str:

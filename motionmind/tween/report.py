@@ -11,7 +11,8 @@ import numpy as np
 
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
-from motionmind.search.solve import LengthChoice
+from motionmind.learned.plausibility import Sighting
+from motionmind.search.length import LengthChoice
 from motionmind.tween.certificate import Bridge, Source, Wait
 from motionmind.tween.what_if import WhatIf
 
@@ -63,6 +64,8 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         sources: a place in the corpus that attests each move of each joint; null where none does, or the motion is not
             within the tolerance of both of its states [T][L].
         detail: where the fine detail was recorded.
+        shown: what the motion shows a viewer, beside what the corpus shows at most: "balance", "bounce", "flight",
+            "crossed_limbs" and "pace"; empty in reports of 0.1.
         times: of the moves [T + 1], seconds.
         names: of the states [T + 1][L].
         degrees: angle of each joint's move [T][L].
@@ -104,6 +107,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     followed: list[list[bool]] = []
     sources: list[list[Source | None]]
     detail: list[Source] = []
+    shown: dict[str, Sighting] = {}
     times: list[float]
     names: list[list[str]]
     degrees: list[list[float]]

@@ -44,6 +44,8 @@ class TweenRequest:
         max_moves: greatest number of moves that the search may find.
         duration: length of the motion in seconds, exact; where `moves` is None it also fixes the number of moves, each
             as long as the corpus's usual.
+        pace: how many times as fast as its own the motion is, where `duration` leaves that open: 1.2 takes 1/1.2 of the
+            time for the same moves.
         pin: joints pinned to an end: "A" keeps A's state until the last move, "B" has B's from the first move on.
         hold: joints that keep their state all the way, such as a standing leg; A and B must agree there.
         avoid: joints, each with a state to avoid on the way, by number or name.
@@ -88,6 +90,7 @@ class TweenRequest:
     moves: int | tuple[int, int] | None = None
     max_moves: int = 60
     duration: float | None = None
+    pace: float = 1.0
     pin: Mapping[str, str] = field(default_factory=dict)
     hold: Sequence[str] = ()
     avoid: Sequence[tuple[str, int | str]] = ()
@@ -137,6 +140,10 @@ class TweenRequest:
             raise MotionMindError(
                 f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {self.fps}"
             )
+        if not (math.isfinite(self.pace) and self.pace > 0.0):
+            raise MotionMindError(f"pace must be a factor of the speed above 0, not {self.pace}")
+        if self.duration is not None and self.pace != 1.0:
+            raise MotionMindError("a duration says how fast to move; leave out pace")
         for name in ("novelty", "differ"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise MotionMindError(f"{name} must be a number from 0 to 1, not {getattr(self, name)}")
@@ -194,6 +201,11 @@ class TweenRequest:
     def fixes_length(self) -> bool:
         """Whether the number of moves or the duration is given, so that even equal postures are to be moved between."""
         return self.moves is not None or self.duration is not None
+
+    @property
+    def paced(self) -> bool:
+        """Whether the number of moves is chosen by the corpus's pace too: a search of whole postures is as it was."""
+        return not self.posturewise and "pace" not in self.without
 
     @property
     def vias(self) -> list[tuple[Posture, int | None]]:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from motionmind._typing import Bools, Floats, States
 from motionmind.body.motion import Motion
+from motionmind.learned.plausibility import Plausibility, Sighting
 from motionmind.search.cfn import cfn
+from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
-from motionmind.search.solve import LengthChoice, Status
+from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
+from motionmind.tween.pacing import UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.what_if import WhatIf
@@ -51,8 +55,10 @@ class Tween:
         search_problem: the problem that was searched.
         request: what was asked.
         length: how the number of moves was chosen; None where it was given, and without a guide.
+        times: the corpus's usual time from each posture that is passed exactly to the next.
         before: seconds of the movement before A that shows its velocity; None where A was given alone.
         after: seconds of the movement after B that shows its velocity; None where B was given alone.
+        plausibility: what the corpus's own movement shows a viewer at most.
 
     >>> from motionmind import Engine
     >>> engine = Engine.load("ballet")
@@ -87,13 +93,20 @@ class Tween:
     search_problem: Problem
     request: TweenRequest
     length: LengthChoice | None
+    times: tuple[UsualTime, ...]
     before: float | None
     after: float | None
+    plausibility: Plausibility
 
     @property
     def moves(self) -> int:
         """Number of moves T; the path has T + 1 postures."""
         return len(self.path) - 1
+
+    @cached_property
+    def shown(self) -> dict[str, Sighting]:
+        """The most that the motion shows a viewer of each of `learned.plausibility.MEASURES`, beside the corpus."""
+        return self.plausibility.shown(self.motion)
 
     @property
     def gap(self) -> float:
@@ -156,6 +169,7 @@ def report_of(tween: Tween) -> TweenReport:
         followed=tween.followed.tolist(),
         sources=[list(row) for row in tween.sources],
         detail=list(tween.detail),
+        shown=tween.shown,
         times=tween.motion.insertions[0].times.tolist(),
         names=[list(row) for row in costs.names],
         degrees=costs.degrees.tolist(),

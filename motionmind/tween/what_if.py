@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 from motionmind.search.bounding import PROVEN
+from motionmind.search.length import choose_length
 from motionmind.search.problem import Problem
 from motionmind.search.solve import Certificate, solve
 from motionmind.tween.request import TweenRequest
@@ -24,8 +25,9 @@ class WhatIf:
         most: it costs at most this, nats.
         proven: whether the two agree to 1e-6 nats a search.
         moves: how many moves the answer has more without it; negative for fewer.
-        guided: whether these are costs with the guide, as the tween's own. Answers of other lengths, or in other
-            durations, have other guides; then the costs compared are those of the cheapest paths without it.
+        guided: whether these are costs with the guide, as the tween's own. Of a length or a duration it is False: in
+            another one there is another guide. Then haste and pace are compared; and without pace, what the cheapest
+            paths without the guide cost.
     """
 
     without: str
@@ -47,17 +49,31 @@ class Answer(NamedTuple):
 def find_what_if(asked: Answer, answer: Callable[[TweenRequest], Answer]) -> tuple[WhatIf, ...]:
     """Find what each pin, held joint, state to avoid and via costs, and what the given length does.
 
+    Where the length is open and paced, it may be another without a restriction, and so may the moves at which vias are
+    passed; then the costs are those without it in as many moves, and with the other vias where the answer has them.
+
     Args:
         asked: the request, answered.
         answer: answers another request between the same ends. Once a search is interrupted, no more are made.
     """
-    out = []
-    for name, request in _without_each(asked):
+    out, open_length = [], asked.problem.tolls is not None and not asked.request.fixes_length
+    stops = [(posture, move) for (posture, _), move in zip(asked.request.vias, asked.certificate.passed, strict=True)]
+    placed = replace(asked.request, moves=_moves(asked), via=stops) if open_length else asked.request
+    alikes = (alike for _, alike in _without_each(asked._replace(request=placed)))
+    for (name, request), alike in zip(_without_each(asked), alikes, strict=False):  # `placed` gives the length, too
         freed = answer(request)
+        moves = _moves(freed) - _moves(asked)
+        if open_length and (moves != 0 or request.via):
+            freed = answer(alike)
         if "interrupted" in (asked.certificate.status, freed.certificate.status):
             break
-        out.append(_compare(name, asked, freed))
+        out.append(_compare(name, asked, freed, moves))
     return tuple(out)
+
+
+def _moves(answer: Answer) -> int:
+    """Return the number of an answer's moves."""
+    return len(answer.certificate.path) - 1
 
 
 def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
@@ -74,7 +90,7 @@ def _without_each(asked: Answer) -> Iterator[tuple[str, TweenRequest]]:
         name = f"via {i + 1}" + ("" if move is None else f" at move {move}")
         yield name, replace(request, via=_all_but(request.via, i))
     if request.fixes_length:
-        longest = max(request.max_moves, len(asked.certificate.path) - 1)
+        longest = max(request.max_moves, _moves(asked))
         yield _length_name(request), replace(request, moves=None, duration=None, max_moves=longest)
 
 
@@ -89,26 +105,34 @@ def _length_name(request: TweenRequest) -> str:
     return " and ".join(names)
 
 
-def _compare(name: str, asked: Answer, freed: Answer) -> WhatIf:
-    """Bound the difference of two optima from below and above.
+def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
+    """Bound the difference of two optima from below and above, of which the second makes so many `moves` more.
 
     Every path that keeps a restriction is also one without it, so the difference is never negative.
     """
-    moves = len(freed.certificate.path) - len(asked.certificate.path)
-    same = moves == 0 and asked.request.duration == freed.request.duration
-    if same or asked.problem.guide is None:
+    same = _moves(asked) == _moves(freed) and asked.request.duration == freed.request.duration
+    if same or (asked.problem.guide is None and asked.problem.tolls is None):
         (cost, bound), (freed_cost, freed_bound) = (
             (one.certificate.cost, one.certificate.lower_bound) for one in (asked, freed)
         )
     else:
-        (cost, bound), (freed_cost, freed_bound) = _unguided(asked), _unguided(freed)
+        of_length = _unguided if asked.problem.tolls is None else _paced
+        (cost, bound), (freed_cost, freed_bound) = of_length(asked), of_length(freed)
     least, most = max(bound - freed_cost, 0.0), max(cost - freed_bound, 0.0)
     return WhatIf(name, least, most, most - least <= 2.0 * PROVEN, moves, same and asked.problem.guide is not None)
 
 
+def _paced(answer: Answer) -> tuple[float, float]:
+    """Return the haste and the tolls of an answer's number of moves, nats; twice, for they are exact."""
+    if _moves(answer) == 0:  # to stay is free
+        return 0.0, 0.0
+    cost = choose_length(answer.problem).cost
+    return cost, cost
+
+
 def _unguided(answer: Answer) -> tuple[float, float]:
     """Return what the cheapest path without the guide costs, and the bound on it, nats."""
-    if len(answer.certificate.path) == 1:  # to stay is free
+    if _moves(answer) == 0:  # to stay is free
         return 0.0, 0.0
     found = solve(replace(answer.problem, guide=None))
     return found.cost, found.lower_bound

@@ -254,5 +254,6 @@ class _Parts:
             root=np.concatenate(self.root),
             times=np.concatenate(self.times),
             insertions=tuple(self.insertions),
+            keyframed=motion.keyframed and not self.insertions,
         )
         return Arrangement(arranged, np.concatenate(self.frames))

@@ -147,6 +147,7 @@ def _frames(motion: Motion) -> FramesSchema:
         rotations=motion.rotations.tolist(),
         name=motion.name,
         insertions=[InsertionSchema(mark.times.tolist(), list(mark.bridged)) for mark in motion.insertions],
+        keyframed=motion.keyframed,
     )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named
-from motionmind.body.contact import find_floor, floor_height, limb_heights, lowest_height, lowest_point
+from motionmind.body.contact import find_floor, floor_height, limb_heights, lowest_height, lowest_point, skating
 from motionmind.body.human import BODIES, human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
@@ -35,6 +36,44 @@ def test_the_lowest_point_is_the_lowest_of_all_limbs_and_the_trunk(name: str) ->
     bones = np.maximum(np.linalg.norm(body.tips, axis=-1), 0.2)  # a heel is less than 0.2 m from its ankle
     at = body.positions(rotations, root)[np.arange(40), joint, 1]
     assert np.all(at - height <= bones[joint])
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_heel_is_where_a_joint_would_hang_from_the_ankle(name: str) -> None:
+    """On both sides, as a mirror shows them; of heels so long that they are often the lowest point."""
+    anatomy, body = anatomy_named(name), BODIES[name]()
+    assert anatomy.leg is not None
+    place = np.array([0.1, -0.2, -0.3])
+    longer = replace(anatomy, leg=msgspec.structs.replace(anatomy.leg, heel=tuple(place.tolist())))
+    rotations, root = tumble(body, 200)
+    heights, joints = lowest_point(longer, rotations, root)
+    at, turned = body.positions(rotations, root), body.global_rotations(rotations)
+    expected, _ = lowest_point(replace(anatomy, leg=None), rotations, root)
+    for side, mirror in (("left", 1.0), ("right", -1.0)):
+        ankle = body.index(f"{side}_{anatomy.leg.ankle}")
+        heel = (at[:, ankle] + rot.mul_vec(turned[:, ankle], place * [mirror, 1.0, 1.0]))[:, 1]
+        assert np.sum(joints[heel < expected] == ankle) > 10
+        expected = np.minimum(expected, heel)
+    np.testing.assert_allclose(heights, expected, atol=1e-12)
+
+
+def test_a_person_at_rest_stands_on_heels_and_toes() -> None:
+    """In human23's own measures: the ankles are 90.5 cm under the pelvis, the soles 97.1 cm."""
+    body = human23()
+    rest, root = np.tile(rot.IDENTITY, (1, 23, 1)), np.array([[0.0, 2.0, 0.0]])
+    ankle, toes = (body.index(f"left_{joint}") for joint in ("ankle", "toes"))
+    points = body.positions_and_tips(rest, root)[0, :, 1]
+    assert lowest_height(body, rest, root) == pytest.approx(2.0 - 0.971)
+    assert lowest_height(body, rest, root, heels=False) == pytest.approx(2.0 - 0.971)
+    np.testing.assert_allclose(points[[ankle, toes, toes + 23]], [2.0 - 0.905, 2.0 - 0.971, 2.0 - 0.971], atol=1e-12)
+    # Bent by 30 degrees the heel, 6.6 cm below the ankle and 4.5 cm behind it, comes lower.
+    rest[0, ankle] = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 6.0)
+    lower = 0.066 * np.cos(np.pi / 6.0) + 0.045 * np.sin(np.pi / 6.0)
+    assert lowest_height(body, rest, root) == pytest.approx(2.0 - 0.905 - lower)
+    limbs = limb_heights(body, rest, root)[0]
+    left = next(number for number, limb in enumerate(limbs_of(body)) if ankle in limb)
+    assert limbs[left] == pytest.approx(2.0 - 0.905 - lower)
+    assert np.sum(limbs == limbs[left]) == 1
 
 
 def test_without_heels_a_body_stands_no_lower() -> None:
@@ -66,3 +105,13 @@ def test_the_floor_is_under_nineteen_frames_of_twenty(heels: bool) -> None:
     floor = find_floor(body, rotations, root, heels=heels)
     assert floor == floor_height(lowest)
     assert np.mean(lowest < floor) == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_foot_that_is_put_down_or_lifted_does_not_skate() -> None:
+    """It is to be low in both frames, from the first to the second of which it goes far."""
+    body = human23()
+    rest = np.tile(rot.IDENTITY, (2, 23, 1))
+    low = 0.971
+    for heights, expected in (((0.0, 0.0), 1.0), ((0.0, 0.06), 0.0), ((0.06, 0.0), 0.0), ((0.04, 0.04), 1.0)):
+        root = np.array([[0.0, low + heights[0], 0.0], [0.1, low + heights[1], 0.0]])
+        assert skating(body, rest, root) == expected

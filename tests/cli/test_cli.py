@@ -18,8 +18,11 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind.body.motion import Motion
+from motionmind.cli.printing import print_tween
+from motionmind.corpus.bundled import bundled
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
+from motionmind.tween.engine import Engine
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
@@ -27,7 +30,7 @@ REPORT = {
     *("asked", "status", "cost", "lower_bound", "gap", "moves", "length"),
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
-    *("sources", "detail", "times", "names", "degrees", "likelihood", "costs"),
+    *("sources", "detail", "shown", "times", "names", "degrees", "likelihood", "costs"),
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 
@@ -80,6 +83,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert ran.err.count("\n") == 1
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
+    table.pop("seen", None)  # where it goes beyond the corpus
     assert list(table) == ["moves", "cost", "proven", "attested", "bridged", "waited", "A", "B", "motion", "written"]
     assert f" {report['moves']}, in " in table["moves"]
     assert f"{report['cost']:.3f}" in table["cost"]
@@ -90,6 +94,21 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert np.allclose(rot.angle(motion.rotations[-1], read_posture(FIFTH).rotations), 0.0, atol=1e-6)
     problem = json.loads(Path("problem.cfn").read_text("utf-8"))
     assert {"problem", "variables", "functions"} <= set(problem)
+
+
+def test_a_tween_says_what_a_viewer_sees_beyond_the_corpus(capsys: pytest.CaptureFixture[str]) -> None:
+    engine = Engine.load("ballet")
+    motion = engine.corpus.motion(engine.corpus.clips[0])
+    tween = engine.tween(motion.posture(0), motion.posture(1))
+    print_tween(tween, [])
+    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("seen")]
+    away = np.linspace(0.0, 9.0, len(tween.motion))[:, None] * [1.0, 0.0, 0.0]
+    carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + away))
+    print_tween(carried, [])
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("seen"))
+    pace = carried.report()["shown"]["pace"]
+    assert line.startswith(f"seen      travel is {pace['value']:.1f} times as fast as")
+    assert line.endswith(f"more than {pace['most']:.1f} times")
 
 
 def test_the_report_has_the_keys_that_are_promised(run: Run) -> None:
@@ -208,28 +227,53 @@ def test_tolerances_for_all_joints_and_for_single_ones(run: Run) -> None:
 def test_skip_facing_and_keyframes(run: Run) -> None:
     write_motion("walk.bvh", clip())
     frames = len(clip())
-    found = built(run, "walk.bvh", "--skip", 4, "--facing", "stage")
+    found = built(run, "walk.bvh", "--skip", 4, "--facing", "stage", "--rate", 30)
     assert found["postures"] == frames - 4
-    assert found["rate"] is None
+    assert found["rate"] == 30.0
     assert "facing" not in found["states"]
 
 
-def test_flips_are_split_kept_or_dropped(run: Run) -> None:
+@pytest.mark.parametrize("suffix", [".bvh", ".json", ".npz"])
+def test_what_compose_writes_is_left_as_it_is_and_a_recording_is_not(run: Run, suffix: str) -> None:
+    score = bundled("corpora") / "ballet" / "allegro.score"
+    assert run("compose", score, "--clip", "sissonnes", "-o", f"score{suffix}").code == 0
+    keyframes = read_motion(f"score{suffix}")
+    assert built(run, f"score{suffix}")["postures"] == len(keyframes)
+    write_motion("film.bvh", clip(fps=120.0))
+    ran = run("corpus", "build", "mine", f"score{suffix}", "film.bvh", "--unit", "cm")
+    assert ran.err.count("note: corpus mine: 5 postures a second of each recording") == 1
+    found = run("corpus", "info", "mine", "--json").json
+    assert [one["postures"] for one in found["clips"]] == [len(keyframes), len(clip(fps=5.0))]
+    assert found["rate"] == 5.0
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".npz"])
+def test_the_clock_of_a_file_can_be_set_right(run: Run, suffix: str) -> None:
+    write_motion(f"late{suffix}", clip(fps=30.0))
+    assert run("convert", f"late{suffix}", "right.json", "--source-fps", 60).code == 0
+    late, right = read_motion(f"late{suffix}"), read_motion("right.json")
+    np.testing.assert_allclose(right.times, late.times / 2.0, atol=1e-9)
+    assert len(right) == len(late)
+
+
+def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
     write_motion("jump.bvh", flipped(60))
     write_motion("plain.bvh", clip(fps=120.0))
     names = {
         flips: [entry["name"] for entry in built(run, "jump.bvh", "plain.bvh", "--flips", flips)["clips"]]
-        for flips in ("split", "keep", "drop")
+        for flips in ("repair", "keep", "drop")
     }
-    assert names == {"split": ["jump.1", "jump.3", "plain"], "keep": ["jump", "plain"], "drop": ["plain"]}
-    faults = built(run, "jump.bvh", "plain.bvh")["faults"]
-    assert {(fault["clip"], fault["joint"], fault["frame"]) for fault in faults} == {
-        ("jump", "left_hip", 60),
-        ("jump", "left_hip", 61),
+    assert names == {"repair": ["jump", "plain"], "keep": ["jump", "plain"], "drop": ["plain"]}
+    found = built(run, "jump.bvh", "plain.bvh")
+    assert {tuple(fault[key] for key in ("clip", "joint", "frame", "repair")) for fault in found["faults"]} == {
+        ("jump", "left_hip", 60, "reconstructed"),
+        ("jump", "left_hip", 61, "reconstructed"),
     }
+    assert found["repairs"] == [{"clip": "jump", "joint": "left_hip", "start": 60, "stop": 61, "exact": False}]
     said = run("corpus", "check", "mine").out
-    assert "2 faults of the recordings" in said
-    assert re.search(r"  jump: left_hip by up to 1\d\d degrees, at frame 60, 61\n", said)
+    assert "2 flips in the recordings" in said
+    assert "  jump: 2 flips, 1 frame reconstructed (left_hip)\n" in said
+    assert "repaired   1 clip, 0 stretches put back exactly, 1 reconstructed\n" in run("corpus", "info", "mine").out
     assert built(run, "jump.bvh", "plain.bvh", "--flip-angle", 180)["faults"] == []
 
 

@@ -18,7 +18,8 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
-from motionmind.corpus.gather import find_flips, gather
+from motionmind.corpus.flips import find_flips
+from motionmind.corpus.gather import gather
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.errors import CorpusError, FormatError, MotionMindError
 from motionmind.geometry import rotations as rot
@@ -72,21 +73,88 @@ def test_the_angle_of_a_flip_is_a_choice() -> None:
     assert len(find_flips(motion, degrees=35.0)) == 1
 
 
+# --- the rate of postures ---------------------------------------------------------------------------------------------
+
+
+def test_recordings_give_5_postures_a_second_and_keyframes_all_of_theirs(caplog: pytest.LogCaptureFixture) -> None:
+    """Whatever says that they are keyframes: the motion itself, or that there are fewer than 15 a second."""
+    film, score = swing("film", 121), replace(swing("score", 31, fps=30.0), keyframed=True)
+    slow, drawn = swing("slow", 26, fps=12.5), swing("drawn", 16, fps=15.0)
+    with caplog.at_level("INFO", "motionmind"):
+        corpus = gather("arms", [film, score, slow, drawn])
+    assert bounds(corpus) == [("film", 6), ("score", 31), ("slow", 26), ("drawn", 6)]
+    np.testing.assert_allclose(corpus.seconds[:5], 0.2)
+    np.testing.assert_array_equal(corpus.times[6:37], score.times)
+    assert corpus.rate == 5.0
+    assert [record.getMessage() for record in caplog.records] == [
+        "corpus arms: 5 postures a second of each recording (--rate, or rate=, for more or fewer)"
+    ]
+
+
+def test_keyframes_alone_have_no_rate_and_nothing_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("INFO", "motionmind"):
+        corpus = gather("arms", [swing("slow", 26, fps=12.5)])
+    assert (corpus.rate, len(corpus), caplog.records) == (None, 26, [])
+    again = gather("arms", [corpus.motion(corpus.clips[0])])
+    np.testing.assert_array_equal(again.rotations, corpus.rotations)
+
+
+@pytest.mark.parametrize("rate", [10.0, None])
+def test_a_rate_that_is_given_is_for_all(rate: float | None, caplog: pytest.LogCaptureFixture) -> None:
+    motions = [swing("film", 121), replace(swing("score", 31, fps=30.0), keyframed=True)]
+    with caplog.at_level("INFO", "motionmind"):
+        corpus = gather("arms", motions, rate=rate)
+    assert [len(clip) for clip in corpus.clips] == ([11, 11] if rate else [121, 31])
+    assert (corpus.rate, caplog.records) == (rate, [])
+
+
+def test_a_score_among_recordings_has_no_detail() -> None:
+    quick = replace(shaking(61, 30.0), keyframed=True)
+    corpus = gather("arms", [shaking(241, 120.0), quick])
+    assert np.abs(corpus.detail[:10]).max() > 0.0
+    assert np.abs(corpus.detail[11:]).max() == 0.0
+
+
+def test_frames_between_keyframes_are_no_keyframes() -> None:
+    score = replace(swing("score", 31, fps=30.0), keyframed=True)
+    assert score.slice(3, 9).keyframed
+    assert not score.resample(10.0).keyframed
+
+
+def test_recordings_join_a_corpus_of_their_rate_and_no_other() -> None:
+    theirs = [gather("theirs", [swing("film", 121)], rate=rate) for rate in (5.0, 4.0)]
+    assert gather("arms", [swing("film", 121)], mix=[(theirs[0], 1.0)]).rate == 5.0
+    with pytest.raises(CorpusError, match=r"different rates \(5 postures a second, 4 postures a second\)"):
+        gather("arms", [swing("film", 121)], mix=[(theirs[1], 1.0)])
+
+
 # --- gather -----------------------------------------------------------------------------------------------------------
 
 
-def test_split_cuts_at_a_flip_and_learns_no_jump() -> None:
-    corpus = gather("arms", [swing("a", jumps={10: 90.0, 11: -90.0, 20: 90.0}), swing("b")])
-    # The lone frame 10 makes no move; b is whole.
-    assert bounds(corpus) == [("a.1", 10), ("a.3", 9), ("a.4", 10), ("b", 30)]
+def test_a_flip_is_repaired_and_no_jump_is_learned() -> None:
+    corpus = gather("arms", [swing("a", jumps={10: 90.0, 11: -90.0, 20: 90.0}), swing("b")], rate=None)
+    assert bounds(corpus) == [("a", 30), ("b", 30)]
     turned = rot.angle(corpus.rotations[corpus.begins], corpus.rotations[corpus.begins + 1])
-    assert np.degrees(turned).max() < 5.0
+    assert np.degrees(turned).max() < 10.0
     assert [(fault.clip, fault.frame) for fault in corpus.faults] == [("a", 10), ("a", 11), ("a", 20)]
+
+
+def restless(name: str) -> Motion:
+    """An arm whose elbow jumps to and fro from frame 50 to 210, for more than a second."""
+    return swing(name, 261, jumps={50 + 20 * number: 90.0 * (-1) ** number for number in range(9)})
+
+
+def test_a_recording_is_cut_where_a_joint_jumps_for_too_long_to_be_repaired() -> None:
+    corpus = gather("arms", [restless("a"), swing("b")], rate=None)
+    parts = [(f"a.{number}", 20) for number in range(2, 10)]
+    assert bounds(corpus) == [("a.1", 50), *parts, ("a.10", 51), ("b", 30)]
+    assert {fault.repair for fault in corpus.faults} == {"none"}
+    assert all(clip.repairs == () for clip in corpus.clips)
 
 
 def test_keep_takes_a_flip_as_it_is_and_drop_leaves_its_recording_out() -> None:
     motions = [swing("a", jumps={10: 90.0}), swing("b")]
-    kept, dropped = (gather("arms", motions, flips=flips) for flips in ("keep", "drop"))
+    kept, dropped = (gather("arms", motions, flips=flips, rate=None) for flips in ("keep", "drop"))
     assert bounds(kept) == [("a", 30), ("b", 30)]
     assert bounds(dropped) == [("b", 30)]
     assert kept.faults == dropped.faults
@@ -94,14 +162,15 @@ def test_keep_takes_a_flip_as_it_is_and_drop_leaves_its_recording_out() -> None:
 
 
 def test_frames_after_skipped_ones_keep_the_recordings_numbers() -> None:
-    corpus = gather("arms", [swing("a", jumps={1: 90.0, 12: 90.0})], skip=2)
+    corpus = gather("arms", [swing("a", jumps={1: 90.0, 12: 90.0})], skip=2, rate=None)
     assert [fault.frame for fault in corpus.faults] == [12]  # the jump among what is skipped is none
-    assert bounds(corpus) == [("a.1", 10), ("a.2", 18)]
+    assert bounds(corpus) == [("a", 28)]
+    assert corpus.clips[0].repairs[0].start < 12 < corpus.clips[0].repairs[0].stop
     np.testing.assert_array_equal(corpus.times[0], 2 / 120.0)
 
 
 def test_no_move_leads_from_one_clip_to_the_next() -> None:
-    corpus = gather("arms", [swing("a", 4), swing("one", 1), swing("b", 3)])
+    corpus = gather("arms", [swing("a", 4), swing("one", 1), swing("b", 3)], rate=None)
     assert bounds(corpus) == [("a", 4), ("one", 1), ("b", 3)]
     np.testing.assert_array_equal(corpus.begins, [0, 1, 2, 5, 6])
     np.testing.assert_allclose(corpus.seconds, 1 / 120.0)
@@ -115,8 +184,9 @@ def test_no_move_leads_from_one_clip_to_the_next() -> None:
 
 
 def test_postures_are_made_even_in_time_after_the_cut() -> None:
-    corpus = gather("arms", [swing("a", 121, jumps={50: 90.0})], rate=20.0)
-    assert bounds(corpus) == [("a.1", 9), ("a.2", 12)]
+    corpus = gather("arms", [restless("a")], rate=20.0)
+    # Parts of 20 frames have 4 postures, 6 frames apart.
+    assert bounds(corpus) == [("a.1", 9), *((f"a.{number}", 4) for number in range(2, 10)), ("a.10", 9)]
     np.testing.assert_allclose(corpus.seconds, 0.05)
     assert corpus.rate == 20.0
 
@@ -162,15 +232,14 @@ def test_nothing_is_kept_of_coarse_recordings_nor_where_every_frame_is_a_posture
         assert rot.angle(again.rotations, corpus.rotations).max() < 1e-7
 
 
-def test_a_cut_leaves_no_detail_of_the_jump() -> None:
-    jump = replace(swing("a", 241, jumps={101: 90.0}), name="jump")
-    corpus = gather("arms", [jump], rate=5.0)
+def test_a_cut_leaves_no_detail_of_the_jumps() -> None:
+    corpus = gather("arms", [restless("jump")], rate=5.0)
     assert len(corpus.clips) == 2
     assert np.abs(corpus.detail).max() < np.radians(1.0)
 
 
 def test_recordings_of_one_name_are_told_apart() -> None:
-    corpus = gather("arms", [swing("a", 3), swing("a", 4), swing("", 3), swing("a", 5), swing("", 3)])
+    corpus = gather("arms", [swing("a", 3), swing("a", 4), swing("", 3), swing("a", 5), swing("", 3)], rate=None)
     assert [clip.name for clip in corpus.clips] == ["a", "a (2)", "clip", "a (3)", "clip (2)"]
 
 
@@ -184,7 +253,7 @@ def test_chains_come_back_as_the_rotations_that_they_were_made_of() -> None:
         assert rot.angle(corpus.from_chains(corpus.to_chains(q)), q).max() < 1e-14
     turned = q.copy()
     turned[:, 0] = rot.mul(rot.about_vertical(1.0), q[:, 0])
-    free = gather("arms", [swing("a")], facing="free")
+    free = gather("arms", [swing("a")], facing="free", rate=None)
     assert rot.angle(free.to_chains(turned)[:, :3], free.to_chains(q)[:, :3]).max() < 1e-7
 
 
@@ -197,8 +266,7 @@ def test_chains_come_back_as_the_rotations_that_they_were_made_of() -> None:
         ([swing("a", 5)], {"skip": 5}, "a has 5 frames; skipping 5 leaves none"),
         ([swing("a")], {"skip": -1}, "frames to skip must be at least 0, not -1"),
         ([swing("a", jumps={3: 90.0})], {"flips": "drop"}, "every recording has faults"),
-        ([swing("a", 2, jumps={1: 90.0})], {"flips": "split"}, "every recording has faults"),
-        ([swing("a")], {"flips": "mend"}, "flips must be one of drop, keep, split, not 'mend'"),
+        ([swing("a")], {"flips": "mend"}, "flips must be one of drop, keep, repair, not 'mend'"),
         ([swing("a")], {"flip_degrees": np.nan}, "the angle of a flip"),
         ([swing("a")], {"flip_degrees": 0.0}, "the angle of a flip"),
         ([swing("a")], {"facing": "north"}, "facing must be 'free' or 'stage', not 'north'"),
@@ -208,23 +276,23 @@ def test_chains_come_back_as_the_rotations_that_they_were_made_of() -> None:
 )
 def test_what_leaves_nothing_to_learn_is_refused(motions: list[Motion], options: dict[str, Any], words: str) -> None:
     with pytest.raises(MotionMindError, match=words):
-        gather("arms", motions, **options)
+        gather("arms", motions, **{"rate": None, **options})
 
 
 def test_a_recording_on_another_skeleton_is_refused_and_the_difference_named() -> None:
     other = Skeleton("hook", ("shoulder", "elbow", "hook"), (-1, 0, 1), ARM.offsets)
     with pytest.raises(CorpusError, match="b is on another skeleton than a: hook lacks wrist and adds hook"):
-        gather("arms", [swing("a"), replace(swing("b"), skeleton=other)])
+        gather("arms", [swing("a"), replace(swing("b"), skeleton=other)], rate=None)
 
 
 def test_a_joint_cannot_have_the_name_of_the_bodys_turn() -> None:
     odd = Skeleton("odd", ("shoulder", "elbow", "facing"), (-1, 0, 1), ARM.offsets)
     with pytest.raises(CorpusError, match="a joint cannot be called 'facing'"):
-        gather("arms", [replace(swing("a"), skeleton=odd)])
+        gather("arms", [replace(swing("a"), skeleton=odd)], rate=None)
 
 
 def test_clips_and_arrays_that_do_not_fit_are_refused() -> None:
-    corpus = gather("arms", [swing("a", 4)])
+    corpus = gather("arms", [swing("a", 4)], rate=None)
     for clips in ((), (Clip("a", 0, 3),), (Clip("a", 1, 4),), (Clip("a", 0, 2), Clip("b", 3, 4))):
         with pytest.raises(CorpusError, match="the clips do not follow one another"):
             replace(corpus, clips=clips)

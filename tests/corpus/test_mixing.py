@@ -456,6 +456,26 @@ def test_the_movement_of_a_mix_goes_the_way_of_the_corpus_that_weighs_more(home:
     np.testing.assert_allclose(leans, -np.array(leans)[::-1], atol=0.02)  # what one gains the other loses
 
 
+def test_on_the_way_too_a_movement_hardly_shows_what_weighs_a_hundredth(home: Home) -> None:
+    """Both corpora hold the flag alike until half the way is gone, so that walks may go over from one to the other."""
+    pole, late = list(range(9)), [0, 0, 0, 0, 1, 2, 2, 2, 0]
+    clip = walk("right", pole, late)
+    home.keep("other", [walk("left", pole, [-flag for flag in late])])
+
+    def leans(engine: Engine) -> Floats:
+        a, b = (walk("ends", [0, 8], [0, 0]).posture(end) for end in (0, 1))
+        tween = engine.tween(a, b, moves=8)
+        return np.degrees(rot.log(tween.motion.at(tween.motion.insertions[0].times).rotations[4:8, 1])[:, 2])
+
+    alone = leans(learned([clip]))
+    assert np.all(alone > 5.0)
+    shares = np.array([leans(home.mix("mixed", [clip], {"other": w})) / alone for w in (0.01, 0.2, 1.0, 5.0, 100.0)])
+    assert np.all(np.diff(shares, axis=0) < 0.0)
+    assert shares[0].min() > 0.95
+    assert shares[-1].max() < -0.95
+    assert np.all((shares[1] > 0.4) & (shares[1] < 0.9))
+
+
 def test_how_joints_stand_together_is_weighed_alike(home: Home) -> None:
     weight, called = 0.3, {}
     one, two = ([0, 1, 1, 0], [0, 0, 1, 1]), ([0, 1, 0], [1, 1, 2])
@@ -693,7 +713,7 @@ def test_a_tween_tells_corpus_clip_and_posture_and_what_is_mirrored_and_reversed
                 if source is None:
                     assert said is None
                     continue
-                assert set(said) == {"clip", "posture", "corpus", "mirrored", "reversed", "seconds"}
+                assert set(said) == {*("clip", "posture", "corpus", "mirrored", "reversed", "seconds", "reconstructed")}
                 assert Source(**said) == source
                 assert_attested(everything, source, chain, before[chain], after[chain])
                 kinds.add((source.corpus, source.mirrored, source.reversed))

@@ -239,6 +239,17 @@ def test_a_small_file(tmp_path: Path) -> None:
     assert rot.angle(motion.rotations[2, 2], expected.as_quat()) < 1e-12
 
 
+def test_a_clock_that_is_wrong_can_be_set_right(tmp_path: Path) -> None:
+    path = write(tmp_path, SMALL)
+    right = read_bvh(path, unit="cm", fps=50.0)
+    np.testing.assert_allclose(right.times, [0, 0.02, 0.04])
+    np.testing.assert_array_equal(right.rotations, read_bvh(path, unit="cm").rotations)
+    np.testing.assert_array_equal(read_motion(path, fps=50.0).times, right.times)
+    for fps in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(MotionMindError, match="fps must be a positive number of frames a second"):
+            read_bvh(path, fps=fps)
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -499,6 +510,52 @@ def test_every_rotation_order_is_read_and_read_back(tmp_path: Path, order: str) 
         np.testing.assert_allclose(written[name], places, atol=1e-5)
     for name, places in ends.items():
         np.testing.assert_allclose(written_ends[name], places, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_joint_has_an_order_of_its_own(tmp_path: Path, seed: int) -> None:
+    """The text is made of known rotations, with positions before, between and after the turns; what is read, and what
+    is written, word by word, are those rotations again."""
+    rng, frames = np.random.default_rng(seed), 12
+    orders = rng.permutation(["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]).tolist()
+    known = Rotation.random(frames * 6, random_state=seed).as_quat().reshape(frames, 6, 4)
+    # Two of them turn on after a right angle about the middle axis, where the other two are one.
+    known[:2, :, :] = Rotation.from_euler("y", [[90.0], [-90.0]], degrees=True).as_quat()[:, None]
+    places = rng.normal(size=(frames, 3))
+    hierarchy, columns = "HIERARCHY\n", []
+    for joint, order in enumerate(orders):
+        with warnings.catch_warnings(action="ignore"):  # SciPy warns where Euler angles lock
+            turns = Rotation.from_quat(known[:, joint]).as_euler(order, degrees=True)
+        channels = [(f"{letter}rotation", turns[:, at]) for at, letter in enumerate(order)]
+        if joint == 0:
+            moves = [(f"{letter}position", 100.0 * places[:, "XYZ".index(letter)]) for letter in orders[1]]
+            channels = [moves[0], channels[0], moves[1], *channels[1:], moves[2]]
+        columns += [values for _, values in channels]
+        words = " ".join(name for name, _ in channels)
+        hierarchy += (
+            f"{'JOINT' if joint else 'ROOT'} j{joint} {{ OFFSET 0 {10 * joint} 3 CHANNELS {len(channels)} {words}\n"
+        )
+        if joint in (2, 5):  # two branches of three
+            hierarchy += "End Site { OFFSET 5 4 3 }" + {2: " } }", 5: " } } } }"}[joint] + "\n"
+    rows = "\n".join(" ".join(f"{number:.9f}" for number in row) for row in np.stack(columns, axis=1))
+    source = write(tmp_path, f"{hierarchy}MOTION\nFrames: {frames}\nFrame Time: 0.1\n{rows}\n")
+    motion = read_bvh(source, unit="cm")
+    assert motion.skeleton.parents == (-1, 0, 1, 0, 3, 4)
+    assert rot.angle(motion.rotations, known).max() < 1e-6
+    np.testing.assert_allclose(motion.root, places, atol=1e-9)
+
+    write_bvh(tmp_path / "again.bvh", motion)
+    words = (tmp_path / "again.bvh").read_text().split()
+    numbers = np.array(words[words.index("Time:") + 2 :], dtype=float).reshape(frames, 3 + 3 * 6)
+    joints = parse(words[: words.index("MOTION")])
+    assert [joint["name"] for joint in joints] == [f"j{joint}" for joint in range(6)]
+    assert joints[0]["channels"][:3] == ["Xposition", "Yposition", "Zposition"]
+    np.testing.assert_allclose(numbers[:, :3], 100.0 * places, atol=1e-6)
+    for joint, written in enumerate(joints):
+        order = "".join(channel[0] for channel in written["channels"][-3:])
+        degrees = numbers[:, 3 + 3 * joint : 6 + 3 * joint]
+        assert rot.angle(Rotation.from_euler(order, degrees, degrees=True).as_quat(), known[:, joint]).max() < 1e-6
+    assert rot.angle(read_bvh(tmp_path / "again.bvh", unit="cm").rotations, known).max() < 1e-6
 
 
 @pytest.mark.parametrize("unit", ["cm", "m", "mm", "in", "cmu", 3.0])

@@ -11,6 +11,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,14 @@ def test_a_posture_reads_back(tmp_path: Path, body: Skeleton) -> None:
     first = (tmp_path / "a.json").read_bytes()
     write_posture(tmp_path / "a.json", back)
     assert (tmp_path / "a.json").read_bytes() == first
+
+
+@pytest.mark.parametrize("keyframed", [True, False])
+def test_keyframes_say_that_they_are(tmp_path: Path, keyframed: bool) -> None:
+    there = replace(random_motion(5), keyframed=keyframed)
+    write_motion(tmp_path / "a.json", there)
+    assert read_motion(tmp_path / "a.json").keyframed is keyframed
+    assert (b"keyframed" in (tmp_path / "a.json").read_bytes()) is keyframed
 
 
 @pytest.mark.parametrize("body", [human23(), tall()])

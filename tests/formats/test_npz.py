@@ -142,6 +142,7 @@ def test_a_rate_that_is_not_said_must_be_given(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="no array 'mocap_framerate': say how many frames per second"):
         read_motion(tmp_path / "a.npz")
     assert read_motion(tmp_path / "a.npz", fps=60).fps == pytest.approx(60.0)
+    assert read_motion(saved(tmp_path / "b.npz", arrays()), fps=60).fps == pytest.approx(60.0)  # in place of the file's
     with pytest.raises(FormatError, match="'fps' must be one number of frames per second, not -1"):
         read_npz(tmp_path / "a.npz", fps=-1)
 

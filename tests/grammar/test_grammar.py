@@ -175,11 +175,30 @@ def test_printed_weights_are_what_the_papers_print(seed: int) -> None:
             assert weight == pytest.approx(-np.log(f_i) + np.log(f_j) - np.log(f_ij), abs=1e-12)
 
 
+@pytest.mark.parametrize("scheme", ["conditional", "printed"])
+@pytest.mark.parametrize("novelty", [0.0, 0.4, 1.0])
+def test_novelty_weighs_the_moves_of_a_state_ever_more_alike(seed: int, scheme: Weights, novelty: float) -> None:
+    graph = grammar(seed).transitions
+    for chain in range(len(corpus(seed).names)):
+        plain, novel = (edges(graph, chain, graph.weights(scheme, nu)) for nu in (0.0, novelty))
+        kinds = Counter(before for before, _ in plain)
+        for (before, after), weight in novel.items():
+            mixed = (1.0 - novelty) * plain[before, after] + novelty * np.log(kinds[before])
+            assert weight == pytest.approx(mixed, abs=1e-12)
+
+
+def test_a_facing_is_visited_as_often_as_any_other(seed: int) -> None:
+    body, graph = corpus(seed), grammar(seed).transitions
+    np.testing.assert_allclose(graph.visits[body.slice(body.joints)], len(body.states) / TURNS)
+    assert graph.visits.sum() == pytest.approx(len(body.states) * len(body.names))
+
+
 def test_postures_without_moves_teach_no_transitions() -> None:
     none = np.zeros(0, np.int64)
     graph = count_transitions(np.array([[0, 3]], np.int32), np.array([1, TURNS]), none, np.zeros(0), pooled=1)
     assert len(graph.targets) == len(graph.weights("conditional")) == len(graph.weights("printed")) == 0
     assert graph.indptr.tolist() == [0] * (TURNS + 2)
+    np.testing.assert_array_equal(graph.edges(np.zeros((3, 2), np.int32)), -1)
 
 
 # --- bridges ---------------------------------------------------------------------------------------------------------

@@ -48,6 +48,25 @@ def test_a_corpus_of_0_1_whose_clusters_were_called_kinds_is_loaded(built: Path,
     assert "carriage.kinds" not in arrays
 
 
+@pytest.mark.parametrize(
+    ("part", "lacking"),
+    [("pace", ["pace."]), ("carriage", ["carriage.aloft", "carriage.overhang", "carriage.touches"])],
+)
+def test_a_corpus_that_was_built_without_some_of_a_part_learns_it(
+    built: Path, tmp_path: Path, part: str, lacking: list[str]
+) -> None:
+    old = tmp_path / "old"
+    shutil.copytree(built, old)
+    manifest = json.loads((old / store.MANIFEST).read_text("utf-8"))
+    for name in [name for name in manifest["arrays"] if name.startswith(tuple(lacking))]:
+        del manifest["arrays"][name]
+        (old / f"{name}.npy").unlink()
+    (old / store.MANIFEST).write_text(json.dumps(manifest), "utf-8")
+    kept, learned = getattr(load(str(built)), part), getattr(load(str(old)), part)
+    for one, other in zip(vars(kept).values(), vars(learned).values(), strict=True):
+        np.testing.assert_allclose(one, other)
+
+
 def test_an_engine_is_what_its_corpus_is_learned_as(built: Path) -> None:
     engine, learned = Engine.load(str(built)), LearnedCorpus.load(str(built))
     assert type(engine) is Engine

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -443,6 +444,17 @@ def test_a_corpus_measures_itself_within_its_range_but_for_what_it_copies(engine
     assert found["longest_run"].value == len(clip)
     assert found["copied_body_5"].value == 1.0 > found["copied_body_5"].high
     assert found["moves"].value == len(clip) - 1
+
+
+def test_a_body_that_bounces_does_so_beyond_the_corpus() -> None:
+    ballet = Engine.load("ballet")
+    clip = at_rate(ballet.corpus.recording(ballet.corpus.clips[0])).slice(0, 60)
+    calm = measure(clip, ballet)["bounce"]
+    assert calm.value <= calm.high
+    shaken = clip.root + 0.04 * np.sin(np.arange(60))[:, None] * [0.0, 1.0, 0.0]
+    bounce = measure(replace(clip, root=shaken), ballet)["bounce"]
+    assert bounce.value == pytest.approx(0.04 * 30.0**2, rel=0.15)
+    assert bounce.value > bounce.high
 
 
 def test_keyframes_and_frames_between_them_are_one_movement(engine: Engine) -> None:

@@ -12,7 +12,9 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture, Velocity
 from motionmind.geometry import rotations as rot
 from motionmind.realise.expectation import Expectation, expect
+from motionmind.realise.headings import turn_with_walks
 from motionmind.realise.mean_walk import _without_ends
+from motionmind.realise.minimal import minimal_movement
 from motionmind.realise.stops import Rates, Stop, moments_rates, stop_at
 from motionmind.tween.engine import Engine
 
@@ -144,6 +146,50 @@ def test_velocities_choose_among_walks(engine: Engine) -> None:
             assert likely(row, 1.0, which) > likely(row, -1.0, which), which
 
 
+def spinning(engine: Engine, posture: Posture, turn: float, seed: int) -> Stop:
+    """A stop at a posture whose joints move, and which turns about the vertical."""
+    velocity = np.random.default_rng(seed).normal(size=(len(posture.skeleton), 3))
+    stop = stop_at(engine.corpus, posture, Velocity(velocity, np.zeros(3)))
+    assert stop.rates is not None
+    return stop._replace(rates=stop.rates._replace(turn=np.asarray(turn)))
+
+
+def test_headings_are_those_of_the_walks_or_of_the_body_where_it_has_its_own(engine: Engine) -> None:
+    clip = clip_of(engine)
+    stops = {0: spinning(engine, clip.posture(3), 0.7, 8), STEPS: spinning(engine, clip.posture(9), -1.3, 9)}
+    found, carriage = expected(engine, stops), engine.carriage
+    if engine.corpus.facing == "stage":
+        np.testing.assert_allclose(found.headings, rot.heading(found.poses[:, 0]), atol=1e-12)
+        return
+    turn, spread = (found.moves @ moved for moved in (carriage.turn, carriage.turn**2))
+    facing = {move: stop.chains[-1] for move, stop in stops.items()}
+    by_hand = turn_with_walks(turn, spread, found.trust[:, 0], found.half_steps, facing, (0.7, -1.3))
+    np.testing.assert_allclose(found.headings, by_hand, atol=1e-12)
+
+
+def test_far_from_the_corpus_joints_go_on_as_they_move_at_the_ends(engine: Engine) -> None:
+    """Both ends are given their velocities, or the one or the other: the movement is the minimal one with them."""
+    joints, a = len(engine.corpus.skeleton), far_off(engine, 2)
+    b = replace(a, rotations=rot.mul(a.rotations, rot.exp(np.full((joints, 3), 0.1))))
+    both = spinning(engine, a, 0.0, 8), spinning(engine, b, 0.0, 9)
+    for first, last in ((True, True), (True, False), (False, True)):
+        ends = [stop if moves else stop._replace(rates=None) for stop, moves in zip(both, (first, last), strict=True)]
+        found = expected(engine, {0: ends[0], STEPS: ends[1]})
+        rates = [None if end.rates is None else end.rates.joints for end in ends]
+        wanted = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, *rates)
+        still = minimal_movement(np.stack([end.chains[:joints] for end in ends]), found.half_steps, None, None)
+        assert rot.angle(found.poses, wanted).max() < 0.15 * rot.angle(still, wanted).max()
+
+
+def test_walks_are_told_both_velocities(engine: Engine) -> None:
+    """Each changes how likely moments are there, beside the other too."""
+    clip = clip_of(engine)
+    a, b = spinning(engine, clip.posture(3), 0.7, 8), spinning(engine, clip.posture(9), -1.3, 9)
+    moments = expected(engine, {0: a, STEPS: b}).moments
+    for ends, at in (({0: a._replace(rates=None), STEPS: b}, 0), ({0: a, STEPS: b._replace(rates=None)}, -1)):
+        assert np.abs(expected(engine, ends).moments[at] - moments[at]).sum() > 0.01
+
+
 def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
     """In the middle of a move, those of the move; and a stop's are those with which its chains turn."""
     corpus, carriage = engine.corpus, engine.carriage
@@ -172,6 +218,9 @@ def test_velocities_of_moments_are_those_of_the_chains(engine: Engine) -> None:
     np.testing.assert_allclose(stop.rates.joints, expected_turns[:joints], atol=0.02)
     if corpus.facing == "free":
         assert stop.rates.turn == pytest.approx(expected_turns[-1, 1], abs=0.02)
+    else:
+        assert stop.rates.turn == 0.0
+        np.testing.assert_array_equal(rates.turn, 0.0)
     back = rot.mul_vec(rot.about_vertical(rot.heading(posture.rotations[0])), stop.rates.travel)
     np.testing.assert_allclose(back, velocity.root, atol=1e-9)
 

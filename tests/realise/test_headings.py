@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
-from motionmind.realise.headings import correct_headings, travel_along, turn_with_walks
+from motionmind.realise.headings import RUN, correct_headings, travel_along, turn_with_walks
 
 STILL = np.zeros(40), np.full(40, 0.01)  # walks that turn to neither side
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -38,6 +38,25 @@ def test_walks_that_surely_turn_lead_the_far_way() -> None:
     assert np.degrees(found[-1]) == pytest.approx(210.0)
     unsure = turn_with_walks(turn, turn**2 + 4.0, SURE, TIMES, facings(0.0, -150.0), (None, None))
     assert np.degrees(unsure[-1]) == pytest.approx(-150.0)
+
+
+@pytest.mark.parametrize("steps", [40, 80])
+def test_walks_lead_the_far_way_by_the_estimate_of_least_square_error(steps: int) -> None:
+    """From 0 to -150 degrees it is the far way if the estimate of what walks turn, 200 degrees, is above 30."""
+    mean, times = np.radians(200.0) / steps, np.linspace(0.0, 4.0, steps + 1)
+    for share in (0.14, 0.16):
+        # share = M^2 / (M^2 + V), and V is the steps' variance times the steps in RUN.
+        varies = np.radians(200.0) ** 2 * (1.0 / share - 1.0) / (steps * RUN * steps / 4.0)
+        turn, spread = np.full(steps, mean), np.full(steps, mean**2 + varies)
+        ends = {0: rot.about_vertical(0.0), steps // 2: rot.about_vertical(np.radians(-150.0))}
+        found = turn_with_walks(turn, spread, np.ones(steps), times, ends, (None, None))
+        assert np.degrees(found[-1]) == pytest.approx(210.0 if share > 0.15 else -150.0)
+
+
+def test_what_is_missing_is_turned_where_walks_are_least_certain() -> None:
+    varies = np.linspace(0.001, 0.02, 40)
+    found = turn_with_walks(np.zeros(40), varies, SURE, TIMES, facings(0.0, 120.0), (None, None))
+    np.testing.assert_allclose(np.diff(np.degrees(found)), 120.0 * varies / varies.sum(), atol=1e-9)
 
 
 def test_walks_that_are_not_trusted_do_not_turn_the_body() -> None:
@@ -77,6 +96,19 @@ def test_a_body_that_turns_at_an_end_does_so(rates: tuple[float | None, float | 
     found = turn_with_walks(np.zeros(8000), np.full(8000, 1e-3), np.ones(8000), times, ends, rates)
     for step, rate in zip(np.diff(found)[[0, -1]] / times[1], rates, strict=True):
         assert step == pytest.approx(0.9 / 4.0 if rate is None else rate, abs=0.01)
+
+
+def test_the_turning_at_an_end_is_that_of_its_own_step() -> None:
+    """However fast the body would turn there, and in the steps beside it."""
+    times, varies = np.linspace(0.0, 4.0, 8001), np.full(8000, 1e-3)
+    varies[[0, -1]] = 0.02  # there what is missing is turned twenty times as fast
+    ends = {0: rot.about_vertical(0.3), 4000: rot.about_vertical(1.3)}
+    free, found = (
+        turn_with_walks(np.zeros(8000), varies, np.ones(8000), times, ends, rates)
+        for rates in ((None, None), (1.5, -2.0))
+    )
+    assert np.diff(free)[0] / times[1] > 4.0
+    np.testing.assert_allclose(np.diff(found)[[0, -1]] / times[1], [1.5, -2.0], atol=0.05)
 
 
 # --- near the states of a path ----------------------------------------------------------------------------------------

@@ -49,6 +49,14 @@ def test_a_departure_is_small_and_is_over_after_a_while() -> None:
     np.testing.assert_array_equal(departure(times, None, None), 0.0)
 
 
+@pytest.mark.parametrize("length", [0.2, LASTS, 3.0])
+def test_a_departure_lasts_for_all_of_a_short_time(length: float) -> None:
+    t, lasts = np.linspace(0.0, length, 31), min(length, LASTS)
+    cubic = t * np.maximum(1.0 - t / lasts, 0.0) ** 2
+    np.testing.assert_allclose(departure(1.0 + t, np.array(3.0), None), 3.0 * cubic, atol=1e-12)
+    np.testing.assert_allclose(departure(1.0 + t, None, np.array(3.0)), -3.0 * cubic[::-1], atol=1e-12)
+
+
 def test_rates_of_numbers_are_of_the_times_shape() -> None:
     assert departure(np.linspace(0.0, 1.0, 5), np.asarray(2.0), None).shape == (5,)
 

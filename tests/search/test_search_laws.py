@@ -58,9 +58,9 @@ def two(movement: list[Motion], seed: int) -> Ends:
 
 
 def join(engine: Engine, ends: Ends, **asked: Any) -> Tween | None:
-    """A tween by what is attested alone, without a guide, or None where there is none."""
+    """A tween by what is attested alone, without a guide and of any pace, or None where there is none."""
     try:
-        return engine.tween(*ends, strict=True, **{"moves": (1, MOVES), "guide": 0.0} | asked)
+        return engine.tween(*ends, strict=True, **{"moves": (1, MOVES), "guide": 0.0, "without": ["pace"]} | asked)
     except NoPathError:
         return None
 

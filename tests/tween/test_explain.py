@@ -151,6 +151,23 @@ def test_people_read_who_moves_how_likely_and_where_it_was_seen(bridged: Tween, 
     assert f"posture {source.posture} ({source.seconds:.2f} s)" in text.split("\nmove ")[move + 1]
 
 
+def test_what_is_least_expected_and_what_the_motion_passes_by_is_told(
+    insects: Engine, bridged: Tween, tmp_path: Path
+) -> None:
+    for tween in (bridged, between(insects, 12, 7, moves=5)):
+        told = explain(read_report(report_of(tween, tmp_path)))
+        for t, (move, part) in enumerate(zip(told.moves, str(told).split("\nmove ")[1:], strict=True)):
+            dear = int(tween.costs.coordination[t].argmax())
+            words = (
+                f"least expected beside its parent: {tween.joints[dear]} ({tween.costs.coordination[t, dear]:.2f} nats)"
+            )
+            assert part.count("least expected") == part.count(words) == (tween.costs.coordination[t, dear] > 0.0)
+            for chain, step in enumerate(move.joints):
+                assert step.followed == (tween.followed[t, chain] and tween.followed[t + 1, chain])
+    assert "(reversed)" in str(told)
+    assert " ()" not in str(told)
+
+
 def test_no_move_is_told_too(insects: Engine, tmp_path: Path) -> None:
     still = between(insects, 3, 3)
     told = explain(read_report(report_of(still, tmp_path)))

@@ -143,7 +143,7 @@ def test_the_search_is_guided_by_the_movement_before_a_and_after_b(engine: Engin
 def test_without_kappa_there_is_no_guide(engine: Engine) -> None:
     assert formulated(engine, guide=0.0).searched.guide is None
     assert formulated(engine, posturewise=True).searched.guide is None
-    tween = engine.tween(*ends(engine), guide=0.0)
+    tween = engine.tween(*ends(engine), guide=0.0, without=["pace"])
     assert not tween.costs.guide.any()
     assert tween.length is None
     assert tween.costs.total == pytest.approx(tween.cost, abs=1e-6)

@@ -80,6 +80,50 @@ def test_a_dancer_s_standing_foot_stays_where_it_stands(recorded: Engine) -> Non
     assert np.mean(rises) < 0.03
 
 
+def on_one_leg(engine: Engine, side: str, count: int) -> Iterator[tuple[Posture, Posture]]:
+    """Postures of any clips that stand on the toes of one side alone; the second is moved onto the first one's foot
+    and, where bodies may face anywhere, turned as that is."""
+    corpus, rng = engine.corpus, np.random.default_rng(1)
+    skeleton = corpus.skeleton
+    foot, other = (skeleton.index(f"{name}_toes") for name in (side, "right" if side == "left" else "left"))
+    points, turned = (
+        skeleton.positions_and_tips(corpus.rotations, corpus.root),
+        skeleton.global_rotations(corpus.rotations),
+    )
+    heights = points[..., 1] - points[..., 1].min(axis=1, keepdims=True)
+    stands, hangs = (heights[:, [toes, toes + len(skeleton)]].min(axis=1) for toes in (foot, other))
+    rows = np.flatnonzero((stands < 0.005) & (hangs > 0.05))
+    while count:
+        a, b = rng.choice(rows, 2, replace=False)
+        rotations = corpus.rotations[b].copy()
+        if corpus.facing == "free":
+            as_there = rot.about_vertical(rot.heading(rot.mul_inv(turned[a, foot], turned[b, foot])))
+            rotations[0] = rot.mul(as_there, rotations[0])
+        elif rot.angle(corpus.rotations[a, 0], rotations[0]) > 0.6:
+            continue
+        there = skeleton.positions(rotations[None], corpus.root[b][None])[0, foot]
+        root = corpus.root[b] + (points[a, foot] - there) * [1.0, 0.0, 1.0]
+        yield Posture(skeleton, corpus.rotations[a], corpus.root[a]), Posture(skeleton, rotations, root)
+        count -= 1
+
+
+@pytest.mark.parametrize(("name", "within"), [("ballet", 0.006), ("karate", 0.03)])
+def test_bodies_on_one_leg_stay_on_it_whatever_else_they_do(name: str, within: float) -> None:
+    """Of default tweens; the foot's end that slides least counts, for a foot may turn on its ball or on its tip."""
+    engine, slid = engine_of(name), []
+    for side in ("left", "right"):
+        for a, b in on_one_leg(engine, side, 20):
+            motion = engine.tween(a, b).motion
+            toes = motion.skeleton.index(f"{side}_toes")
+            ends = motion.skeleton.positions_and_tips(motion.rotations, motion.root)[
+                :, [toes, toes + len(motion.skeleton)]
+            ]
+            steps = np.linalg.norm(np.diff(ends[..., [0, 2]], axis=0), axis=-1)
+            low = np.maximum(ends[1:, :, 1], ends[:-1, :, 1]) < 0.02
+            slid.append(float(np.where(low, steps, np.inf).min(axis=1)[low.any(axis=1)].sum()))
+    assert np.mean(slid) < within  # it is twice as far where nothing holds them
+
+
 @pytest.mark.parametrize("name", ["ballet", "karate", "walk-hexapod"])
 def test_no_frame_is_below_the_floor(name: str) -> None:
     """The floor is at 0, or as low as the ends are."""
@@ -123,6 +167,25 @@ def test_a_body_turns_the_near_way_round(a: float, b: float, turn: float, speeds
         headings = np.degrees(np.unwrap(rot.heading(motion.rotations[:, 0])))
         assert headings[-1] - headings[0] == pytest.approx(turn, abs=1e-6)
         assert headings.max() - headings.min() < abs(turn) + 40.0
+
+
+@pytest.mark.parametrize(
+    ("facings", "turns"),
+    [
+        ([170.0, -170.0], [20.0]),
+        ([170.0, 180.0, -170.0], [10.0, 10.0]),
+        ([0.0, 100.0, -120.0], [100.0, 140.0]),
+        ([-90.0, 160.0, -170.0, 90.0], [-110.0, 30.0, -100.0]),
+    ],
+)
+def test_from_one_posture_to_the_next_a_body_turns_the_near_way_round(facings: list[float], turns: list[float]) -> None:
+    engine = engine_of("karate")
+    a, *via, b = (turned(posture(engine, 130 + 3 * k), degrees) for k, degrees in enumerate(facings))
+    tween = engine.tween(a, b, via=via)
+    headings = np.degrees(np.unwrap(rot.heading(tween.motion.rotations[:, 0])))
+    times = tween.motion.insertions[0].times[[0, *tween.passed, tween.moves]]
+    np.testing.assert_allclose(np.diff(np.interp(times, tween.motion.times, headings)), turns, atol=3.0)
+    assert np.ptp(headings) < np.ptp(np.cumsum([0.0, *turns])) + 40.0
 
 
 @pytest.mark.parametrize(("name", "row"), [("ballet", 0), ("ballet", 500), ("ballet", 2000), ("karate", 334)])

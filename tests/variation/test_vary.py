@@ -380,6 +380,29 @@ def test_insertions_lead_from_posture_to_posture(smoothed: Variation) -> None:
     assert kept.sum() == len(frames)
 
 
+@pytest.mark.parametrize("facing", ["free", "stage"])
+def test_an_insertion_turns_the_body_the_near_way_round(
+    kata: Piece, karate: Engine, smoothed: Variation, facing: str
+) -> None:
+    """Where each posture keeps its own orientation, from one to the other; else the body ends as it began. By nearly
+    half a turn it may go either way, as the corpus does."""
+    variation = smoothed
+    if facing == "stage":
+        variation = vary(Piece(kata.motion, kata.frames, "stage"), karate, flow=FLOWS["rossler"], alternatives=1)
+    motion, frames = variation.arrange()
+    headings, turns = np.degrees(rot.heading(motion.rotations[:, 0])), []
+    for seam in variation.seams:
+        if seam.insertion:
+            way = np.unwrap(headings[frames[seam.at] : frames[seam.at + 1] + 1], period=360.0)
+            near = (way[-1] - way[0] + 180.0) % 360.0 - 180.0
+            if abs(near) < 150.0:
+                assert way[-1] - way[0] == pytest.approx(near, abs=1e-6)
+                assert np.ptp(way) < abs(near) + 90.0
+                turns.append(abs(near) > 1.0)
+    assert len(turns) > 10
+    assert any(turns) if facing == "stage" else not any(turns)
+
+
 # --- the movement at the ends of an insertion ------------------------------------------------------------------------
 
 

@@ -1,0 +1,189 @@
+"""Support: which limbs bear a body, where its mass is over them, when it is in the air, and feet that rise.
+
+A limb *bears* the body in a frame in which one of its points is near the lowest point of the body and hardly moves. A
+body is *airborne* while even its lowest point is well above the floor. In between, as on half-pointe, or where a
+recording's floor is a little off, it stands: so "near" is measured from the body's lowest point, not from the floor.
+
+The *support* is the convex hull of the bearing limbs' low points on the floor, and the *overhang* how far outside of it
+the centre of mass is, seen from above. Limbs are those of `limbs_of`, and last the trunk: a body can stand on its hands
+and sit, and an insect has six limbs to stand on. Lengths are of a person as tall as human23, and grow with the body.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy_file import anatomy_of
+from motionmind.body.contact import contact_points, limb_heights
+from motionmind.body.human import human23
+from motionmind.body.limbs import limb_of_points
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
+from motionmind.jit import jit
+
+NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
+STILL = 0.3  # metres a second: a point that moves faster does not bear
+# Metres above the floor of the lowest point of a body in the air. Dancers on half-pointe, and recordings whose floor is
+# a little off, reach 8 to 12 cm; above it, the mass of the dancers of `cmu-05` and `cmu-16` falls freely.
+AIRBORNE = 0.12
+STEPS = 0.1  # metres: a foot that is put so far from where it stood has made a step
+
+
+class Support(NamedTuple):
+    """The support of a body in each of T frames.
+
+    Attributes:
+        bears: whether each limb, and last the trunk, bears the body [T, limbs + 1].
+        airborne: whether the body is in the air [T].
+        mass: the centre of mass [T, 3], metres; None for a body whose masses are not known.
+        overhang: how far the centre of mass is outside of the support, seen from above [T], metres: 0 where it is over
+            it, NaN where no limb bears; None as for `mass`.
+    """
+
+    bears: Bools
+    airborne: Bools
+    mass: Floats | None
+    overhang: Floats | None
+
+
+def find_support(
+    skeleton: Skeleton, rotations: Floats, root: Floats, fps: float, floor: float | Floats = 0.0
+) -> Support:
+    """Find which limbs bear a body, and where its mass is over them, in each frame.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres.
+        fps: frames a second.
+        floor: height of the floor, or in each frame [T], metres.
+    """
+    places, joints = contact_points(skeleton, rotations, root)
+    limb, size = limb_of_points(skeleton)[joints], size_of(skeleton)
+    lowest = places[..., 1].min(axis=-1)
+    airborne = lowest > floor + AIRBORNE * size
+    low = (places[..., 1] <= lowest[:, None] + NEAR * size) & ~airborne[:, None]
+    firm = low & (_speeds(places, fps) < STILL * size)
+    bears = np.stack([firm[:, limb == number].any(axis=1) for number in range(limb.max() + 1)], axis=1)
+    mass = centre_of_mass(skeleton, rotations, root)
+    over = None if mass is None else overhang(places[..., [0, 2]], low & bears[:, limb], mass[:, [0, 2]])
+    return Support(bears, airborne, mass, over)
+
+
+def size_of(skeleton: Skeleton) -> float:
+    """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well."""
+    return _extent(skeleton) / _extent(human23())
+
+
+def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:
+    """Return the centre of mass [..., 3], metres; None for a body whose masses are not known.
+
+    Args:
+        skeleton: the body; of other proportions than its anatomy's own it has the same shares of mass.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+    """
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None or not anatomy.has_masses:
+        return None
+    return anatomy.centre_of_mass(rotations, root, skeleton)
+
+
+def overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
+    """Return how far outside of the convex hull of its supports a centre of mass is [T], metres.
+
+    Args:
+        points: of the body, seen from above [T, P, 2], metres.
+        supports: whether each is a support [T, P].
+        mass: centre of mass, seen from above [T, 2], metres.
+
+    Returns:
+        0 where it is over the hull, and NaN where there is no support.
+    """
+    return _overhang(np.ascontiguousarray(points), supports, np.ascontiguousarray(mass))
+
+
+def stands_alone(skeleton: Skeleton, rotations: Floats, root: Floats) -> Ints:
+    """Return the number of the limb, or trunk, that postures stand on alone [...]; -1 where several are low.
+
+    A posture has no speed: here the limb is the only one with a point near the body's lowest.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [..., J, 4].
+        root: positions of the root [..., 3], metres.
+    """
+    heights = limb_heights(skeleton, rotations, root)
+    low = heights <= heights.min(axis=-1, keepdims=True) + NEAR * size_of(skeleton)
+    return np.where(low.sum(axis=-1) == 1, low.argmax(axis=-1), -1)
+
+
+def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
+    """Return how far the limb that a movement stands on alone at both ends rises above it on the way, metres.
+
+    It is the height of the limb's lowest point above a line from where it is first to where it is last, the greatest
+    over the frames. NaN where the ends do not stand on one and the same limb, or where it makes a step.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root [T, 3], metres.
+    """
+    ends = stands_alone(skeleton, rotations[[0, -1]], root[[0, -1]])
+    if ends[0] < 0 or ends[0] != ends[1]:
+        return float("nan")
+    places, joints = contact_points(skeleton, rotations, root)
+    places = places[:, limb_of_points(skeleton)[joints] == ends[0]]
+    moved = (places[-1] - places[0])[:, [0, 2]]
+    if np.linalg.norm(moved, axis=1).min() > STEPS * size_of(skeleton):
+        return float("nan")
+    heights = places[..., 1].min(axis=1)
+    return float((heights - np.linspace(heights[0], heights[-1], len(heights))).max())
+
+
+def _extent(skeleton: Skeleton) -> float:
+    at_rest = np.tile(rot.IDENTITY, (len(skeleton), 1))
+    return float(np.ptp(skeleton.positions_and_tips(at_rest, np.zeros(3)), axis=0).max())
+
+
+def _speeds(places: Floats, fps: float) -> Floats:
+    """Return the speeds of points [T, P], metres a second: over two frames, at the ends over one."""
+    if len(places) < 2:
+        return np.zeros(places.shape[:2])
+    frames = np.arange(len(places))
+    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(places) - 1)
+    moved = np.linalg.norm(places[after] - places[before], axis=-1)
+    return np.asarray(moved * fps / (after - before)[:, None])
+
+
+@jit
+def _overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
+    """Return the overhang [T], see `overhang`.
+
+    Seen from the centre of mass, points that surround it leave no gap of half a turn between their directions. Outside
+    of the hull its distance is that to the nearest of all segments between two supports, for the hull's sides are among
+    them and none leaves the hull.
+    """
+    out = np.full(len(points), np.nan)
+    for t in range(len(points)):
+        chosen = np.flatnonzero(supports[t])
+        if len(chosen) == 0:
+            continue
+        off = points[t][chosen] - mass[t]
+        angles = np.sort(np.arctan2(off[:, 1], off[:, 0]))
+        gap = angles[0] + 2.0 * np.pi - angles[-1]
+        for i in range(1, len(angles)):
+            gap = max(gap, angles[i] - angles[i - 1])
+        least = np.inf
+        for i in range(len(off)):
+            for j in range(i + 1):
+                side = off[j] - off[i]
+                length = side @ side
+                share = 0.0 if length == 0.0 else min(max(-(off[i] @ side) / length, 0.0), 1.0)
+                nearest = off[i] + share * side
+                least = min(least, nearest @ nearest)
+        out[t] = 0.0 if gap < np.pi else np.sqrt(least)
+    return out

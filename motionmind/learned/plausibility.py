@@ -1,0 +1,155 @@
+"""The most that a corpus's own movement shows a viewer, beside which other movement is plausible or not.
+
+To the measures of `motionmind.body.plausibility` comes `pace`: how many times as fast as its fastest the fastest of all
+joints, the body's turning and its travel is, where fastest is what that part exceeds in one of a hundred frames of the
+corpus (`motionmind.learned.pace`).
+
+The limit of each is the 99.5th percentile, over all stretches of a second of the corpus's clips, of the greatest that
+each shows. Shorter clips are a stretch each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.contact import RATE, find_floor
+from motionmind.body.motion import Motion
+from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
+from motionmind.corpus.corpus import FACING, Corpus
+from motionmind.learned.pace import way_of
+
+MEASURES = (*SEEN, "pace")
+ABOUT = {  # the unit of each, and what it is
+    "balance": ("m", "how far the body leans over what it stands on, on one limb and at ease"),
+    "bounce": ("m/s^2", "greatest acceleration of the body's mass, up or down"),
+    "flight": ("", "share of gravity that the body lacks in the air: 1 where it floats"),
+    "crossed_limbs": ("m", "how deep limbs are in each other"),
+    "pace": ("", "how many times as fast as its fastest the fastest part of the body is"),
+}
+STRETCH = 1.0  # seconds
+BEYOND = 99.5  # percentile of the corpus's own stretches
+# What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, and times as fast.
+TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0])
+_MOST = 40_000  # frames of a corpus that are measured, about
+_PIECE = 120  # frames of each piece of a corpus that has more
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The most that a movement shows a viewer of something, beside a corpus.
+
+    Attributes:
+        value: the most; None where the measure does not apply to the movement.
+        most: what stretches of a second of the corpus show at most; None where it tells nothing.
+        unit: the unit of both; "" for shares and ratios.
+        part: the part of the body that shows it, where it is one part: a joint, "facing" or "travel"; else "".
+
+    >>> from motionmind import Sighting
+    >>> Sighting(31.0, 18.5, "m/s^2").is_beyond
+    True
+    """
+
+    value: float | None
+    most: float | None
+    unit: str
+    part: str = ""
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether the movement shows more than the corpus does."""
+        return self.value is not None and self.most is not None and self.value > self.most
+
+
+@dataclass(frozen=True, eq=False)
+class Plausibility:
+    """The limits of a corpus with J joints.
+
+    Attributes:
+        fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel, heights/s [J + 2].
+        most: what its stretches show at most, in the order of `MEASURES` [M]; NaN where the corpus never shows it.
+    """
+
+    fastest: Floats
+    most: Floats
+
+    def shown(self, motion: Motion) -> dict[str, Sighting]:
+        """Return what a movement on the corpus's joints shows a viewer, by the names of the measures."""
+        values, part = _summarise(motion, self.fastest, None)
+        most = np.maximum(self.most, TRIFLES)  # NaN stays NaN
+        return {
+            name: Sighting(_or_none(value), _or_none(limit), ABOUT[name][0], part if name == "pace" else "")
+            for name, value, limit in zip(MEASURES, values, most, strict=True)
+        }
+
+
+def learn_plausibility(corpus: Corpus, fastest: Floats) -> Plausibility:
+    """Learn the limits of a corpus from its clips.
+
+    Args:
+        corpus: the movement.
+        fastest: see `Plausibility`.
+    """
+    shown = [_greatest_of_stretches(values) for values in _frames_of(corpus, fastest)]
+    most = np.full(len(MEASURES), np.nan)
+    for column in range(len(MEASURES)):
+        known = np.concatenate([values[:, column] for values in shown])
+        if np.isfinite(known).any():
+            most[column] = np.percentile(known[np.isfinite(known)], BEYOND)
+    return Plausibility(fastest, most)
+
+
+def summarise_shown(motion: Motion, fastest: Floats, floor: float) -> Floats:
+    """Return the most that a movement shows of each of `MEASURES` [M], above a floor at a height in metres."""
+    return _summarise(motion, fastest, floor)[0]
+
+
+def _summarise(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, str]:
+    """Return the most that a movement shows of each of `MEASURES` [M], and the name of its fastest part."""
+    frames, speeds = _show(motion, fastest, floor)
+    parts = (*motion.skeleton.names, FACING, "travel")
+    return greatest(frames), parts[int(speeds.max(axis=0).argmax())] if len(speeds) else ""
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _show(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, Floats]:
+    """Return what a movement shows in each frame at 30 a second [T, M], and how many times as fast as its fastest each
+    part is between frames [T - 1, J + 2].
+
+    The floor's height is in metres; None stands for 0, or lower where the body is.
+    """
+    sampled = at_rate(motion)
+    where = sampled.skeleton, sampled.rotations, sampled.root
+    frames = implausibility(*where, RATE, floor_of(*where) if floor is None else floor)
+    pace = np.full((len(sampled), 1), np.nan)
+    speeds = RATE * way_of(sampled).parts / fastest
+    pace[1:, 0] = speeds.max(axis=1)
+    return np.concatenate([frames, pace], axis=1), speeds
+
+
+def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
+    """Yield what clips of a corpus show in each frame [T, M]; of very long ones evenly spread pieces, _MOST in all."""
+    seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
+    every = int(np.ceil(RATE * seconds / _MOST))
+    pieces = 0
+    for clip in corpus.clips:
+        recording = at_rate(corpus.recording(clip))
+        floor = find_floor(recording.skeleton, recording.rotations, recording.root, heels=True)
+        size = len(recording) if every <= 1 else _PIECE
+        for start in range(0, len(recording), size):
+            if every <= 1 or pieces % every == 0:
+                yield _show(recording.slice(start, start + size), fastest, floor)[0]
+            pieces += 1
+
+
+def _greatest_of_stretches(values: Floats) -> Floats:
+    """Return the greatest of each column [T, M] in each stretch [stretches, M]; minus infinity where all are NaN."""
+    known = np.where(np.isnan(values), -np.inf, values)
+    windows = np.lib.stride_tricks.sliding_window_view(known, min(round(STRETCH * RATE), len(known)), axis=0)
+    return np.asarray(windows.max(axis=-1))

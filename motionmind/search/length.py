@@ -1,0 +1,96 @@
+"""The number of moves, where that is left open: chosen by tolls, and by how much the chains would have to hurry.
+
+A path's energy says little about its length: once nothing hurries, each further move costs about as much as the last.
+What it does say is which lengths are in haste. The chains' *haste* in n moves is what they pay for starting where they
+do: with V[n, s] the least cost of a chain on its own from state s to the goal in exactly n moves,
+
+    haste(n) = sum over chains of  V[n, start] - min over s of V[n, s].
+
+It is infinite where a chain cannot get there, tens of nats where only rare moves or bridges lead there in time, and
+about constant from some length on, whatever a move costs. Length is chosen by haste plus tolls. Both are tables, so the
+choice is exact, and no path need be searched for it. A path is divided into segments by vias: then the numbers of moves
+of all segments are chosen together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.errors import InfeasibleError
+from motionmind.search.problem import Problem, costs_to_go
+
+
+@dataclass(frozen=True)
+class LengthChoice:
+    """The choice of a number of moves: by haste and tolls, or, without tolls, by what paths cost without the guide.
+
+    Attributes:
+        moves: the number of moves that costs least; without tolls, that of the cheapest path known.
+        cost: what it costs, nats.
+        lower_bound: no number of moves costs less than this, nats; with tolls, it is the cost.
+        lower_bound_elsewhere: no other number of moves costs less than this, nats; the choice is proven where this is
+            no less than `cost`, to 1e-6 nats.
+        expansions: nodes that A* expanded for the choice.
+        haste: the part of the cost that is haste, nats; 0 without tolls.
+        passed: with tolls, the moves at which vias are to be passed [K].
+    """
+
+    moves: int
+    cost: float
+    lower_bound: float
+    lower_bound_elsewhere: float
+    expansions: int
+    haste: float = 0.0
+    passed: tuple[int, ...] = ()
+
+
+def choose_length(problem: Problem) -> LengthChoice:
+    """Choose the number of moves of each of a problem's segments, by haste and tolls.
+
+    Raises:
+        InfeasibleError: no path satisfies the problem.
+        ValueError: the tolls are not of the problem's segments and numbers of moves, or not finite.
+    """
+    hastes, tolls, rules = _hastes(problem), problem.tolls, problem.rules
+    if tolls is None or tolls.shape != hastes.shape or not np.isfinite(tolls).all():
+        raise ValueError(f"there must be finite tolls of the shape {hastes.shape}")
+    costs = hastes + tolls
+    # Least cost of the first segments together, by the move after which they end [N + 1], from none to all.
+    so_far = [np.where(np.arange(rules.longest + 1) == 0, 0.0, np.inf)]
+    for number, row in enumerate(costs):
+        least = np.full(rules.longest + 1, np.inf)
+        for first in np.flatnonzero(np.isfinite(so_far[-1])):
+            np.minimum(least[first:], so_far[-1][first] + row[: len(row) - first], out=least[first:])
+        if number < len(problem.vias) and (move := problem.vias[number].move) is not None:
+            least[np.arange(len(least)) != move] = np.inf
+        so_far.append(least)
+    so_far[-1][: rules.shortest] = np.inf
+    ends = [int(so_far[-1].argmin())]
+    if not np.isfinite(so_far[-1][ends[0]]):
+        raise InfeasibleError("no path satisfies the problem")
+    for row, least in zip(costs[::-1], so_far[-2::-1], strict=True):
+        ends.insert(0, int((least[: ends[0] + 1] + row[ends[0] :: -1]).argmin()))
+    cost, haste = float(so_far[-1][ends[-1]]), sum(hastes[k, b - a] for k, (a, b) in enumerate(pairwise(ends)))
+    elsewhere = float(np.delete(so_far[-1], ends[-1]).min(initial=np.inf))
+    return LengthChoice(ends[-1], cost, cost, elsewhere, 0, float(haste), tuple(ends[1:-1]))
+
+
+def _hastes(problem: Problem) -> Floats:
+    """Return the haste of each segment in each number of moves, nats [K, N + 1]; infinite where it has no path."""
+    model, rules, stops = problem.model_with_waits(), problem.rules, problem.stops
+    out = np.full((len(stops) - 1, rules.longest + 1), np.inf)
+    if not all(model.allowed[model.starts[:-1] + stop].all() for stop in stops[1:-1]):
+        return out
+    for haste, (start, goal) in zip(out, pairwise(stops), strict=True):
+        to_go = costs_to_go(model, goal, rules.longest)
+        from_start = to_go[:, model.starts[:-1] + start]
+        possible = np.isfinite(from_start).all(axis=1)
+        cheapest = np.minimum.reduceat(to_go[possible], model.starts[:-1], axis=1)
+        haste[possible] = (from_start[possible] - cheapest).sum(axis=1)
+    if len(out) > 1:
+        out[:, 0] = np.inf
+    return out

@@ -1,0 +1,78 @@
+"""Pacing: how many moves to make for so far a way, in the search's terms.
+
+A likeliest path hurries: every move costs something, so the energy alone prefers as few as the states' graphs allow.
+The corpus's bodies take their time (`motionmind.learned.pace`). So a segment of T moves, of u seconds each, pays a toll
+
+    w L (log(T u / d) / spread)^2 / 2 + HURRIES max(0, least / (T u) - 1)   nats
+
+beside its haste (`motionmind.search.length`):
+
+- the first term is the duration's -log density in the corpus, given the way, but for a constant; d is the median. Haste
+  adds up over the L chains, each of which counts on its own, so the duration counts w times for each chain too;
+- `least` is the time in which no joint need turn, nor the body turn or travel, faster than all but the corpus's fastest
+  hundredth of moments. The peak of a smooth movement is above its mean: 15/8 of it where jerk is least (Flash and
+  Hogan, J. Neuroscience 5:1688, 1985). The toll is as good as a prohibition, but one that gives way where the number
+  of moves is bounded from above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Posture
+from motionmind.learned.model import LearnedCorpus
+from motionmind.learned.pace import way_between
+from motionmind.realise.timeline import usual
+
+A_CHAIN = 10.0  # w: how often the duration's density counts for each chain
+HURRIES = 1e4  # nats for half of the least time
+PEAK = 15.0 / 8.0  # of a smooth movement's speed over its mean
+
+
+@dataclass(frozen=True)
+class UsualTime:
+    """The time that a corpus's bodies take for the way from one stop to the next.
+
+    Attributes:
+        median: of movements that go so far, seconds.
+        least: seconds in which no part of the body need be faster than all but the corpus's fastest hundredth.
+        slowest: the part that needs them: a joint, "turning" or "travel".
+    """
+
+    median: float
+    least: float
+    slowest: str
+
+
+def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
+    """Return the corpus's usual time from each of the postures to the next."""
+    parts = (*learned.corpus.skeleton.names, "turning", "travel")
+    out = []
+    for a, b in pairwise(stops):
+        way = way_between(a, b)
+        needs = PEAK * way.parts / learned.pace.fastest
+        slowest = int(needs.argmax())
+        out.append(UsualTime(float(learned.pace.expected(way)), float(needs[slowest]), parts[slowest]))
+    return tuple(out)
+
+
+def tolls(learned: LearnedCorpus, times: Sequence[UsualTime], longest: int) -> Floats:
+    """Return the toll of each number of moves for each segment, nats [K, longest + 1].
+
+    Args:
+        learned: the corpus.
+        times: the usual time of each segment [K].
+        longest: greatest number of moves.
+    """
+    seconds = np.maximum(np.arange(longest + 1), 1) * usual(learned.grammar.transitions)
+    out = np.empty((len(times), longest + 1))
+    for row, time in zip(out, times, strict=True):
+        off = np.log(seconds / time.median) / learned.pace.spread
+        hurries = np.maximum(time.least / seconds - 1.0, 0.0)
+        row[:] = 0.5 * A_CHAIN * len(learned.space) * off**2 + HURRIES * hurries
+    return out

@@ -1,0 +1,123 @@
+"""How long a corpus's bodies take for how far a way, and how fast they are at most."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import insect
+
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.gather import gather
+from motionmind.geometry import rotations as rot
+from motionmind.learned.pace import EVERYDAY, FPS, SLOPES, Pace, Way, find_still, learn_pace, way_between, way_of
+
+ARM = 7
+
+
+def reaches(skeleton: Skeleton, seconds: list[float], angles: list[float], stride: float = 0.0) -> Motion:
+    """All joints but the root turn there and back, one of them farthest; the root travels; still between moves."""
+    times, turned, gone = [0.0], [0.0], [0.0]
+    for number, (length, angle) in enumerate(zip(seconds, angles, strict=True)):
+        share = np.arange(1, round(length * FPS) + 1) / round(length * FPS)
+        eased = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)  # least jerk
+        way = angle if number % 2 == 0 else -angle
+        times += [times[-1] + length * part for part in share]
+        turned += [turned[-1] + way * part for part in eased]
+        gone += [gone[-1] + stride * angle * part for part in eased]
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (len(times), len(skeleton), 1))
+    for joint in range(1, len(skeleton)):
+        share = 1.0 if joint == ARM else 0.5
+        rotations[:, joint] = rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), share * np.array(turned))
+    root = np.zeros((len(times), 3))
+    root[:, 2] = gone
+    return Motion(skeleton, rotations, root, np.array(times), "reaches")
+
+
+def learned(*clips: Motion, rate: float | None = 10.0) -> Pace:
+    return learn_pace(gather("reaches", clips, rate=rate))
+
+
+def way(skeleton: Skeleton, turn: float = 0.0, travel: float = 0.0, facing: float = 0.0) -> Way:
+    """The way of a body whose arm turns, that travels, and faces elsewhere in the end."""
+    still = reaches(skeleton, [1.0], [0.0]).posture(0)
+    rotations, root = still.rotations.copy(), still.root + np.array([0.0, 0.0, travel])
+    rotations[0] = rot.about_vertical(np.array(facing))
+    rotations[ARM] = rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(turn))
+    return way_between(still, Posture(skeleton, rotations, root))
+
+
+def test_a_way_is_what_a_body_does_between_two_postures() -> None:
+    skeleton = human23()
+    there = way(skeleton, turn=0.7, travel=2.0 * skeleton.height, facing=-0.4)
+    assert there.joints[ARM] == pytest.approx(0.7)
+    assert there.joints.sum() == pytest.approx(0.7)  # that the body turns is no turn of the root's own
+    assert (float(there.turn), float(there.travel)) == (pytest.approx(0.4), pytest.approx(2.0))
+
+
+def test_still_moments_are_found_where_moves_meet() -> None:
+    clip = reaches(human23(), [0.8, 1.2, 0.6, 1.0], [1.0, 1.0, 2.0, 2.0])
+    np.testing.assert_allclose(find_still(way_of(clip).joints.mean(axis=1)), np.cumsum([24, 36, 18]), atol=4)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_who_is_slower_in_the_same_is_expected_to_take_longer(factor: float) -> None:
+    seconds, angles = [0.8, 1.0, 1.2, 0.9] * 6, [0.4, 1.5] * 12
+    clips = [reaches(human23(), [times * length for length in seconds], angles, 0.3) for times in (1.0, factor)]
+    usual, other = (learned(clip) for clip in clips)
+    there = way(human23(), turn=1.0, travel=0.3)
+    assert (float(other.expected(there)) > float(usual.expected(there))) == (factor > 1.0)
+    assert other.fastest[ARM] == pytest.approx(usual.fastest[ARM] / factor, rel=0.15)
+
+
+def test_a_longer_way_takes_longer() -> None:
+    rng = np.random.default_rng(0)
+    for seed in range(5):
+        seconds, angles = rng.uniform(0.4, 1.5, 20).tolist(), rng.uniform(0.1, 2.0, 20).tolist()
+        pace = learned(reaches(human23(), seconds, angles, rng.uniform(0.0, 1.0)))
+        assert SLOPES[0] <= pace.law[1] <= SLOPES[1], seed
+        for kind, most in (("turn", 3.0), ("travel", 5.0), ("facing", 3.0)):
+            expected = [float(pace.expected(way(human23(), **{kind: far}))) for far in np.linspace(0.0, most, 20)]
+            assert np.all(np.diff(expected) > 0.0), (seed, kind)
+            assert expected[-1] < 60.0
+
+
+def test_the_fastest_speeds_are_those_of_the_rarest_frames() -> None:
+    clip = reaches(human23(), [1.0] * 30, [1.5] * 30, 1.0)
+    pace, speeds = learned(clip, rate=30.0), FPS * way_of(clip).parts
+    assert pace.fastest[ARM] == pytest.approx(np.percentile(speeds[:, ARM], 99.0), rel=0.05)
+    assert pace.fastest[-1] == pytest.approx(np.percentile(speeds[:, -1], 99.0), rel=0.05)
+
+
+def test_what_never_moves_in_a_corpus_may_move() -> None:
+    pace = learned(reaches(human23(), [1.0, 1.0], [1.0, 1.0]))
+    assert np.all(pace.fastest > 0.0)
+    assert pace.fastest[0] == pytest.approx(0.25 * np.median(pace.fastest[:-2]))
+    assert tuple(pace.fastest[-2:]) == EVERYDAY[1:]
+
+
+@pytest.mark.parametrize("frames", [2, 3])
+def test_a_corpus_of_a_few_postures_has_the_prior(frames: int) -> None:
+    still = reaches(human23(), [1.0], [0.5]).slice(0, frames)
+    pace = learn_pace(gather("few", [still], rate=None))
+    assert np.isfinite(pace.law).all()
+    assert 0.5 < float(pace.expected(way(human23(), turn=1.0, travel=1.0))) < 5.0
+
+
+def test_size_does_not_matter() -> None:
+    clip = reaches(human23(), [0.8, 1.2] * 8, [1.0, 1.0] * 8, 0.5)
+    body = clip.skeleton
+    small = Skeleton("small", body.names, body.parents, 0.01 * body.offsets, 0.01 * body.tips)
+    shrunk = replace(clip, skeleton=small, root=0.01 * clip.root)
+    for one, other in zip(vars(learned(clip)).values(), vars(learned(shrunk)).values(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_insects_have_a_pace_too() -> None:
+    body = insect()
+    pace = learned(reaches(body, [0.5, 0.4] * 10, [0.8, 0.8] * 10, 0.01))
+    assert len(pace.fastest) == len(body) + 2
+    assert float(pace.expected(way(body, turn=0.8))) < float(pace.expected(way(body, turn=0.8, travel=0.1)))

@@ -1,0 +1,106 @@
+"""The limits of a corpus: its own movement keeps them, and movement that is worse does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionmind import Engine, Motion
+from motionmind._typing import Floats
+from motionmind.body.plausibility import at_rate
+from motionmind.learned.plausibility import MEASURES, Plausibility, learn_plausibility
+
+BALLET = Engine.load("ballet")
+
+
+def stretches(engine: Engine, count: int, seed: int = 0) -> list[Motion]:
+    """Random seconds of the clips of a corpus."""
+    rng = np.random.default_rng(seed)
+    clips = [at_rate(engine.corpus.recording(clip)) for clip in engine.corpus.clips]
+    long = [clip for clip in clips if len(clip) > 31]
+    lengths = np.array([len(clip) - 30 for clip in long])
+    chosen = [long[number] for number in rng.choice(len(long), size=count, p=lengths / lengths.sum())]
+    starts = [int(rng.integers(len(clip) - 30)) for clip in chosen]
+    return [clip.slice(start, start + 31) for clip, start in zip(chosen, starts, strict=True)]
+
+
+def raised(motion: Motion, by: Floats) -> Motion:
+    return replace(motion, root=motion.root + by[:, None] * [0.0, 1.0, 0.0])
+
+
+def test_a_corpus_keeps_its_own_limits() -> None:
+    beyond = np.array(
+        [[one.is_beyond for one in BALLET.plausibility.shown(motion).values()] for motion in stretches(BALLET, 400)]
+    )
+    assert np.all(beyond.mean(axis=0) <= 0.02)
+    assert np.isfinite(BALLET.plausibility.most).all()  # a ballet has it all: jumps, legs that cross, one-leg balances
+
+
+def test_haste_is_told_with_its_part() -> None:
+    motion = stretches(BALLET, 1)[0]
+    hurried = replace(motion, times=motion.times[0] + (motion.times - motion.times[0]) / 20.0)
+    shown = BALLET.plausibility.shown(hurried.resample(120.0))
+    assert shown["pace"].is_beyond
+    assert shown["pace"].part in (*BALLET.corpus.chains, "travel")
+    still = replace(motion, rotations=np.tile(motion.rotations[:1], (31, 1, 1)), root=np.tile(motion.root[:1], (31, 1)))
+    carried = replace(still, root=still.root + np.linspace(0.0, 9.0, 31)[:, None] * [1.0, 0.0, 0.0])
+    found = BALLET.plausibility.shown(carried)["pace"]
+    assert (found.part, found.is_beyond) == ("travel", True)
+    assert not BALLET.plausibility.shown(still)["pace"].is_beyond
+
+
+def test_a_body_that_hops_or_floats_is_told() -> None:
+    motion = stretches(BALLET, 1)[0]
+    hops = raised(motion, 0.05 * np.sin(np.arange(31)))
+    assert BALLET.plausibility.shown(hops)["bounce"].is_beyond
+    floats = raised(motion, np.concatenate([np.linspace(0.0, 0.5, 5), np.full(26, 0.5)]))
+    assert BALLET.plausibility.shown(floats)["flight"].is_beyond
+
+
+def test_the_frame_rate_does_not_matter() -> None:
+    motion = stretches(BALLET, 1)[0]
+    once = BALLET.plausibility.shown(motion)
+    fine = BALLET.plausibility.shown(motion.resample(120.0))
+    for name in MEASURES:
+        assert once[name] == fine[name] or once[name].value == pytest.approx(fine[name].value, rel=1e-6)
+
+
+def test_what_is_unknown_of_a_body_is_not_told() -> None:
+    engine = Engine.load("walk-hexapod")
+    shown = engine.plausibility.shown(engine.corpus.motion(engine.corpus.clips[0]))
+    known = {name for name, one in shown.items() if one.value is not None or one.most is not None}
+    assert known == {"pace"}
+
+
+def test_limits_survive_the_disk(tmp_path: Path) -> None:
+    BALLET.save(tmp_path / "ballet")
+    opened = Engine.load(str(tmp_path / "ballet")).plausibility
+    np.testing.assert_array_equal(opened.most, BALLET.plausibility.most)
+    np.testing.assert_array_equal(opened.fastest, BALLET.plausibility.fastest)
+
+
+def test_a_corpus_of_two_postures_has_limits() -> None:
+    motion = BALLET.corpus.motion(BALLET.corpus.clips[0])
+    limits = Engine.fit([motion.slice(0, 2), motion.slice(5, 6)]).plausibility
+    assert not any(one.is_beyond for one in limits.shown(motion.slice(0, 2)).values())
+
+
+def test_of_a_long_corpus_pieces_are_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limits of every third piece are near those of all, and cost a third."""
+    monkeypatch.setattr("motionmind.learned.plausibility._MOST", 8_000)
+    fewer = learn_plausibility(BALLET.corpus, BALLET.plausibility.fastest).most
+    assert np.all(fewer <= BALLET.plausibility.most * 1.2)
+    assert np.all(fewer >= BALLET.plausibility.most * 0.6)
+    assert np.any(fewer != BALLET.plausibility.most)
+
+
+def test_trifles_are_not_told() -> None:
+    motion = stretches(BALLET, 1)[0]
+    still = replace(motion, rotations=np.tile(motion.rotations[:1], (31, 1, 1)), root=np.tile(motion.root[:1], (31, 1)))
+    limits = Plausibility(BALLET.plausibility.fastest, np.zeros(len(MEASURES)))
+    trembles = raised(still, 0.0003 * np.sin(np.arange(31)))
+    assert not limits.shown(trembles)["bounce"].is_beyond
+    assert limits.shown(raised(still, 0.003 * np.sin(np.arange(31))))["bounce"].is_beyond

@@ -1,0 +1,148 @@
+"""A duration of its own: it grows with the way, keeps within the corpus's speeds, and `pace` scales it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import Run
+
+from motionmind.body.motion import Posture
+from motionmind.corpus.bundled import bundled
+from motionmind.errors import MotionMindError
+from motionmind.formats import read_posture
+from motionmind.geometry import rotations as rot
+from motionmind.tween.engine import Engine
+from motionmind.tween.request import TweenRequest
+from motionmind.tween.result import Tween
+from motionmind.variation.variation import vary
+
+POSTURES = bundled("corpora") / "ballet" / "postures"
+A, B, PASSE = POSTURES / "arabesque.json", POSTURES / "fifth.json", POSTURES / "passe.json"
+ENDS = read_posture(A), read_posture(B)
+
+
+@pytest.fixture(scope="module", params=["ballet", "walk-hexapod"])
+def engine(request: pytest.FixtureRequest) -> Engine:
+    return Engine.load(request.param)
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+def seconds(tween: Tween) -> float:
+    return float(tween.motion.times[-1])
+
+
+def ends(engine: Engine, seed: int = 0) -> tuple[Posture, Posture]:
+    corpus = engine.corpus
+    pair = np.random.default_rng(seed).integers(len(corpus), size=2)
+    a, b = (Posture(corpus.skeleton, corpus.rotations[k], corpus.root[k]) for k in pair)
+    return a, b
+
+
+def moved(posture: Posture, heights: float, radians: float) -> Posture:
+    """The posture elsewhere, facing elsewhere."""
+    rotations = posture.rotations.copy()
+    rotations[0] = rot.mul(rot.about_vertical(np.array(radians)), rotations[0])
+    return Posture(posture.skeleton, rotations, posture.root + np.array([heights * posture.skeleton.height, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("by", [(1.0, 0.0), (0.0, 1.0)])
+def test_the_farther_the_longer(engine: Engine, by: tuple[float, float]) -> None:
+    a, b = ends(engine)
+    here = Posture(b.skeleton, b.rotations, a.root)
+    heading = float(rot.heading(here.rotations[0]) - rot.heading(a.rotations[0]))
+    here = moved(here, 0.0, -heading)  # so that every turn is a longer one
+    taken = [seconds(engine.tween(a, moved(here, by[0] * far, by[1] * far))) for far in (0.0, 0.7, 1.5, 3.0)]
+    # Moves take as long as the corpus takes for those that a path makes, which is another one each time.
+    assert all(after > 0.9 * before for before, after in pairwise(taken))
+    assert taken[-1] > 1.2 * taken[0]
+
+
+def test_it_takes_about_as_long_as_the_corpus_does(engine: Engine) -> None:
+    off = []
+    for seed in range(12):
+        tween = engine.tween(*ends(engine, seed))
+        (time,) = tween.times
+        off.append(np.log(seconds(tween) / max(time.median, time.least)))
+    assert abs(np.median(off)) < 0.25
+
+
+def test_without_pace_fewer_moves_are_made(engine: Engine) -> None:
+    own = [engine.tween(*ends(engine, seed)).moves for seed in range(8)]
+    fewer = [engine.tween(*ends(engine, seed), without=["pace"]).moves for seed in range(8)]
+    assert np.mean(fewer) < np.mean(own)
+
+
+def test_the_choice_does_not_depend_on_what_else_might_have_been_chosen(engine: Engine) -> None:
+    own = engine.tween(*ends(engine))
+    more = engine.tween(*ends(engine), max_moves=2 * own.moves + 30)
+    assert own.length is not None
+    assert more.length is not None
+    assert (more.moves, more.length.cost) == (own.moves, pytest.approx(own.length.cost))
+    assert engine.tween(*ends(engine), max_moves=own.moves - 1).moves == own.moves - 1
+    assert engine.tween(*ends(engine), moves=(own.moves + 1, own.moves + 4)).moves == own.moves + 1
+
+
+@pytest.mark.parametrize("asked", [{"guide": 0.0}, {"coordination": "progression"}, {"pin": {"left_wrist": "A"}}])
+def test_it_is_chosen_in_the_same_way_whatever_else_is_asked(ballet: Engine, asked: dict[str, Any]) -> None:
+    found = ballet.tween(*ENDS, **asked)
+    assert found.length is not None
+    assert found.length.lower_bound_elsewhere >= found.length.cost - 1e-6
+    assert abs(found.moves - ballet.tween(*ENDS).moves) <= 1
+    assert found.status == "optimal"
+
+
+def test_each_segment_between_vias_has_its_time(ballet: Engine) -> None:
+    near, far = read_posture(PASSE), moved(read_posture(PASSE), 2.0, 0.0)
+    usual = ballet.tween(*ENDS, via=[near])
+    goes = ballet.tween(*ENDS, via=[far])
+    assert usual.moves > ballet.tween(*ENDS).moves
+    assert len(usual.times) == len(goes.times) == 2
+    legs = [np.diff([0, *tween.passed, tween.moves]) for tween in (usual, goes)]
+    assert np.all(legs[1] >= legs[0])
+    assert legs[1].sum() > legs[0].sum()
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.25, 2.0])
+def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> None:
+    own, other = (engine.tween(*ends(engine), pace=one) for one in (1.0, pace))
+    assert other.moves == own.moves
+    assert seconds(other) == pytest.approx(seconds(own) / pace, abs=1.0 / 30.0)
+    for end, frame in (("a", 0), ("b", -1)):
+        np.testing.assert_array_equal(other.motion.rotations[frame], own.motion.rotations[frame], err_msg=end)
+    given = engine.tween(*ends(engine), pace=pace, moves=4)
+    assert seconds(given) == pytest.approx(seconds(engine.tween(*ends(engine), moves=4)) / pace, abs=0.1)
+
+
+@pytest.mark.parametrize("asked", [{"pace": 0.0}, {"pace": -1.0}, {"pace": np.inf}, {"pace": 1.2, "duration": 2.0}])
+def test_a_pace_that_cannot_be_is_refused(asked: dict[str, float]) -> None:
+    with pytest.raises(MotionMindError, match="pace"):
+        TweenRequest(**asked)  # type: ignore[arg-type]
+
+
+def test_insertions_of_variations_take_it(ballet: Engine) -> None:
+    piece = ballet.corpus.motion(ballet.corpus.clips[0])
+    times = {}
+    for pace in (1.0, 2.0):
+        variation = vary(piece, ballet, nudge=1.0, length=30, alternatives=1, pace=pace)
+        made = [seam.insertion.motion for seam in variation.seams if seam.insertion]
+        assert made
+        times[pace] = [float(motion.times[-1]) for motion in made]
+    np.testing.assert_allclose(times[1.0], np.multiply(2.0, times[2.0]), atol=0.15)
+
+
+def test_the_command_line_takes_it(run: Run) -> None:
+    own, fast, old = (
+        run("tween", A, B, "--corpus", "ballet", *asked, "--report", "-").json
+        for asked in ((), ("--pace", 2), ("--without", "pace"))
+    )
+    assert fast["times"][-1] == pytest.approx(own["times"][-1] / 2.0, abs=0.05)
+    assert (fast["asked"]["pace"], fast["moves"]) == (2.0, own["moves"])
+    assert old["moves"] < own["moves"]
+    assert run("tween", A, B, "--corpus", "ballet", "--pace", 0).code == 2
