@@ -33,7 +33,7 @@ def named(name: str) -> Posture:
 
 
 def in_the_air() -> Posture:
-    """the highest posture."""
+    """The highest posture of the jumps on the spot."""
     corpus = Engine.load("ballet").corpus
     motion = corpus.motion(next(clip for clip in corpus.clips if clip.name == "sautes"))
     return motion.posture(int(lowest_height(motion.skeleton, motion.rotations, motion.root).argmax()))

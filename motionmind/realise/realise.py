@@ -19,7 +19,7 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.ground import set_on_floor
+from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
@@ -122,20 +122,28 @@ def realise(
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     trust = walk.trust[:, 0]
-    rotations, root = set_on_floor(
-        a.skeleton,
-        rotations,
-        clock.frames,
+    aloft = walk.moments @ carriage.aloft
+    stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
         np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
         walk.moments @ carriage.stands,
+        aloft,
+        size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
+        size * travel,
+        size * float(carriage.overhang[0]),
+    )
+    rotations, root = set_on_floor(
+        a.skeleton,
+        rotations,
+        clock.frames,
+        stance,
         carriage.loose,
         fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
-        size * travel,
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
+        without,
     )
     if "limbs" not in without:
         given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
