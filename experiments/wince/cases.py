@@ -3,7 +3,8 @@
     python experiments/wince/cases.py FOLDER [--case NAME ...]
 
 Each is a tween of the bundled ballet with nothing asked of it, in twelve postures evenly spread over its time, at half
-the size of a contact sheet. The handstand is the fifth position of the arms and feet, upside down and with its hands on the floor.
+the size of a contact sheet. The handstand is the fifth position of the arms and feet, upside down, with its hands
+on the floor.
 """
 
 from __future__ import annotations
