@@ -14,7 +14,7 @@ from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
-LOOSE = 0.08  # of a leg's length, as `legs.SOFT`, of one that swings
+LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
 SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
