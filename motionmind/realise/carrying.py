@@ -109,7 +109,7 @@ def carry(
             known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
         )
     flying = flying_frames(flights, (hovering[0], hovering[1]), count)
-    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
+    bearing = find_bearing(shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
     touches = bearing.touching(shape)

@@ -246,7 +246,9 @@ def bend_legs(
     out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * loads
     for number, foot in enumerate(feet):
         hip, knee, end = chain = foot.chain(skeleton)
-        thigh, shank = reach(turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge, soft[:, number])
+        thigh, shank = reach(
+            turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge, soft[:, number]
+        )
         thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
         out[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
         out[:, knee] = rot.inv_mul(thigh, shank)
