@@ -96,6 +96,16 @@ class Bearing(NamedTuple):
     targets: Floats
     others: Floats
 
+    def holds(self, fps: float) -> Floats:
+        """Return how much each foot holds its place [N, feet], from 0 to 1: 1 while it stands, fading as it swings."""
+        out = self.stands.astype(np.float64)
+        fades = max(1, round(LOADS * fps))
+        for away in range(1, min(fades, len(out))):
+            share = 1.0 - away / fades
+            out[away:] = np.maximum(out[away:], share * self.stands[:-away])
+            out[:-away] = np.maximum(out[:-away], share * self.stands[away:])
+        return out
+
     def touching(self, shape: Shape) -> Bools:
         """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
         out = np.zeros(shape.places.shape[:2], dtype=np.bool_)

@@ -57,13 +57,13 @@ class Carried(NamedTuple):
     Attributes:
         root: positions of the root [N, 3], metres.
         off: displacements of the feet from where the rotations have them [N, feet, 3], metres.
-        loads: how much of the weight each foot bears [N, feet], from 0 to 1.
+        holds: how much each foot holds its place [N, feet], from 0 to 1.
         heights: of the feet's lowest points that these lead to [N, feet], metres.
     """
 
     root: Floats
     off: Floats
-    loads: Floats
+    holds: Floats
     heights: Floats
 
 
@@ -112,7 +112,7 @@ def carry(
     bearing = find_bearing(shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
-    touches = bearing.touching(shape)
+    touches, holds = bearing.touching(shape), bearing.holds(fps)
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
@@ -141,8 +141,8 @@ def carry(
             places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
             stances, leg = bearing.stances[number], foot.length(skeleton)
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
-        posed = bend_legs(skeleton, rotations, start, feet, off, bearing.loads)
-    return Carried(start, off, bearing.loads, shape.low + start[:, 1:2] + off[..., 1])
+        posed = bend_legs(skeleton, rotations, start, feet, off, holds)
+    return Carried(start, off, holds, shape.low + start[:, 1:2] + off[..., 1])
 
 
 def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:

@@ -230,7 +230,7 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
 
 
 def bend_legs(
-    skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot], off: Floats, loads: Floats
+    skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot], off: Floats, holds: Floats
 ) -> Floats:
     """Return rotations [N, J, 4] whose legs bring the feet to their places; feet keep their orientations.
 
@@ -240,10 +240,10 @@ def bend_legs(
         root: positions of the root [N, 3], metres.
         feet: those to place.
         off: how far each is from where the rotations have it [N, feet, 3], metres.
-        loads: how much of the weight each bears [N, feet], from 0 to 1: legs that swing keep their knees loose.
+        holds: how much each holds its place [N, feet], from 0 to 1: legs that swing keep their knees loose.
     """
     turned, places = skeleton.global_rotations(rotations), skeleton.positions_and_tips(rotations, root)
-    out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * loads
+    out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * holds
     for number, foot in enumerate(feet):
         hip, knee, end = chain = foot.chain(skeleton)
         thigh, shank = reach(

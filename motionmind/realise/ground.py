@@ -180,7 +180,7 @@ def _reach_floor(
     if not joints:
         return out, carried.root
     for again in (True, False):
-        planted = bend_legs(skeleton, rotations, carried.root, feet, off, carried.loads)
+        planted = bend_legs(skeleton, rotations, carried.root, feet, off, carried.holds)
         out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
         if again:
             missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
