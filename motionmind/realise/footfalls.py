@@ -27,7 +27,7 @@ ALONE = 30.0  # a second: cost of swinging where nothing else bears the body
 OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
 CROSSES = 4.0  # how much more it costs to be off the track towards the other feet than elsewhere
 SHIFTS = 0.08  # seconds in which a body shifts its weight from one foot to another
-SOON = 6.0  # a second: cost of swinging before that
+SOON = 12.0  # a second: cost of swinging before that
 SLIPS = 0.02  # metres that a foot may slip without a step
 
 
