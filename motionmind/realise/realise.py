@@ -125,12 +125,15 @@ def realise(
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
+    given = [0, *(2 * move for move in through), -1]
+    flies = trusted * aloft
+    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
         trusted,
         walk.moments @ carriage.stands,
-        trusted * aloft,
+        flies,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
         size * float(carriage.overhang[0]),
