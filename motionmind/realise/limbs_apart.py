@@ -75,7 +75,7 @@ class _Placed(NamedTuple):
 def keep_limbs_apart(
     skeleton: Skeleton,
     rotations: Floats,
-    root: Floats,
+    root: Floats | None,
     times: Floats,
     given: Floats,
     fixed: Bools,
@@ -86,7 +86,7 @@ def keep_limbs_apart(
     Args:
         skeleton: the body; if it has no capsules, nothing changes.
         rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
+        root: positions of the root [N, 3], metres; None where they are not known yet, and no foot stands anywhere.
         times: of the frames [N], seconds, evenly spaced.
         given: times of postures that must not change, in frames, whole or not, from the first to the last [G]. The
             frames next to them do not change either.
@@ -108,7 +108,8 @@ def keep_limbs_apart(
         return rotations
     limbs = _limbs_of(skeleton, capsules)
     still = np.zeros((len(rotations), 4))
-    still[:, :2] = _standing(capsules, places + root[:, None], fps)
+    if root is not None:
+        still[:, :2] = _standing(capsules, places + root[:, None], fps)
     placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], still)
     sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
     frozen = np.isin(frames, held + np.array([[-1], [0], [1]]))
@@ -127,6 +128,8 @@ def keep_limbs_apart(
         _turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)
     out = _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+    if root is None:
+        return out
     lowest = lowest_height(skeleton, rotations, root)
     floor = np.minimum(lowest, np.linspace(lowest[0], lowest[-1], len(lowest)))
     return _lift_feet(skeleton, out, root, floor, fixed, frozen, fps)
