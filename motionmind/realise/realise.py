@@ -127,12 +127,13 @@ def realise(
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
+    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
-        np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
+        trusted,
         walk.moments @ carriage.stands,
-        aloft,
+        trusted * aloft,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
         size * float(carriage.overhang[0]),
