@@ -230,6 +230,7 @@ REPORT = [
     "gap",
     "moves",
     "length",
+    "tempo",
     "expansions",
     "peak_nodes",
     "node_budget",
