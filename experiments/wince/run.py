@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import FPS, engine, recorded
 from experiments.wince.dancers import MEASURES, Dancers, Seen, dancers, nearer, on_the_same_spot, see
 from motionmind import Motion, NoPathError, Posture
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import standing_rise
 from motionmind.geometry import rotations as rot
@@ -131,8 +132,8 @@ def _row(
     }
 
 
-def _is_falling(accelerations: Floats) -> Floats:
-    return np.abs(accelerations + GRAVITY) < NEAR_GRAVITY * GRAVITY
+def _is_falling(accelerations: Floats) -> Bools:
+    return np.asarray(np.abs(accelerations + GRAVITY) < NEAR_GRAVITY * GRAVITY)
 
 
 def _share_of_falls(accelerations: list[Floats]) -> float:
@@ -246,16 +247,7 @@ def _falls(rows: list[Row]) -> str:
 
 
 def _spearman(rows: list[Row], name: str) -> float:
-    seconds, other = _ranks(_all(rows, "seconds")), _ranks(_all(rows, name))
-    return (
-        float(np.corrcoef(np.stack([seconds, other]))[0, 1]) if min(seconds.std(), other.std()) > 0.0 else float("nan")
-    )
-
-
-def _ranks(values: Floats) -> Floats:
-    """Ranks of values, those of equal ones their mean."""
-    _, inverse, counts = np.unique(values, return_inverse=True, return_counts=True)
-    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[inverse])
+    return float(spearmanr(_all(rows, "seconds"), _all(rows, name)).statistic)
 
 
 def chart(rows: list[Row]) -> str:

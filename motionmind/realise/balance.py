@@ -21,7 +21,14 @@ SWAYS = 0.5  # seconds in which a body that is given beyond its support comes ba
 
 
 def balance_rows(
-    points: Floats, touches: Bools, centre: Floats, own: Floats, height: Floats, overhang: float, fps: float
+    points: Floats,
+    touches: Bools,
+    centre: Floats,
+    own: Floats,
+    height: Floats,
+    overhang: float,
+    gravity: float,
+    fps: float,
 ) -> list[Rows]:
     """Return rows for the root's trajectory that bring the weight back over the support where it is beyond it.
 
@@ -32,9 +39,10 @@ def balance_rows(
         own: the same relative to the root.
         height: of the centre of mass above the floor [N], metres.
         overhang: how far beyond the support the centre of mass may be, metres.
+        gravity: metres a second squared.
         fps: frames a second.
     """
-    lever = np.maximum(height, 0.1)[1:-1] / GRAVITY * fps**2
+    lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
     pressure = centre.copy()
     pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
     since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)[:, None]

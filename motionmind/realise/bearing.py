@@ -18,7 +18,8 @@ BEARS = 4  # a limb bears the body by this power of how firmly it stands
 TOUCHES = 0.03  # metres above a limb's lowest point below which another point of it touches the floor
 MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
 LOADS = 0.12  # seconds in which a foot takes over the body's weight
-NEAR = 0.06  # metres within which a foot is in one place
+ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
+NEAR = 0.1  # metres within which a foot is in one place
 
 
 class Shape(NamedTuple):
@@ -104,7 +105,9 @@ class Bearing(NamedTuple):
         return out
 
 
-def find_bearing(shape: Shape, root: Floats, firm: Floats, flying: Bools, feet: list[Foot], fps: float) -> Bearing:
+def find_bearing(
+    shape: Shape, root: Floats, firm: Floats, flying: Bools, staying: int | None, feet: list[Foot], fps: float
+) -> Bearing:
     """Find what bears a body, and where its feet step.
 
     Args:
@@ -112,6 +115,7 @@ def find_bearing(shape: Shape, root: Floats, firm: Floats, flying: Bools, feet: 
         root: level places of the root on which feet would slide to where they have to be [N, 2], metres.
         firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
         flying: whether the body is in the air [N].
+        staying: a foot that stands throughout, or None.
         feet: its feet.
         fps: frames a second.
     """
@@ -123,10 +127,9 @@ def find_bearing(shape: Shape, root: Floats, firm: Floats, flying: Bools, feet: 
     costs = [standing_costs(shape.low[:, k] - low[:, 0], firm[:, foot.limb]) for k, foot in enumerate(feet)]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
-    for k in _staying(tracks, stands, rests):
-        if not flying.any():
-            costs[k] = np.zeros(len(root)), np.full(len(root), np.inf)
-            stands[:, k] = True
+    if staying is not None:
+        costs[staying] = np.zeros(len(root)), np.full(len(root), np.inf)
+        stands[:, staying] = True
     stances: list[list[Stance]] = [[] for _ in feet]
     for _ in range(2):  # each foot steps where others stand, as they did the last time
         for k in range(len(feet)):
@@ -144,13 +147,20 @@ def find_bearing(shape: Shape, root: Floats, firm: Floats, flying: Bools, feet: 
     return Bearing(stances, loads, stands, places - shape.tracks, others)
 
 
-def _staying(tracks: Floats, stands: Bools, rests: Bools) -> list[int]:
-    """Return the feet that stay where they stand throughout: one that alone bears at both ends, in one place."""
-    if stands.shape[1] == 0:
-        return []
-    far = np.linalg.norm(tracks[-1] - tracks[0], axis=-1)
-    alone = [stands[end].sum() == 1 and not rests[end] for end in (0, -1)]
-    return [int(k) for k in np.flatnonzero(stands[0] & stands[-1] & (far < NEAR))] if all(alone) else []
+def find_staying(shape: Shape, root: Floats) -> int | None:
+    """Return the foot that stays where it stands: one that bears alone in the first and in the last frame, in one place.
+
+    Args:
+        shape: the body.
+        root: level places of the root [N, 2], metres.
+    """
+    low = np.concatenate([shape.low, shape.low_others], axis=1)[[0, -1]]
+    bears = low < low.min(axis=1, keepdims=True) + ALONE
+    if np.any(bears.sum(axis=1) != 1) or np.any(bears[0] != bears[1]) or not bears[0, : shape.low.shape[1]].any():
+        return None
+    foot = int(bears[0].argmax())
+    moved = shape.tracks[-1, foot] + root[-1] - shape.tracks[0, foot] - root[0]
+    return foot if np.linalg.norm(moved) < NEAR else None
 
 
 def _load(stance: Stance, count: int, fps: float) -> Floats:

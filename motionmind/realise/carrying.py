@@ -17,7 +17,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
 from motionmind.realise.balance import balance_rows
-from motionmind.realise.bearing import Bearing, Shape, find_bearing, lowest, points_of_feet, shape_of
+from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
@@ -74,6 +74,7 @@ def carry(
     feet: list[Foot],
     known: Ends,
     overhang: float,
+    gravity: float,
     fps: float,
     without: Collection[Correction],
 ) -> Carried:
@@ -88,6 +89,7 @@ def carry(
         feet: those that may be placed.
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
+        gravity: metres a second squared.
         fps: frames a second.
         without: corrections to leave out.
     """
@@ -97,12 +99,15 @@ def carry(
     standing = floor - shape.lowest
     hovering = [known.aloft[end] > SURELY and root[end, 1] - standing[end] > HOVERS for end in (0, -1)]
     flights = []
-    if "flight" not in without:
+    staying = None if any(hovering) else find_staying(shape, root[:, [0, 2]])
+    if "flight" not in without and staying is None:
         masses = root[[0, -1], 1] + mass[[0, -1], 1]
         up = standing + mass[:, 1]
-        flights = find_flights(known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, fps)
+        flights = find_flights(
+            known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
+        )
     flying = flying_frames(flights, (hovering[0], hovering[1]), count)
-    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, feet, fps)
+    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, feet, fps)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
     touches = bearing.touching(shape)
@@ -116,7 +121,7 @@ def carry(
         steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += _prior_rows(root, bearing, fps)
         steady += _standing_rows(shape, bearing, floor, leg_freedom(flights, count, fps))
-        steady += flight_rows(flights, mass, standing, fps)
+        steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start)]
             rows += _reach_rows(skeleton, places, shape, bearing, floor, start, feet, fps)
@@ -126,7 +131,7 @@ def carry(
                     points[:, own] += (bearing.targets[:, number] - start[:, [0, 2]])[:, None]
                 centre, level = start + mass, [0, 2]
                 height = centre[:, 1] - floor
-                rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, fps)
+                rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
             start = solve(rows, start, fixed)
         for number, foot in enumerate(feet):
             height = shape.low[:, number] + start[:, 1] - floor

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.realise.balance import GRAVITY
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
@@ -45,6 +44,7 @@ def find_flights(
     masses: Floats,
     hovering: tuple[bool, bool],
     rates: tuple[float | None, float | None],
+    gravity: float,
     fps: float,
 ) -> list[Flight]:
     """Return the flights of a movement, in order.
@@ -56,6 +56,7 @@ def find_flights(
         masses: its height in the first and in the last frame [2], metres.
         hovering: whether the first and the last posture are in the air.
         rates: its vertical velocities there, metres a second; None where unknown.
+        gravity: metres a second squared.
         fps: frames a second.
     """
     last = len(aloft) - 1
@@ -63,10 +64,12 @@ def find_flights(
     first = second = None
     push = PUSHES * fps
     if hovering[0]:
-        lands, rate = _time_of_fall(standing, masses[0], None if rates[0] is None else -rates[0], last - push, fps)
+        lands, rate = _time_of_fall(
+            standing, masses[0], None if rates[0] is None else -rates[0], last - push, gravity, fps
+        )
         first = Flight(0, lands, (-rate, None))
     if hovering[1]:
-        back, rate = _time_of_fall(standing[::-1], masses[1], rates[1], last - push, fps)
+        back, rate = _time_of_fall(standing[::-1], masses[1], rates[1], last - push, gravity, fps)
         rises = last - back
         second = Flight(rises, last, (None, rate))
     if first and second and lands + push > rises:
@@ -79,7 +82,7 @@ def find_flights(
             continue
         share, frames = aloft[start:stop], np.arange(start, stop)
         height = float(share @ leaps[start:stop] / share.sum())
-        seconds = min(2.0 * np.sqrt(2.0 * height / GRAVITY), LONGEST)
+        seconds = min(2.0 * np.sqrt(2.0 * height / gravity), LONGEST)
         # Walks jump at different moments: so many of their flights are expected in this time.
         count = round(share.sum() / (seconds * fps))
         middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
@@ -93,7 +96,9 @@ def find_flights(
     return [*out, second] if second else out
 
 
-def _time_of_fall(standing: Floats, mass: float, rate: float | None, longest: float, fps: float) -> tuple[int, float]:
+def _time_of_fall(
+    standing: Floats, mass: float, rate: float | None, longest: float, gravity: float, fps: float
+) -> tuple[int, float]:
     """Return the frames before a body in the air came off the floor, and its vertical velocity in the air.
 
     Args:
@@ -101,14 +106,15 @@ def _time_of_fall(standing: Floats, mass: float, rate: float | None, longest: fl
         mass: its height in the air, metres.
         rate: its velocity there, metres a second, upward; None for the top of the flight, if there is time for it.
         longest: how many frames it may take.
+        gravity: metres a second squared.
         fps: frames a second.
     """
     seconds = np.arange(len(standing)) / fps
     if rate is None:
         rise = max(mass - float(standing.min()), 0.01)
         most = max(longest, 2.0) / fps
-        rate = max(rise / most - 0.5 * GRAVITY * most, 0.0)
-    heights = mass - rate * seconds - 0.5 * GRAVITY * seconds**2
+        rate = max(rise / most - 0.5 * gravity * most, 0.0)
+    heights = mass - rate * seconds - 0.5 * gravity * seconds**2
     below = np.flatnonzero(heights[1:] <= standing[1:])
     return (int(below[0]) + 1 if len(below) else len(standing) - 1), rate
 
@@ -133,13 +139,14 @@ def leg_freedom(flights: list[Flight], count: int, fps: float) -> Floats:
     return out
 
 
-def flight_rows(flights: list[Flight], own: Floats, standing: Floats, fps: float) -> list[Rows]:
+def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: float, fps: float) -> list[Rows]:
     """Return rows for the root's trajectory that let the centre of mass fall freely in flights.
 
     Args:
         flights: the flights.
         own: the centre of mass relative to the root [N, 3], metres.
         standing: height of the root if the lowest point were on the floor [N], metres.
+        gravity: metres a second squared.
         fps: frames a second.
     """
     count = len(own)
@@ -153,11 +160,11 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, fps: float
             (flight.rates[1], count - 3, 1.0, (0.0, -fps, fps)),
         ):
             if rate is not None:
-                target = rate + sign * 0.5 * GRAVITY / fps - np.array(shares) @ own[first : first + 3, 1]
+                target = rate + sign * 0.5 * gravity / fps - np.array(shares) @ own[first : first + 3, 1]
                 row = difference_rows(1, shares, np.array([target]), np.array([RATE**-2.0]))
                 leaves.append(row._replace(first=np.array([first])))
     rows = []
-    for axis, falls, spread in ((0, 0.0, FALLS[1]), (1, -GRAVITY, FALLS[0]), (2, 0.0, FALLS[1])):
+    for axis, falls, spread in ((0, 0.0, FALLS[1]), (1, -gravity, FALLS[0]), (2, 0.0, FALLS[1])):
         target = falls - fps**2 * np.diff(own[:, axis], 2)
         rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), target, weights * spread**-2.0))
     frames = np.array(at, dtype=np.int64)

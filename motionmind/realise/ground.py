@@ -9,6 +9,7 @@ weight stays over the support (`motionmind.realise.root`). The legs then reach f
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,7 +18,9 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import size_of
 from motionmind.geometry.splines import natural_spline
+from motionmind.realise.balance import GRAVITY
 from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import Foot, bend_legs, fade_at_ends, find_free_feet
@@ -48,6 +51,11 @@ class Stance(NamedTuple):
     drift: Floats
     overhang: float
 
+    def scaled(self, by: float) -> Stance:
+        """Return the same of a body of another size."""
+        lengths = ("clearance", "leaps", "drift", "overhang")
+        return self._replace(**{name: by * getattr(self, name) for name in lengths})
+
 
 def set_on_floor(
     skeleton: Skeleton,
@@ -63,6 +71,8 @@ def set_on_floor(
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
 
+    Bodies of all sizes are set down as one as large as a person, on whom the constants were chosen.
+
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
@@ -76,6 +86,34 @@ def set_on_floor(
         rates: its first and its last velocity [3], metres a second; None where unknown.
         without: corrections to leave out.
     """
+    size = size_of(skeleton)
+    small = replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
+    lows = {move: height / size for move, height in low.items()}
+    near = (ends[0] / size, ends[1] / size)
+    slow = (None if rates[0] is None else rates[0] / size, None if rates[1] is None else rates[1] / size)
+    gravity = GRAVITY / size
+    placed = _set_down(
+        small, rotations, times, stance.scaled(1.0 / size), loose, fixed, lows, near, slow, gravity, without
+    )
+    root = size * placed[1]
+    root[0], root[-1] = ends
+    return placed[0], root
+
+
+def _set_down(
+    skeleton: Skeleton,
+    rotations: Floats,
+    times: Floats,
+    stance: Stance,
+    loose: Bools,
+    fixed: Bools,
+    low: Mapping[int, float],
+    ends: tuple[Floats, Floats],
+    rates: tuple[Floats | None, Floats | None],
+    gravity: float,
+    without: Collection[Correction],
+) -> tuple[Floats, Floats]:
+    """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
     half_steps, given = stance.half_steps, 2 * np.array(list(low))
     under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]))
     at_half_steps = stance.clearance + under
@@ -116,6 +154,7 @@ def set_on_floor(
             feet,
             known,
             stance.overhang,
+            gravity,
             fps,
             without,
         )

@@ -21,6 +21,7 @@ from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
+from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
 from motionmind.realise.retime import keep_pace
@@ -123,12 +124,13 @@ def realise(
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
+    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
-        np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
+        trusted,
         walk.moments @ carriage.stands,
-        aloft,
+        trusted * aloft,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
         size * float(carriage.overhang[0]),
@@ -147,7 +149,11 @@ def realise(
     )
     if "limbs" not in without:
         given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
-        may_not = fixed[: len(a.skeleton)]
+        # As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
+        legs = [joint for leg, _ in find_legs(a.skeleton)[1] for joint in leg]
+        may_not = np.where(
+            np.isin(np.arange(len(a.skeleton)), legs), *(each[: len(a.skeleton)] for each in (fixed, wished))
+        )
         rotations = keep_limbs_apart(a.skeleton, rotations, root, clock.frames, given, may_not, carriage.touches)
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 

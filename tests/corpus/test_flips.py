@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionmind import Engine, own_skeleton, read_motion
+from motionmind import Engine, explain, own_skeleton, read_motion
 from motionmind._typing import Floats
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.flips import find_flips, repair_flips
 from motionmind.corpus.gather import gather
+from motionmind.discretize import Codebook
 from motionmind.geometry import rotations as rot
 from motionmind.tween.certificate import source_of
 
@@ -246,6 +247,16 @@ def test_sources_say_what_was_reconstructed() -> None:
         assert ankle.reconstructed == (posture in (9, 10))  # 0.9 to 1.1 s; the fault is at 1.0 to 1.1 s
         assert not hip.reconstructed
         assert source_of(corpus, posture + 1, posture, "left_ankle").reconstructed == ankle.reconstructed
+
+
+def test_an_explanation_says_what_was_reconstructed() -> None:
+    engine = Engine.fit([mixed_faults()], name="legs", rate=10.0, discretization=Codebook(2.0))
+    corpus = engine.corpus
+    a, b = (Posture(corpus.skeleton, corpus.rotations[i], corpus.root[i]) for i in (9, 10))
+    told = explain(engine.tween(a, b, moves=1))  # as recorded, but for the ankle at B
+    marked = [one.joint for one in told.moves[0].joints if one.source and one.source.reconstructed]
+    assert marked == ["left_ankle"]
+    assert str(told).count(" s, reconstructed)") == 1
 
 
 def test_what_was_mended_is_saved_and_summarised(tmp_path: Path) -> None:

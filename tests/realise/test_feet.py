@@ -116,7 +116,7 @@ def test_feet_slide_much_less_and_all_but_legs_and_root_stay() -> None:
 def test_the_body_is_not_lifted_onto_the_toes_of_a_leg_that_works() -> None:
     """On one leg, the other points its foot down until it would be 6 cm in the floor: the standing foot stays on it."""
     skeleton, frames = human23(), 46
-    q = on_one_leg(frames, 25.0)
+    q = on_one_leg(frames, 45.0)
     ankle = skeleton.index("left_ankle")
     point = 0.9 * np.sin(np.linspace(0.0, np.pi, frames)) ** 2
     q[:, ankle] = rot.mul(q[:, ankle], rot.from_axis_angle([1.0, 0.0, 0.0], point))
@@ -305,7 +305,7 @@ def test_a_jump_on_the_way_lasts_as_long_as_its_height_asks() -> None:
 
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     still, leaps = np.full(31, 1.0), np.full(31, 0.3)
-    on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), 30.0)
+    on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY, 30.0)
     middle = np.zeros(31)
     middle[9:22] = 1.0
     (flight,) = find_flights(middle, leaps, still, *on_floor)
@@ -313,7 +313,9 @@ def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     short = find_flights(middle[10:21], leaps[10:21], still[10:21], *on_floor)
     assert all(one.end - one.start < 6 for one in short)
     # Between two postures in the air, so near that there is no time to land, all of it is flight.
-    (whole,) = find_flights(np.ones(13), leaps[:13], still[:13], np.array([1.2, 1.2]), (True, True), (None, None), 30.0)
+    (whole,) = find_flights(
+        np.ones(13), leaps[:13], still[:13], np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
+    )
     assert (whole.start, whole.end) == (0, 12)
     first, last = find_flights(
         np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), 30.0
