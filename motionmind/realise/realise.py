@@ -114,7 +114,7 @@ def realise(
         if fastest is not None:
             moving = leaving is not None, arriving is not None
             missing = (b.root - a.root) / size - travel.sum(axis=0)
-            longer *= keep_pace(walk, corpus, fastest, travel + missing / len(travel), moving)
+            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
