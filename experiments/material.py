@@ -13,7 +13,7 @@ import numpy as np
 
 from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
 from motionmind._typing import Ints
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.corpus.gather import gather
 from motionmind.metrics import find_floor
 from motionmind.metrics.measure import at_rate
@@ -79,11 +79,14 @@ def part(whole: Corpus, clips: Sequence[int], mirror: bool = False) -> Corpus:
 
 @lru_cache(maxsize=24)
 def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]]:
-    """The unbroken pieces of each sequence of a corpus that has one of more than so many frames, at 30 a second."""
+    """The unbroken pieces of each sequence of a corpus that has one of more than so many frames, at 30 a second.
+
+    Where a recording was reconstructed nobody knows what was danced: it is left out.
+    """
     if name in RECORDED:
         assert data is not None
         whole = gather(name, recordings(data, name), rate=FPS)
-        pieces = [whole.motion(clip) for clip in whole.clips]
+        pieces = [piece for clip in whole.clips for piece in as_recorded(whole.motion(clip), clip)]
     else:
         whole = corpus(data, name)
         pieces = [at_rate(whole.recording(clip)) for clip in whole.clips]
@@ -91,6 +94,16 @@ def movement(data: str | None, name: str, frames: int) -> dict[str, list[Motion]
     for piece in pieces:
         out.setdefault(take_of(piece.name), []).append(piece)
     return {name: pieces for name, pieces in out.items() if any(len(piece) > frames for piece in pieces)}
+
+
+def as_recorded(motion: Motion, clip: Clip) -> list[Motion]:
+    """The pieces of a clip between the frames that were reconstructed."""
+    step, known = 1.0 / FPS, np.ones(len(motion) + 2, dtype=bool)
+    known[[0, -1]] = False
+    for first, last in (repair.seconds for repair in clip.repairs if not repair.exact):
+        known[1:-1] &= (motion.times < first - step) | (motion.times > last + step)
+    edges = np.flatnonzero(np.diff(known))
+    return [motion.slice(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
 def take_of(name: str) -> str:

@@ -28,6 +28,7 @@ RULES: dict[str, dict[str, Any]] = {
 BUDGET = 20_000
 FPS = 30.0
 RARE = 99.0  # percentile of the corpus's own frames
+STILL = 0.01  # rad/s: what a joint that never moves in a recording turns by rounding alone is less
 
 
 def jobs(setting: Setting) -> list[dict[str, Any]]:
@@ -118,6 +119,7 @@ def usual(found: Engine) -> Usual:
     whole = found.corpus
     clips = [at_rate(whole.recording(clip)) for clip in whole.clips]
     speed = np.percentile(np.concatenate([angular_speed(clip.rotations, FPS) for clip in clips]), RARE, axis=0)
+    speed = np.maximum(speed, STILL)
     long = [clip.rotations for clip in clips if len(clip) > 3]
     jerk = np.percentile(np.concatenate([angular_jerk(q, FPS) for q in long]), RARE, axis=0)
     own = [

@@ -2,8 +2,9 @@
 
     python experiments/wince/cases.py FOLDER [--case NAME ...]
 
-Each is a tween of the bundled ballet with nothing asked of it, in twelve postures evenly spread over its time. The
-handstand is the fifth position of the arms and feet, upside down and with its hands on the floor.
+Each is a tween of the bundled ballet with nothing asked of it, in twelve postures evenly spread over its time, at half
+the size of a contact sheet. The handstand is the fifth position of the arms and feet, upside down, with its hands
+on the floor.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def named(name: str) -> Posture:
 
 
 def in_the_air() -> Posture:
-    """the highest posture."""
+    """The highest posture of the jumps on the spot."""
     corpus = Engine.load("ballet").corpus
     motion = corpus.motion(next(clip for clip in corpus.clips if clip.name == "sautes"))
     return motion.posture(int(lowest_height(motion.skeleton, motion.rotations, motion.root).argmax()))
@@ -81,7 +82,8 @@ def main() -> None:
         tween = engine.tween(*CASES[name]())
         motion = tween.motion
         path = asked.folder / f"{name}.png"
-        path.write_bytes(png(contact_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)))
+        sheet = contact_sheet(motion, evenly(range(len(motion)), SHOWN), columns=SHOWN // 2)
+        path.write_bytes(png(sheet.reduce(2)))
         print(f"{path}: {tween.moves} moves in {motion.times[-1]:.2f} s")
 
 

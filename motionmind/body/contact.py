@@ -166,10 +166,25 @@ def skating(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 
         root: positions of the root joint [T, 3], metres.
         floor: height of the floor, metres; for a recording, from `find_floor`.
     """
+    slides = foot_slides(skeleton, rotations, root, floor)
+    return float((slides > FAR).any(axis=-1).mean()) if len(slides) else 0.0
+
+
+def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats = 0.0) -> Floats:
+    """Return how far each foot near the floor slides to the next frame [T - 1, feet], metres; 0 where it is higher.
+
+    A foot is near the floor where one of its ends (see `skating`) is below 5 cm in both frames; of two such ends that
+    counts which moves least, level.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4].
+        root: positions of the root joint [T, 3], metres.
+        floor: height of the floor, or in each frame [T], metres.
+    """
     moved, height = _foot_ends(skeleton, rotations, root, floor)
-    down = height < LOW
-    skates = np.any(down, axis=-1) & np.all(~down | (moved > FAR), axis=-1)
-    return float(skates.any(axis=-1).mean()) if len(moved) else 0.0
+    least = np.where(height < LOW, moved, np.inf).min(axis=-1)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:
@@ -192,11 +207,11 @@ def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float
     return float(100.0 * np.where(np.isfinite(least), least, 0.0).mean()) if least.size else 0.0
 
 
-def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float) -> tuple[Floats, Floats]:
+def _foot_ends(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float | Floats) -> tuple[Floats, Floats]:
     """Return how far both ends of each foot's last bone move, level, to the next frame, and the greater of their
     heights above the floor in the two frames: [T - 1, feet, 2] each, metres."""
     feet = np.array(find_feet(skeleton), dtype=np.intp)
     places = skeleton.positions_and_tips(rotations, root)[:, np.stack([feet, feet + len(skeleton)], axis=-1)]
     moved = np.hypot(np.diff(places[..., 0], axis=0), np.diff(places[..., 2], axis=0))
-    height = places[..., 1] - floor
+    height = places[..., 1] - np.reshape(floor, (-1, 1, 1))
     return moved, np.maximum(height[1:], height[:-1])

@@ -76,7 +76,7 @@ def at_rate(motion: Motion) -> Motion:
     start, keys = motion.times[0], motion.times
     times = start + np.arange(int(np.floor((keys[-1] - start) * RATE + 1e-3)) + 1) / RATE
     rotations, root = rotation_spline(keys, motion.rotations, times), natural_spline(keys, motion.root, times)
-    return replace(motion, rotations=rotations, root=root, times=times, insertions=())
+    return replace(motion, rotations=rotations, root=root, times=times, insertions=(), keyframed=False)
 
 
 def _lack_of_gravity(heights: Floats, airborne: Bools, fps: float) -> Floats:

@@ -60,11 +60,14 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
     if len(times) > _LONG:
         return _by_pieces(rotation_spline, times, keys, at)
-    vectors = _unroll(rot.log(rot.inv_mul(keys[None], keys[:, None])))
-    piece, bends = _pieces(times, at), _bends(times, vectors)
+    piece = _pieces(times, at)
+    centres = np.union1d(piece, piece + 1)
+    vectors = _unroll(rot.log(rot.inv_mul(keys[centres][None], keys[:, None])), centres)
+    bends = _bends(times, vectors)
 
     def around(key: Ints) -> Floats:
-        ends = vectors[piece, key], vectors[piece + 1, key], bends[piece, key], bends[piece + 1, key]
+        chart = np.searchsorted(centres, key)
+        ends = vectors[piece, chart], vectors[piece + 1, chart], bends[piece, chart], bends[piece + 1, chart]
         return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, *ends)))
 
     s = ((at - times[piece]) / np.diff(times)[piece]).reshape(-1, *(1,) * (keys.ndim - 2))
@@ -82,18 +85,19 @@ def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats
     return out
 
 
-def _unroll(vectors: Floats) -> Floats:
-    """Add whole turns to rotation vectors [K, K, ..., 3], to each key from each centre, radians.
+def _unroll(vectors: Floats, centres: Ints) -> Floats:
+    """Add whole turns to rotation vectors [K, C, ..., 3], radians, to each key from the keys that are `centres` [C].
 
     Each is then nearest to the vector of the neighbouring key towards the centre.
     """
-    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max() < np.pi:
+    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max(initial=0.0) < np.pi:
         return vectors  # all neighbours are that near already
     out = vectors.copy()
     for distance in range(2, len(out)):
         for side in (1, -1):
-            key = np.arange(distance, len(out)) if side > 0 else np.arange(len(out) - distance)
-            centre = key - side * distance
+            key, centre = centres + side * distance, np.arange(len(centres))
+            inside = (key >= 0) & (key < len(out))
+            key, centre = key[inside], centre[inside]
             toward, own = out[key - side, centre], out[key, centre]
             angle = np.linalg.norm(own, axis=-1, keepdims=True)
             # A zero vector may be a whole turn about any axis: take its neighbour's, if that is not zero too.

@@ -8,17 +8,22 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.capsules import penetration
-from motionmind.body.contact import floor_height, lowest_height
+from motionmind.body.contact import contact_points, floor_height, limb_heights, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
 from motionmind.body.limits import find_loose
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
-RARE = 0.01  # share of postures in which limbs may be deeper in each other than they usually are
+LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
+FIRM = 0.5  # how firmly a limb stands that bears
+RARE = 0.01  # share of postures in which limbs may be deeper in each other, or the weight farther out, than usual
+USUAL = 0.08  # metres of overhang, for a corpus that shows none
+MOST = 0.15  # metres of overhang at most: dancers who lean farther are moving
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
 
 
@@ -40,6 +45,9 @@ class Carriage:
         clearance: height of the lowest point above the clip's floor (`floor_height`) [N], metres, at least 0.
         stands: how firmly each limb, and last the trunk, stands [N, limbs + 1]: 1 where its lowest point does not move
             level, near 0 where it moves fast. A foot may be low and slide, as dancers' feet do.
+        aloft: whether the body is in the air at each moment [N], 0 or 1: its lowest point is off the floor, and moves.
+        overhang: how far the centre of mass is beyond its support while one limb bears it, but for RARE postures [1],
+            metres.
         loose: whether each joint breaks its limits in the corpus [J].
         touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
             metres.
@@ -55,6 +63,8 @@ class Carriage:
     travel: Floats
     clearance: Floats
     stands: Floats
+    aloft: Floats
+    overhang: Floats
     loose: Bools
     touches: Floats
 
@@ -72,6 +82,9 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     chains = corpus.to_chains(corpus.rotations)
     orientations = np.concatenate([chains, rot.normalise(rot.slerp(chains[begins], chains[ends], 0.5))])
     middles = len(corpus) + np.arange(len(begins))
+    stands = _standing(corpus)
+    clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
+    aloft = _aloft(corpus, clear)
     return Carriage(
         orientations,
         np.concatenate([corpus.weights, weights]),
@@ -81,8 +94,10 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         clusters_of(corpus.skeleton, orientations),
         0.5 * turned,
         0.5 * moved,
-        np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])]),
-        _standing(corpus),
+        clear,
+        stands,
+        aloft,
+        _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)]),
         find_loose(corpus.skeleton, corpus.rotations),
         _touching(corpus),
     )
@@ -117,6 +132,47 @@ def _standing(corpus: Corpus) -> Floats:
         sums = np.bincount(begins, still, len(corpus)) + np.bincount(ends, still, len(corpus))
         out[: len(corpus), number] = sums / counts
     return out
+
+
+def _aloft(corpus: Corpus, clearance: Floats) -> Floats:
+    """Return whether the body is in the air in each moment [N], 0 or 1, as in Carriage.
+
+    A body on half-pointe, or whose recording's floor is a little off, is as high; but its lowest point hardly moves.
+
+    Args:
+        corpus: the movement.
+        clearance: height of the lowest point above the floor in the moments [N], metres.
+    """
+    begins, ends, size = corpus.moves.begins, corpus.moves.ends, size_of(corpus.skeleton)
+    places, _ = contact_points(corpus.skeleton, corpus.rotations, corpus.root)
+    lowest = np.argmin(places[begins, :, 1] + places[ends, :, 1], axis=1)
+    speed = np.linalg.norm(places[ends, lowest] - places[begins, lowest], axis=-1) / corpus.moves.seconds
+    both, twice = np.concatenate([begins, ends]), np.concatenate([speed, speed])
+    counts = np.maximum(np.bincount(both, minlength=len(corpus)), 1)
+    speeds = np.concatenate([np.bincount(both, twice, len(corpus)) / counts, speed])
+    return np.asarray((clearance > LEAVES * size) & (speeds > STILL * size), dtype=np.float64)
+
+
+def _overhang(corpus: Corpus, stands: Floats, aloft: Floats) -> Floats:
+    """Return how far beyond its support the corpus's bodies have their mass while one limb bears it, as in Carriage.
+
+    Args:
+        corpus: the movement.
+        stands: how firmly each limb, and last the trunk, stands in its postures [N, limbs + 1].
+        aloft: whether the body is in the air there [N].
+    """
+    size = size_of(corpus.skeleton)
+    mass = centre_of_mass(corpus.skeleton, corpus.rotations, corpus.root)
+    low = limb_heights(corpus.skeleton, corpus.rotations, corpus.root)
+    bears = (low <= low.min(axis=1, keepdims=True) + NEAR * size) & (stands > FIRM) & (aloft == 0.0)[:, None]
+    alone = bears.sum(axis=1) == 1
+    if mass is None or not alone.any():
+        return np.array([USUAL * size])
+    places, joints = contact_points(corpus.skeleton, corpus.rotations[alone], corpus.root[alone])
+    near = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
+    supports = near & bears[alone][:, limb_of_points(corpus.skeleton)[joints]]
+    over = overhang(places[..., [0, 2]], supports, mass[alone][:, [0, 2]])
+    return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
 
 
 def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:

@@ -29,7 +29,7 @@ from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
-from motionmind.learned.carriage import Carriage
+from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.learning import Learned, learn
 from motionmind.learned.pace import Pace, learn_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
@@ -52,6 +52,7 @@ _ARRAYS = (
     *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
 )
 _RENAMED = {"carriage.kinds": "carriage.clusters"}  # arrays of corpora built by 0.1: old name -> new
+_ADDED = {"carriage.aloft", "carriage.overhang", "carriage.touches"}  # arrays that corpora built by 0.1 lack
 
 
 def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
@@ -130,8 +131,9 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
-    # Corpora built before 0.2 keep neither of these; they take a second to learn for minutes of movement.
+    # Corpora built before 0.2 keep none of these; they take a second to learn for minutes of movement.
     new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
+    new |= set() if _ADDED & arrays.keys() else {"carriage"}
     missing = [name for name in _ARRAYS if name not in arrays and name.partition(".")[0] not in new]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
@@ -161,7 +163,7 @@ def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
         _part(Bridges, "bridges", arrays),
         _part(Coordination, "coordination", arrays),
     )
-    carriage = _part(Carriage, "carriage", arrays)
+    carriage = learn_carriage(corpus) if "carriage" in new else _part(Carriage, "carriage", arrays)
     pace = learn_pace(corpus) if "pace" in new else _part(Pace, "pace", arrays)
     plausibility = (
         learn_plausibility(corpus, pace.fastest)

@@ -165,7 +165,6 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     clips = [at_rate(corpus.recording(clip)) for clip in corpus.clips]
     seen = [features(clip.rotations) for clip in clips]
     fastest = learned.plausibility.fastest
-    fastest = learned.plausibility.fastest
     own = _motion_figures(sampled, _style(seen, None), fastest) | _path_figures(path, habits, phrases, None)
     frames = min(len(sampled), max(sum(map(len, clips)) // _PARTS, _SHORTEST))
     postures = min(len(path), max(len(corpus) // _PARTS, 2))

@@ -1,167 +1,251 @@
-"""Planted feet: keep feet where they stand, by their legs, which one root cannot do for two feet.
-
-Each foot is given a *track* near its original one, on which it hardly moves while it is near the floor; where it has to
-get elsewhere in so short a time that it would slide, it is lifted in a step (`motionmind.realise.tracks`). The root
-moves along as far as the legs would otherwise have to bend or stretch, and the legs follow by inverse kinematics of
-their two long bones (`motionmind.realise.legs`); the feet keep their orientations. The constants were chosen on other
-recordings than those that experiments/inbetween reports.
-"""
+"""Feet: the tracks that they go along relative to the root, and legs that bring them to where they should be."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats
-from motionmind.body.contact import limb_heights
-from motionmind.body.limits import within_limits
+from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.realise.legs import find_legs, reach
-from motionmind.realise.root import BEARS, stand
-from motionmind.realise.tracks import departure, fade_at_ends
+from motionmind.realise.footfalls import Stance
+from motionmind.realise.legs import find_hinge, find_legs, reach
 
-UNDER = 0.02  # metres above the lowest limb at which a limb's share in bearing the body has fallen to 1/e
-STANDS = 0.055  # metres above the floor below which another foot stands, so that this one may step
-STAY = 0.3  # weight of the root's staying on its trajectory, that of a leg's keeping its length being 1
+GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
+SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
+FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
+BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
+SLIDES = 2.0  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
+LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
+KNEE = 8.0  # radians a second at which knees bend at most in a step, which is lifted less if it is quick
+FAR = 0.15  # metres from its own track to which a foot must go to be lifted so far
 
 
-def plant_feet(
-    skeleton: Skeleton,
-    rotations: Floats,
-    root: Floats,
-    heights: Floats,
-    clearance: Floats,
-    stands: Floats,
-    loose: Bools,
-    fixed: Bools,
+class Foot(NamedTuple):
+    """A leg that can be placed; the part of it that stands is everything beyond the shank.
+
+    Attributes:
+        limb: its number among the limbs.
+        leg: its joints, outward.
+        knee: the place among them of its knee.
+        hinge: the axis about which that bends, in the frame of the joint above [3]; None if unknown.
+    """
+
+    limb: int
+    leg: list[int]
+    knee: int
+    hinge: Floats | None
+
+    @property
+    def joints(self) -> list[int]:
+        """The joints of the foot itself; none if the leg ends in the shank's own tip."""
+        return self.leg[self.knee + 1 :]
+
+    def chain(self, skeleton: Skeleton) -> list[int]:
+        """Return hip, knee and the point that they bring to its place, the next joint or the tip, as of points [2 J]."""
+        return [*self.leg, self.leg[-1] + len(skeleton)][self.knee - 1 : self.knee + 2]
+
+    def length(self, skeleton: Skeleton) -> float:
+        """Return the length of thigh and shank together, metres."""
+        _, knee, end = self.chain(skeleton)
+        shank = skeleton.offsets[end] if end < len(skeleton) else skeleton.tips[end - len(skeleton)]
+        return float(np.linalg.norm(skeleton.offsets[knee]) + np.linalg.norm(shank))
+
+
+def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
+    """Return the feet of a body's legs, but for those with joints that must not change."""
+    numbers, legs = find_legs(skeleton)
+    return [
+        Foot(number, leg, knee, find_hinge(skeleton, leg[knee]))
+        for number, (leg, knee) in zip(numbers, legs, strict=True)
+        if not fixed[leg].any()
+    ]
+
+
+def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
+    """Return which of a body's points are a foot's [P]: its joints, tips and heel; of a leg without a foot, its tip.
+
+    Args:
+        foot: the foot.
+        joints: the joint that each point belongs to [P] (`contact_points`).
+        count: number of joints; after them come the joints' tips.
+    """
+    out = np.isin(joints, foot.joints)
+    if not foot.joints:
+        out[count + foot.leg[-1]] = True
+    return out
+
+
+def track_of(foot: Foot, places: Floats) -> Floats:
+    """Return where a foot is, level, relative to the root [N, 2], metres, so that one that stands or rolls stays.
+
+    It moves as its last bone does, both ends of it by how low they are.
+
+    Args:
+        foot: the foot.
+        places: of all joints, then all tips, relative to the root [N, 2 J, 3], metres.
+    """
+    count = places.shape[1] // 2
+    ends = places[:, [foot.leg[-1], count + foot.leg[-1]]]
+    height, level = ends[..., 1], ends[..., [0, 2]]
+    moved = np.einsum("np,npk->nk", _hold(np.maximum(height[1:], height[:-1])), np.diff(level, axis=0))
+    along = np.concatenate([np.zeros((1, 2)), np.cumsum(moved, axis=0)])
+    # A foot that rolls to and fro comes back to its place only roughly: on the whole, it moves as the end of it does
+    # that stands in the first and in the last frame.
+    both = _hold(height[0] + height[-1])
+    drift = both @ (level[-1] - level[0]) - along[-1]
+    along += np.linspace(0.0, 1.0, len(along))[:, None] * drift
+    return np.asarray(both @ level[0] + along)
+
+
+def _hold(height: Floats) -> Floats:
+    """Return how much each end of a foot holds on to the floor [..., 2], by its height [..., 2], metres; sums are 1."""
+    share = np.exp(-(height - height.min(axis=-1, keepdims=True)) / GRIP)
+    return np.asarray(share / share.sum(axis=-1, keepdims=True))
+
+
+def departure(
+    places: Floats,
+    track: Floats,
+    height: Floats,
+    stances: list[Stance],
+    leg: float,
     fps: float,
-    given: Floats,
-) -> tuple[Floats, Floats]:
-    """Return the same movement with feet that stay where they stand.
+    moving: tuple[bool, bool],
+) -> Floats:
+    """Return a foot's displacement from the movement's own track [N, 3], metres: 0 in the first and the last frame.
 
-    Only the root and the legs change. A leg is a limb of two bones or more that hangs from the root, or from the first
-    fork below it. Its joints are finally brought within their limits, which may take its foot a little off its track,
-    but not into the floor. The body rests on the limbs that stand: where a foot that does not stand is lower, its leg
-    bends, and the body is not lifted onto it.
+    Where the foot stands it is what keeps it in its place, on the floor; between two places it is as smooth as can be,
+    and tends to 0. A foot that swings is kept above the floor. As far as it is taken elsewhere it is lifted, and then
+    moves level the less the lower it is.
+
+    Args:
+        places: of the foot where it stands [N, 2], metres, level.
+        track: where the movement has it [N, 2], metres.
+        height: of its lowest point above the floor [N], metres.
+        stances: when it stands.
+        leg: length of the leg, metres.
+        fps: frames a second.
+        moving: whether the foot's velocity is given in the first and in the last frame.
+    """
+    count = len(places)
+    wanted, stands, lift, slides = np.zeros((count, 3)), np.zeros(count), np.zeros(count), np.zeros(count - 1)
+    last = None
+    for stance in stances:
+        here = slice(stance.start, stance.end + 1)
+        wanted[here, 0], wanted[here, 2] = (places[here] - track[here]).T
+        wanted[here, 1] = _settled(height, stance, fps) - height[here]
+        stands[here] = 1.0
+        if last is not None:
+            far = np.linalg.norm(places[stance.start] - places[last] - track[stance.start] + track[last])
+            rises = _lift(stance.start - last, float(far), leg, fps)
+            lift[last : stance.start + 1] = rises
+            slides[last : stance.start] = (1.0 - 0.5 * (rises[1:] + rises[:-1]) / max(rises.max(), 1e-9)) ** 2
+        last = stance.end
+    out = _bend(wanted, np.diff(track, axis=0), stands, slides, fps)
+    free = stands == 0.0
+    above = height + out[:, 1] - lift
+    soft = 0.1 * lift + 1e-4
+    # A smooth maximum of where it is and how far it is to be lifted.
+    lifted = np.where(above > 30.0 * soft, above, soft * np.log1p(np.exp(np.minimum(above / soft, 30.0))))
+    out[free, 1] += (lifted - above)[free]
+    return out * fade_at_ends(count, moving, fps)[:, None]
+
+
+def fade_at_ends(count: int, moving: tuple[bool, bool], fps: float) -> Floats:
+    """Return a curve [count] that is 0 at both ends, and elsewhere 1; where the end moves it rises smoothly."""
+    out, frames = np.ones(count), np.arange(count)
+    out[[0, -1]] = 0.0
+    for moves, away in ((moving[0], frames), (moving[1], frames[::-1])):
+        if moves:
+            s = np.minimum(away / (FADES * fps), 1.0)
+            out *= s * s * (3.0 - 2.0 * s)
+    return out
+
+
+def _lift(frames: int, far: float, leg: float, fps: float) -> Floats:
+    """Return how far a step lifts a foot, from one stance to the next [frames + 1], metres.
+
+    The shorter and the quicker a step, the less: by what a knee bends from straight in the time that it rises.
+
+    Args:
+        frames: that the step takes.
+        far: how far it takes the foot from the movement's own track, metres.
+        leg: length of the leg, metres.
+        fps: frames a second.
+    """
+    bend = min(KNEE * RISES * frames / (1.5 * fps), np.pi)
+    s = np.linspace(0.0, 1.0, frames + 1)
+    s = np.minimum(np.minimum(s, 1.0 - s) / RISES, 1.0)
+    highest = min(leg * (1.0 - np.cos(0.5 * bend)), LIFT) * min(far / FAR, 1.0)
+    return np.asarray(highest * s * s * (3.0 - 2.0 * s))
+
+
+def _settled(height: Floats, stance: Stance, fps: float) -> Floats:
+    """Return how high a foot stands above the floor during a stance: 0, but as it is given at an end nearby."""
+    frames = np.arange(stance.start, stance.end + 1)
+    out = np.zeros(len(frames))
+    for end, at in ((0, stance.start == 0), (len(height) - 1, stance.end == len(height) - 1)):
+        if at:
+            s = np.clip(1.0 - np.abs(frames - end) / (SETTLES * fps), 0.0, 1.0)
+            out += height[end] * s * s * (3.0 - 2.0 * s)
+    return out
+
+
+def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: float) -> Floats:
+    """Return departures [N, 3] that are as wanted where a foot stands, smooth, and elsewhere near 0.
+
+    They minimise sum_t 1e6 s^2 |d - wanted|^2 + (1 - s) |d|^2 + (BENDS^4) |d''|^2 + SLIDES^2 l |d' + track'|^2, with s how
+    much it stands, and l how low it is in a step. They are 0, and depart smoothly, at both ends.
+
+    Args:
+        wanted: displacements of a foot that stands [N, 3], metres.
+        moves: of the movement's own track from frame to frame, level [N - 1, 2], metres.
+        stands: how much it stands [N], from 0 to 1.
+        slides: how much it is to move level as little as it can [N - 1], from 0 to 1.
+        fps: frames a second.
+    """
+    from scipy.linalg import solveh_banded
+
+    count = len(wanted)
+    firm, bend, still = 1e6 * stands**2, (BENDS * fps) ** 4, slides * (SLIDES * fps) ** 2
+    diagonals = np.zeros((3, count))
+    diagonals[0] = firm + 1.0 - stands
+    for k, share in enumerate((1.0, 4.0, 1.0)):
+        diagonals[0, k : count - 2 + k] += bend * share
+    diagonals[0, [1, -2]] += bend
+    diagonals[1, : count - 1] = bend * np.concatenate([[-2.0], np.full(count - 3, -4.0), [-2.0]])
+    diagonals[2, : count - 2] = bend
+    right = firm[:, None] * wanted
+    for k, sign in ((0, 1.0), (1, -1.0)):
+        diagonals[0, k : count - 1 + k] += still
+        right[k : count - 1 + k, [0, 2]] += sign * still[:, None] * moves
+    diagonals[1, :-1] -= still
+    diagonals[0, [0, -1]] += 1e12
+    right[[0, -1]] = 0.0
+    return np.asarray(solveh_banded(diagonals, right, lower=True))
+
+
+def bend_legs(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot], off: Floats) -> Floats:
+    """Return rotations [N, J, 4] whose legs bring the feet to their places; feet keep their orientations.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres, of any height.
-        heights: height that the body's lowest point is to have at each frame [N], metres.
-        clearance: the same above the floor [N], metres.
-        stands: how firmly each limb, and last the trunk, is to stand where it is low, between frames
-            [N - 1, limbs + 1], from 0 to 1.
-        loose: joints without limits [J].
-        fixed: joints that must not change [J]; nor do the others of their leg, whose foot then stands as it may.
-        fps: frames a second.
-        given: times of postures that must not change, in frames, whole or not, from the first frame to the last [G].
-            The frames next to them do not change either.
-
-    Returns:
-        Local rotations [N, J, 4], positions of the root [N, 3], metres.
+        root: positions of the root [N, 3], metres.
+        feet: those to place.
+        off: how far each is from where the rotations have it [N, feet, 3], metres.
     """
-    numbers, legs = find_legs(skeleton)
-    if not legs:
-        return rotations, stand(skeleton, rotations, root, heights)
-    rotations, root, floor = rotations.copy(), root.copy(), heights - clearance
-    low = limb_heights(skeleton, rotations, root)
-    lift = heights - low.min(axis=1)
-    root[:, 1] += lift
-    low += lift[:, None]
-    free = [not fixed[leg].any() for leg, _ in legs]
-    sunk = _sink_depth(low, stands)
-    for start, end in pairwise(given):
-        # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
-        part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
-        if part.stop - part.start > 2:
-            sink = np.maximum(sunk[part] - np.linspace(sunk[part][0], sunk[part][-1], len(sunk[part])), 0.0)
-            sink *= fade_at_ends(len(sink), fps)
-            root[part, 1] -= sink
-            under = np.maximum(heights[part, None] - (low[part][:, numbers] - sink[:, None]), 0.0)
-            stretch = rotations[part], root[part], floor[part], under, stands[part.start : part.stop - 1, numbers]
-            rotations[part], root[part] = _plant_stretch(skeleton, legs, *stretch, loose, free, fps)
-    return rotations, stand(skeleton, rotations, root, heights)
-
-
-def _plant_stretch(
-    skeleton: Skeleton,
-    legs: list[tuple[list[int], int]],
-    rotations: Floats,
-    root: Floats,
-    floor: Floats,
-    under: Floats,
-    stands: Floats,
-    loose: Bools,
-    free: Sequence[bool],
-    fps: float,
-) -> tuple[Floats, Floats]:
-    """Return rotations and root of three frames or more with planted feet; the first and the last do not change.
-
-    Arguments are those of `plant_feet`, of the legs alone, of which those that are `free` may bend; each leg is also
-    lifted by as much as it is `under` the height at which the body stands [N, legs], metres.
-    """
-    turned = skeleton.global_rotations(rotations)
-    places = skeleton.positions_and_tips(rotations, root)
-    # Both ends of each foot's last bone: one that turns on its ball or on its tip stands.
-    ends = [places[:, [leg[-1], leg[-1] + len(skeleton)]] for leg, _ in legs]
-    heights = [end[..., 1] - floor[:, None] + lifted[:, None] for end, lifted in zip(ends, under.T, strict=True)]
-    off = np.zeros((len(rotations), len(legs), 3))
-    feet = [foot for foot, bends in enumerate(free) if bends]
-    for foot in feet:
-        others = [height.min(axis=1) for other, height in enumerate(heights) if other != foot]
-        others_stand = np.min(others, axis=0) < STANDS if others else np.zeros(len(rotations), dtype=np.bool_)
-        off[:, foot] = departure(ends[foot], heights[foot], stands[:, foot], others_stand, fps)
-        heights[foot] = heights[foot] + off[:, foot, 1:2]
-        off[:, foot, 1] += under[:, foot]
-    # Hip, knee, and the point that they bring to its place: the next joint, or the tip.
-    chains = np.array([[*leg, leg[-1] + len(skeleton)][knee - 1 : knee + 2] for leg, knee in legs])
-    # A step only bends the knee; the root moves along with level departures.
-    moved = _follow_legs(places[:, chains[:, 2]] - places[:, chains[:, 0]], off * np.array([1.0, 0.0, 1.0]))
-    planted = rotations.copy()
-    for foot, (hip, knee, end) in enumerate(chains):
-        thigh, shank = reach(turned[:, hip], places[:, chains[foot]], places[:, end] + off[:, foot] - moved)
-        thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
-        planted[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
-        planted[:, knee] = rot.inv_mul(thigh, shank)
-        if end < len(skeleton):
-            planted[:, end] = rot.inv_mul(shank, turned[:, end])
-    joints = [joint for foot in feet for joint in legs[foot][0]]
+    turned, places = skeleton.global_rotations(rotations), skeleton.positions_and_tips(rotations, root)
     out = rotations.copy()
-    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
-    return out, root + moved
-
-
-def _sink_depth(low: Floats, stands: Floats) -> Floats:
-    """Return how far the body must sink [N], metres, from resting on its lowest point to resting on limbs that stand.
-
-    This is the mean of the heights h of the limbs' lowest points above the lowest of all, weighted by how firmly the
-    limbs stand to the power of BEARS, and by exp(-h / UNDER).
-
-    Args:
-        low: height of each limb's lowest point [N, limbs + 1], metres.
-        stands: how firmly each limb stands between frames [N - 1, limbs + 1], from 0 to 1.
-    """
-    still = np.concatenate([stands[:1], 0.5 * (stands[1:] + stands[:-1]), stands[-1:]])
-    above = low - low.min(axis=1, keepdims=True)
-    weights = np.maximum(still, 1e-3) ** BEARS * np.exp(-above / UNDER)
-    return np.asarray(np.sum(weights * np.where(weights > 0.0, above, 0.0), axis=1) / weights.sum(axis=1))
-
-
-def _follow_legs(legs: Floats, off: Floats) -> Floats:
-    """Return the root's displacement [N, 3], metres, by which legs hardly change their lengths.
-
-    It is the r for which sum_l (u_l . (off_l - r))^2 + STAY |r|^2 is least, with u_l the direction of leg l: 0 where
-    no foot departs from its place.
-
-    Args:
-        legs: vectors from the hip to the end of each leg [N, L, 3], metres.
-        off: displacement of that end [N, L, 3], metres.
-    """
-    along = legs / np.maximum(np.linalg.norm(legs, axis=-1, keepdims=True), 1e-9)
-    system = np.einsum("nli,nlj->nij", along, along) + STAY * np.eye(3)
-    pull = np.einsum("nli,nlj,nlj->ni", along, along, off)
-    return np.asarray(np.linalg.solve(system, pull[..., None])[..., 0])
+    for number, foot in enumerate(feet):
+        hip, knee, end = chain = foot.chain(skeleton)
+        thigh, shank = reach(turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge)
+        thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
+        out[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
+        out[:, knee] = rot.inv_mul(thigh, shank)
+        if end < len(skeleton):
+            out[:, end] = rot.inv_mul(shank, turned[:, end])
+    return out

@@ -1,71 +1,191 @@
-"""Setting a movement on the floor: heights, the root's trajectory and planted feet together."""
+"""Setting a movement on the floor: who bears the body and where, the root's trajectory, and legs that reach the floor.
+
+Rotations come from the mean of walks; where the body is follows from what bears it. Each foot gets *stances*, with
+places on the floor (`motionmind.realise.footfalls`). The root is carried by what bears, smoothly, and so that its
+weight stays over the support (`motionmind.realise.root`). The legs then reach for the places
+(`motionmind.realise.feet`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import size_of
 from motionmind.geometry.splines import natural_spline
-from motionmind.realise.feet import plant_feet
+from motionmind.realise.balance import GRAVITY
+from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
+from motionmind.realise.corrections import Correction
+from motionmind.realise.feet import Foot, bend_legs, fade_at_ends, find_free_feet
 from motionmind.realise.minimal import departure
-from motionmind.realise.root import root_trajectory
+from motionmind.realise.root import root_trajectory, stand
+
+
+class Stance(NamedTuple):
+    """How a corpus's bodies hold themselves and travel along a movement, at its T moves and midway between them.
+
+    Attributes:
+        half_steps: times [2 T + 1], seconds.
+        clearance: height of the lowest point above the floor [2 T + 1], metres.
+        trust: how far that is to be trusted, and not the way from one given height to the next [2 T + 1], from 0 to 1.
+        stands: how firmly each limb, and last the trunk, stands where it is low [2 T + 1, limbs + 1], from 0 to 1.
+        aloft: share of them that are in the air [2 T + 1], from 0 to 1.
+        leaps: height of their lowest points above the floor there [2 T + 1], metres.
+        drift: their displacement in each half step [2 T, 3], metres.
+        overhang: how far beyond its support the centre of mass may be, metres.
+    """
+
+    half_steps: Floats
+    clearance: Floats
+    trust: Floats
+    stands: Floats
+    aloft: Floats
+    leaps: Floats
+    drift: Floats
+    overhang: float
+
+    def scaled(self, by: float) -> Stance:
+        """Return the same of a body of another size."""
+        lengths = ("clearance", "leaps", "drift", "overhang")
+        return self._replace(**{name: by * getattr(self, name) for name in lengths})
 
 
 def set_on_floor(
     skeleton: Skeleton,
     rotations: Floats,
     times: Floats,
-    half_steps: Floats,
-    clearance: Floats,
-    trust: Floats,
-    stands: Floats,
+    stance: Stance,
     loose: Bools,
     fixed: Bools,
     low: Mapping[int, float],
-    drift: Floats,
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
+    without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
+
+    Bodies of all sizes are set down as one as large as a person, on whom the constants were chosen.
 
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
         times: of the frames [N], seconds.
-        half_steps: times of the moves and midway between them [2 T + 1], seconds.
-        clearance: height of the lowest point above the floor at the half steps [2 T + 1], metres.
-        trust: how far that is to be trusted, and not the way from one given height to the next [2 T + 1], from 0 to 1.
-        stands: how firmly each limb, and last the trunk, stands where it is low, at the half steps
-            [2 T + 1, limbs + 1], from 0 to 1.
+        stance: how the corpus's bodies hold themselves and travel along it.
         loose: joints without limits [J].
         fixed: joints that must not change for the feet's sake [J].
         low: height of the lowest point above 0 of the given postures, metres, by the number of moves that lead there;
             with the first and the last.
-        drift: displacement of the corpus's bodies in each half step [2 T, 3], metres.
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
+        without: corrections to leave out.
     """
-    given = 2 * np.array(list(low))
-    floor = _floor_under(half_steps, clearance, np.array([low[0], low[given[-1] // 2]]))
-    at_half_steps = clearance + floor
-    evenly = np.interp(half_steps, half_steps[given], list(low.values()))
-    at_half_steps = evenly + trust * (at_half_steps - evenly)
-    at_half_steps[given] = evenly[given]
-    heights = _eased(half_steps, at_half_steps, times)
-    clear = np.maximum(heights - np.interp(times, half_steps, floor), 0.0)
-    places = np.concatenate([np.zeros((1, 3)), np.cumsum(drift, axis=0)])
-    middles = 0.5 * (times[1:] + times[:-1])
-    held = np.stack([np.interp(middles, half_steps, limb) for limb in stands.T], axis=1)
-    drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
-    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends), times, rates)
-    fps = 1.0 / (times[1] - times[0])
-    frames = fps * half_steps[given]
-    rotations, root = plant_feet(skeleton, rotations, root, heights, clear, held, loose, fixed, fps, frames)
+    size = size_of(skeleton)
+    small = replace(skeleton, offsets=skeleton.offsets / size, tips=skeleton.tips / size)
+    lows = {move: height / size for move, height in low.items()}
+    near = (ends[0] / size, ends[1] / size)
+    slow = (None if rates[0] is None else rates[0] / size, None if rates[1] is None else rates[1] / size)
+    gravity = GRAVITY / size
+    placed = _set_down(
+        small, rotations, times, stance.scaled(1.0 / size), loose, fixed, lows, near, slow, gravity, without
+    )
+    root = size * placed[1]
     root[0], root[-1] = ends
+    return placed[0], root
+
+
+def _set_down(
+    skeleton: Skeleton,
+    rotations: Floats,
+    times: Floats,
+    stance: Stance,
+    loose: Bools,
+    fixed: Bools,
+    low: Mapping[int, float],
+    ends: tuple[Floats, Floats],
+    rates: tuple[Floats | None, Floats | None],
+    gravity: float,
+    without: Collection[Correction],
+) -> tuple[Floats, Floats]:
+    """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
+    half_steps, given = stance.half_steps, 2 * np.array(list(low))
+    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]))
+    at_half_steps = stance.clearance + under
+    evenly = np.interp(half_steps, half_steps[given], list(low.values()))
+    at_half_steps = evenly + stance.trust * (at_half_steps - evenly)
+    at_half_steps[given] = evenly[given]
+    heights, floor = _eased(half_steps, at_half_steps, times), np.interp(times, half_steps, under)
+    places = np.concatenate([np.zeros((1, 3)), np.cumsum(stance.drift, axis=0)])
+    middles = 0.5 * (times[1:] + times[:-1])
+    held = np.stack([np.interp(middles, half_steps, limb) for limb in stance.stands.T], axis=1)
+    drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
+    clear = np.maximum(heights - floor, 0.0)
+    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1]), times, rates)
+    root = stand(skeleton, rotations, root, heights)
+    root[0], root[-1] = ends
+    fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
+    firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
+    aloft, leaps = (np.interp(times, half_steps, one) for one in (stance.aloft, stance.leaps))
+    frames, rotations = fps * half_steps[given], rotations.copy()
+    for number, (start, end) in enumerate(pairwise(frames)):
+        # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
+        part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
+        if part.stop - part.start < 3:
+            continue
+        rate = rates[0] if number == 0 else None, rates[1] if number == len(frames) - 2 else None
+        known = Ends(
+            aloft[part],
+            leaps[part],
+            (rate[0] is not None, rate[1] is not None),
+            (None if rate[0] is None else float(rate[0][1]), None if rate[1] is None else float(rate[1][1])),
+        )
+        carried = carry(
+            skeleton,
+            rotations[part],
+            root[part],
+            floor[part],
+            firm[part],
+            feet,
+            known,
+            stance.overhang,
+            gravity,
+            fps,
+            without,
+        )
+        rotations[part], root[part] = _reach_floor(skeleton, rotations[part], carried, feet, loose, known.moving, fps)
     return rotations, root
+
+
+def _reach_floor(
+    skeleton: Skeleton,
+    rotations: Floats,
+    carried: Carried,
+    feet: list[Foot],
+    loose: Bools,
+    moving: tuple[bool, bool],
+    fps: float,
+) -> tuple[Floats, Floats]:
+    """Return rotations whose legs are where they should be, within their limits, and the root.
+
+    A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height.
+    """
+    joints, fades = [joint for foot in feet for joint in foot.leg], fade_at_ends(len(rotations), moving, fps)
+    out, off = rotations.copy(), carried.off
+    if not joints:
+        return out, carried.root
+    for again in (True, False):
+        planted = bend_legs(skeleton, rotations, carried.root, feet, off)
+        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+        if again:
+            missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
+            off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
+    return out, carried.root
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limbs_of, stem_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
@@ -33,7 +34,23 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
     return numbers, out
 
 
-def reach(hip: Floats, leg: Floats, target: Floats) -> tuple[Floats, Floats]:
+def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
+    """Return the axis [3] about which a knee bends, in its own frame; None where nothing is known of the body's joints.
+
+    It is that of the angle with the greatest range, in the sense in which the joint goes farther.
+    """
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None:
+        return None
+    name = skeleton.names[knee]
+    joint, described = anatomy.anatomy(name)
+    angle = max(described.angles.values(), key=lambda one: one.range[1] - one.range[0])
+    axis = np.eye(3)[angle.axis] * angle.sign * np.sign(sum(angle.range))
+    # A turn is mirrored as its axis is, and reversed.
+    return axis * np.array([1.0, -1.0, -1.0]) if anatomy.paired(joint) and name.startswith("right_") else axis
+
+
+def reach(hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None) -> tuple[Floats, Floats]:
     """Return rotations [N, 4] of thigh and shank, in the world, that bring the leg's end to its target.
 
     The knee bends about its own axis until the end is as far from the hip as the target, by the law of cosines; the
@@ -43,9 +60,11 @@ def reach(hip: Floats, leg: Floats, target: Floats) -> tuple[Floats, Floats]:
         hip: orientations of the hip in the world [N, 4].
         leg: positions of hip, knee and end [N, 3, 3], metres.
         target: positions for the end [N, 3], metres.
+        hinge: axis in the hip's frame about which the knee bends where the leg is all but straight [3]; None for that
+            of frames where it is not.
     """
     thigh, shank = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 1]
-    axis = _hinge(hip, thigh, shank)
+    axis = _hinge(hip, thigh, shank, hinge)
     # Components along the axis do not change; across it, the bones and their angle form a triangle.
     along = np.sum(thigh * axis, axis=-1), np.sum(shank * axis, axis=-1)
     across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
@@ -58,13 +77,15 @@ def reach(hip: Floats, leg: Floats, target: Floats) -> tuple[Floats, Floats]:
     return turn, rot.mul(turn, bend)
 
 
-def _hinge(hip: Floats, thigh: Floats, shank: Floats) -> Floats:
+def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> Floats:
     """Return unit axes [N, 3] about which a knee bends, from its bones [N, 3], metres.
 
-    In frames where the leg is all but straight the axis is that of other frames, as seen from the hip [N, 4].
+    In frames where the leg is all but straight the axis is the usual one, as seen from the hip [N, 4]: if that is not
+    given, that of other frames.
     """
     normal = np.cross(thigh, shank)
-    usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
+    if usual is None:
+        usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
     if np.linalg.norm(usual) < 1e-9:
         # Straight in all frames: the body axis most nearly at right angles to the thigh, made exactly so.
         bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])

@@ -4,8 +4,9 @@ Limbs are capsules (`motionmind.body.capsules`). While two are in each other the
 It lies between them as they meet and as they part; where these are opposite sides, as of a leg that goes from in front
 of the other to behind it, the plane turns on the way by the line from one hip (or shoulder) to the other, so that the
 limbs open. Each limb turns as a whole about its hip or shoulder, as little as will do, and smoothly in time; feet keep
-their orientations, and a foot that stands its place: such a leg turns about the line from hip to ankle alone. The
-given postures do not change, and what they have in each other, or the corpus usually has, stays.
+their orientations, and a foot that stands its place: such a leg turns about the line from hip to ankle alone. A foot
+that would sink into the floor is lifted by its knee. The given postures do not change; what they have in each other, or
+the corpus usually has, stays.
 
 Constants were chosen on random pairs of `cmu-05` and ballet.
 """
@@ -19,10 +20,12 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES
 from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths, radius_at
+from motionmind.body.contact import limb_heights, lowest_height
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.segments import nearest_points
 from motionmind.jit import jit
+from motionmind.realise.legs import find_legs, reach
 
 ROUNDS = 8  # corrections, each of what those before it have left
 TOUCHES = 0.005  # metres that any two limbs may be in each other
@@ -33,6 +36,7 @@ PLACE = 1000.0  # weight of a standing foot's place
 LEVER = 0.1  # metres: touched so near to its joint, a limb turns half as far as it would have to
 MOST = 0.3  # radians that a limb turns in one correction
 STEADY = 0.08  # metres a second at which a foot stands half as firmly as one at rest
+LIFTS = 0.1  # seconds in which a foot begins and ends to be lifted off the floor
 LOW = 0.04  # metres above the body's lowest point at which it stands half as firmly as one there
 
 
@@ -122,7 +126,10 @@ def keep_limbs_apart(
             turns[:, limb] = _smooth(steps[:, limb], needed[:, limb], axis, still[:, limb], frozen, SPREADS * fps)
         _turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)
-    return _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+    out = _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+    lowest = lowest_height(skeleton, rotations, root)
+    floor = np.minimum(lowest, np.linspace(lowest[0], lowest[-1], len(lowest)))
+    return _lift_feet(skeleton, out, root, floor, fixed, frozen, fps)
 
 
 def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> _Limbs:
@@ -170,6 +177,49 @@ def _with_turned(skeleton: Skeleton, rotations: Floats, limbs: _Limbs, turned: F
     return out
 
 
+def _lift_feet(
+    skeleton: Skeleton, rotations: Floats, root: Floats, floor: Floats, fixed: Bools, frozen: Bools, fps: float
+) -> Floats:
+    """Return local rotations [N, J, 4] with knees bent so that no foot is below the floor [N], metres.
+
+    Legs with fixed joints [J] do not change, nor do frozen frames [N].
+    """
+    numbers, legs = find_legs(skeleton)
+    sunk = np.maximum(floor[:, None] - limb_heights(skeleton, rotations, root)[:, numbers], 0.0)
+    sunk[frozen] = 0.0
+    out = rotations.copy()
+    for (leg, bends), depth in zip(legs, sunk.T, strict=True):
+        if depth.max() <= LEAST or fixed[leg].any():
+            continue
+        lift = _eased(depth, frozen, max(1, round(LIFTS * fps)))
+        hip, knee, ankle = leg[bends - 1 : bends + 2]
+        world, places = skeleton.global_rotations(rotations), skeleton.positions(rotations, root)
+        target = places[:, ankle] + lift[:, None] * np.array([0.0, 1.0, 0.0])
+        thigh, shank = reach(world[:, hip], places[:, [hip, knee, ankle]], target)
+        thigh, shank = rot.mul(thigh, world[:, hip]), rot.mul(shank, world[:, knee])
+        bent = np.stack(
+            [
+                rot.inv_mul(world[:, skeleton.parents[hip]], thigh),
+                rot.inv_mul(thigh, shank),
+                rot.inv_mul(shank, world[:, ankle]),
+            ],
+            axis=1,
+        )
+        out[:, [hip, knee, ankle]] = np.where((lift > 0.0)[:, None, None], bent, out[:, [hip, knee, ankle]])
+    return out
+
+
+def _eased(need: Floats, frozen: Bools, rise: int) -> Floats:
+    """Return a curve [N] that is at least `need` [N] and rises and falls within `rise` frames; 0 where frozen."""
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * rise), 2 * rise + 1).max(axis=1)
+    window = np.hanning(2 * rise + 3)[1:-1]
+    frames = np.arange(len(need))
+    far = np.abs(frames[:, None] - frames[frozen]).min(axis=1)
+    share = np.minimum(far / rise, 1.0)
+    eased = np.convolve(around, window / window.sum(), "valid") * share * share * (3.0 - 2.0 * share)
+    return np.where(frozen, 0.0, np.maximum(eased, need))
+
+
 def _smooth(steps: Floats, needed: Bools, axis: Floats, still: Floats, frozen: Bools, spread: float) -> Floats:
     """Return rotation vectors d [N, 3] that are near `steps` [N, 3] where needed, and smooth in time.
 
@@ -190,14 +240,14 @@ def _smooth(steps: Floats, needed: Bools, axis: Floats, still: Floats, frozen: B
     blocks = (PLACE * still)[:, None, None] * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
     blocks += (1.0 + pull)[:, None, None] * np.eye(3)
     # Second differences: three frames each, so that unknowns, which are three a frame, are coupled over six rows.
-    second = np.diff(np.eye(len(steps)), 2, axis=0)
-    bend = spread**4 * second.T @ second
+    outer = np.ones(len(steps) - 2)
+    bends = [np.convolve(outer, kernel) for kernel in ([1.0, 4.0, 1.0], [-2.0, -2.0], [1.0])]
     diagonals = np.zeros((7, len(steps), 3))
     for above in range(3):
         for column in range(above, 3):
             diagonals[6 - above, :, column] = blocks[:, column - above, column]
     for later in range(3):
-        diagonals[6 - 3 * later, later:] += np.diagonal(bend, later)[:, None]
+        diagonals[6 - 3 * later, later:] += spread**4 * bends[later][:, None]
     diagonals[:, frozen] = 0.0
     diagonals[6, frozen] = 1.0
     for later in (1, 2):

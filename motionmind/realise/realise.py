@@ -19,18 +19,21 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves
 from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.ground import set_on_floor
+from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
+from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
+from motionmind.realise.retime import keep_pace
 from motionmind.realise.stops import Stop, stop_at
-from motionmind.realise.timeline import Timeline, timeline
+from motionmind.realise.timeline import Timeline, stretch, timeline
 
 # Tolerances by which a chain may be off its state at a move: where something is asked of it, with room for the arc
 # between two frames, and elsewhere.
 FIRMLY, FREELY = 0.95, 3.0
 # Power of the trust in walks by which their detail is trusted: roughness is less particular than movement.
 LINGERS = 0.1
+_ROUNDING = 1e-9  # radians: a joint that moves by no more, such as fingers that were not recorded, does not move
 
 
 def realise(
@@ -50,6 +53,7 @@ def realise(
     arriving: Velocity | None = None,
     without: Collection[Correction] = (),
     pace: float = 1.0,
+    fastest: Floats | None = None,
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -83,6 +87,8 @@ def realise(
         arriving: velocity with which it arrives at `b`.
         without: corrections to leave out.
         pace: how many times as fast as the corpus to move, where there is no `length`.
+        fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
+            `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
@@ -90,42 +96,71 @@ def realise(
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
         return still, np.zeros(0, dtype=np.int64)
-    clock = timeline(path, grammar.transitions, fps, length, pace)
+    clock = timeline(path, grammar.transitions, fps, length)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
-    stops[0], stops[len(path) - 1] = stop_at(corpus, a, leaving), stop_at(corpus, b, arriving)
+    slower = 1.0 if length else 1.0 / pace  # the walk is made at a pace of 1, and then taken faster
+    stops[0] = stop_at(corpus, a, _times(slower, leaving))
+    stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage)
     within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
+    size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
+    travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel), walk.headings)
+    if length is None:
+        longer = np.full(len(travel), slower)
+        if fastest is not None:
+            moving = leaving is not None, arriving is not None
+            missing = (b.root - a.root) / size - travel.sum(axis=0)
+            longer *= keep_pace(walk, corpus, fastest, travel + missing / len(travel), moving)
+        clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
+        walk = walk._replace(half_steps=half_steps)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     rotations = _limit(rotations, postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
-    size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     trust = walk.trust[:, 0]
+    aloft = walk.moments @ carriage.aloft
+    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
+    stance = Stance(
+        walk.half_steps,
+        size * (walk.moments @ carriage.clearance),
+        trusted,
+        walk.moments @ carriage.stands,
+        trusted * aloft,
+        size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
+        size * travel,
+        size * float(carriage.overhang[0]),
+    )
     rotations, root = set_on_floor(
         a.skeleton,
         rotations,
         clock.frames,
-        walk.half_steps,
-        size * (walk.moments @ carriage.clearance),
-        np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust),
-        walk.moments @ carriage.stands,
+        stance,
         carriage.loose,
         fixed[: len(a.skeleton)],
         _given_heights(postures, walk),
-        size * travel_along(trust[:, None] * (walk.moves @ carriage.travel), walk.headings),
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
+        without,
     )
     if "limbs" not in without:
         given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
-        may_not = fixed[: len(a.skeleton)]
+        # As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
+        legs = [joint for leg, _ in find_legs(a.skeleton)[1] for joint in leg]
+        may_not = np.where(
+            np.isin(np.arange(len(a.skeleton)), legs), *(each[: len(a.skeleton)] for each in (fixed, wished))
+        )
         rotations = keep_limbs_apart(a.skeleton, rotations, root, clock.frames, given, may_not, carriage.touches)
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
+
+
+def _times(factor: float, velocity: Velocity | None) -> Velocity | None:
+    """Return a velocity times a factor; None for none."""
+    return None if velocity is None else Velocity(factor * velocity.rotations, factor * velocity.root)
 
 
 def _walk_near(
@@ -240,6 +275,8 @@ def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> 
     first, *_, last = postures.values()
     given = np.stack([posture.rotations for posture in postures.values()])
     out = within_limits(first.skeleton, rot.normalise(rotations), given, loose)
+    still = rot.angle(out, first.rotations).max(axis=0) < _ROUNDING
+    out[:, still] = first.rotations[still]
     out[0], out[-1] = first.rotations, last.rotations
     return out
 

@@ -11,11 +11,20 @@ from motionmind.body.skeleton import Skeleton
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
+WALKS = 0.3  # metres a second of missing travel that is made up evenly by half
+STARTS = 0.3  # seconds in which even travel starts and stops
 BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
 
 
 def root_trajectory(
-    skeleton: Skeleton, rotations: Floats, clearance: Floats, stands: Floats, drift: Floats, a: Floats, b: Floats
+    skeleton: Skeleton,
+    rotations: Floats,
+    clearance: Floats,
+    stands: Floats,
+    drift: Floats,
+    a: Floats,
+    b: Floats,
+    seconds: float,
 ) -> Floats:
     """Return positions [N, 3] of the root, metres, from `a` to `b`; their heights are provisional, `stand` sets them.
 
@@ -33,6 +42,7 @@ def root_trajectory(
         drift: displacement of the corpus's bodies from each frame to the next [N - 1, 3], metres.
         a: first position of the root [3], metres.
         b: last position of the root [3], metres.
+        seconds: duration of the whole.
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -40,7 +50,13 @@ def root_trajectory(
     weight = SLIP + hold.sum(axis=1)
     steps = (SLIP * drift - np.einsum("np,npk->nk", hold, np.diff(points, axis=0))) / weight[:, None]
     slack = (1.0 / weight) / np.sum(1.0 / weight)
-    steps += slack[:, None] * (b - a - steps.sum(axis=0))
+    missing = b - a - steps.sum(axis=0)
+    fast = np.linalg.norm(missing) / seconds
+    evenly = fast**2 / (fast**2 + WALKS**2)
+    since = np.linspace(0.0, seconds, len(steps) + 2)[1:-1]
+    ramp = np.minimum(np.minimum(since, since[::-1]) / STARTS, 1.0)
+    slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
+    steps += slack[:, None] * missing
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 

@@ -48,9 +48,7 @@ def durations(path: Int32s, transitions: Transitions) -> Floats:
     return out
 
 
-def timeline(
-    path: Int32s, transitions: Transitions, fps: float, length: float | None = None, pace: float = 1.0
-) -> Timeline:
+def timeline(path: Int32s, transitions: Transitions, fps: float, length: float | None = None) -> Timeline:
     """Return the times of a path's moves and of its frames, at about `fps`; the last frame falls on the end exactly.
 
     Args:
@@ -59,12 +57,29 @@ def timeline(
         fps: frames a second.
         length: duration of the whole, seconds, to which frames are fitted; None for as long as the corpus takes,
             stretched by less than a frame.
-        pace: how many times as fast as the corpus, where there is no `length`.
     """
     seconds = durations(path, transitions)
     usually = float(seconds.sum())
-    frames = max(1, round((length or usually / pace) * fps))
+    frames = max(1, round((length or usually) * fps))
     length = length or frames / fps
     moves = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
     moves[-1] = length
     return Timeline(moves, np.linspace(0.0, length, frames + 1), max(1, round(len(seconds) * length / usually)))
+
+
+def stretch(clock: Timeline, at: Floats, times_longer: Floats, fps: float) -> tuple[Timeline, Floats]:
+    """Return a clock that runs slower, or faster, and the times that some steps then end at [S + 1].
+
+    Args:
+        clock: the clock as it was; the number of its usual moves stays, for they are slower, or faster.
+        at: times that the steps end at [S + 1], the first and the last those of the clock.
+        times_longer: how many times as long each step is to take [S].
+        fps: frames a second; the whole is stretched further by less than a frame.
+    """
+    to = np.concatenate([[0.0], np.cumsum(times_longer * np.diff(at))])
+    frames = max(1, round(float(to[-1]) * fps))
+    length = frames / fps
+    to *= length / to[-1]
+    moves = np.interp(clock.moves, at, to)
+    moves[-1] = to[-1] = length
+    return Timeline(moves, np.linspace(0.0, length, frames + 1), clock.usual_moves), to

@@ -216,6 +216,7 @@ class Engine(LearnedCorpus):
             formulation.arriving,
             request.without,
             request.pace,
+            self.pace.fastest if request.paced and not request.fixes_length else None,
         )
 
     def _account_for(

@@ -48,15 +48,21 @@ def test_a_corpus_of_0_1_whose_clusters_were_called_kinds_is_loaded(built: Path,
     assert "carriage.kinds" not in arrays
 
 
-def test_a_corpus_that_was_built_without_its_pace_learns_it(built: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("part", "lacking"),
+    [("pace", ["pace."]), ("carriage", ["carriage.aloft", "carriage.overhang", "carriage.touches"])],
+)
+def test_a_corpus_that_was_built_without_some_of_a_part_learns_it(
+    built: Path, tmp_path: Path, part: str, lacking: list[str]
+) -> None:
     old = tmp_path / "old"
     shutil.copytree(built, old)
     manifest = json.loads((old / store.MANIFEST).read_text("utf-8"))
-    for name in [name for name in manifest["arrays"] if name.startswith("pace.")]:
+    for name in [name for name in manifest["arrays"] if name.startswith(tuple(lacking))]:
         del manifest["arrays"][name]
         (old / f"{name}.npy").unlink()
     (old / store.MANIFEST).write_text(json.dumps(manifest), "utf-8")
-    kept, learned = load(str(built)).pace, load(str(old)).pace
+    kept, learned = getattr(load(str(built)), part), getattr(load(str(old)), part)
     for one, other in zip(vars(kept).values(), vars(learned).values(), strict=True):
         np.testing.assert_allclose(one, other)
 

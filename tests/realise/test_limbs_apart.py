@@ -8,6 +8,7 @@ from bodies import insect
 
 from motionmind._typing import Floats
 from motionmind.body.capsules import capsules_of, legs_depth, penetration
+from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
@@ -44,7 +45,8 @@ def between(a: Floats, b: Floats) -> Floats:
 
 def apart(rotations: Floats, root: Floats | None = None, **options: Floats) -> Floats:
     """The movement with limbs kept apart, on a body in the air unless its root's places are given."""
-    flying = np.stack([np.zeros(FRAMES), np.arange(FRAMES), np.arange(FRAMES)], axis=1)
+    frame = np.arange(FRAMES)
+    flying = np.stack([np.zeros(FRAMES), 0.1 * frame * (FRAMES - 1 - frame), frame], axis=1)
     given = {"given": ENDS, "fixed": FREE, "usual": UNUSUAL} | options
     return keep_limbs_apart(BODY, rotations, flying if root is None else root, TIMES, **given)
 
@@ -108,7 +110,7 @@ def test_a_fixed_leg_stays_and_the_other_gives_way() -> None:
 
 
 def test_a_standing_foot_stays_where_it_stands() -> None:
-    """The left leg stands straight; the right one swings through it."""
+    """The left leg stands straight; the right one swings through it, and does not sink into the floor."""
     swing = between(posture(right_hip=(-0.6, 0.0, 0.28)), posture(right_hip=(0.6, 0.0, 0.28)))
     root = np.zeros((FRAMES, 3))
     assert legs_depth(BODY, swing).max() > 0.05
@@ -118,6 +120,7 @@ def test_a_standing_foot_stays_where_it_stands() -> None:
     moved = np.linalg.norm(BODY.positions(out, root) - BODY.positions(swing, root), axis=-1)
     assert moved[:, left].max() < 0.005
     assert moved[:, right].max() > 0.05
+    assert lowest_height(BODY, out, root).min() > lowest_height(BODY, swing, root).min() - 0.002
 
 
 def test_a_hand_goes_round_the_thigh() -> None:

@@ -1,0 +1,233 @@
+"""Dancers to be beside: their clips at 30 frames a second, what a viewer sees in them, and pairs of their postures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from experiments.material import FPS, RECORDED, corpus, movement
+from motionmind import Motion, Posture
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.capsules import legs_depth
+from motionmind.body.contact import FAR, floor_height, foot_slides, lowest_height
+from motionmind.body.plausibility import CALM
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import find_support, stands_alone
+from motionmind.geometry import rotations as rot
+
+MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
+BEYOND = 99.5  # percentile of the dancers' own windows
+TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
+STILL_JOINT = 0.5  # rad/s: no joint's limit is less
+_FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
+
+
+class Seen(NamedTuple):
+    """Movement at 30 frames a second as a viewer sees it.
+
+    Attributes:
+        greatest: `MEASURES` but the joints, frame by frame: speed and acceleration of the root [T - 1], [T - 2], slide
+            of the feet [T - 1], depth of the legs in each other [T]; metres and seconds.
+        joints: speeds of the joints [T - 1, J], rad/s.
+        bounce: vertical acceleration of the mass, up or down [T - 2], m/s^2; empty where masses are unknown.
+        lean: overhang where one limb bears and the mass is hardly accelerated [T], metres, else NaN; or empty.
+        fall: vertical acceleration in frames in the air whose neighbours are in the air, too, m/s^2.
+        skates: whether a foot skates [T - 1].
+        airborne: whether the body is in the air [T].
+    """
+
+    greatest: dict[str, Floats]
+    joints: Floats
+    bounce: Floats
+    lean: Floats
+    fall: Floats
+    skates: Bools
+    airborne: Bools
+
+
+def see(motion: Motion, floor: float | Floats) -> Seen:
+    """Look at movement at 30 frames a second above a floor, whose height may change from frame to frame [T]."""
+    body, rotations, root = motion.skeleton, motion.rotations, motion.root
+    support = find_support(body, rotations, root, FPS, floor)
+    bounce, lean, fall = np.zeros(0), np.zeros(0), np.zeros(0)
+    if support.mass is not None and support.overhang is not None:
+        accelerations = FPS**2 * np.diff(support.mass, 2, axis=0)
+        calm = np.zeros(len(motion), dtype=bool)
+        calm[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2]) < CALM
+        lean = np.where(calm & (support.bears.sum(axis=1) == 1), support.overhang, np.nan)
+        bounce = np.abs(accelerations[:, 1])
+        up = support.airborne
+        fall = accelerations[up[:-2] & up[1:-1] & up[2:], 1]
+    slides = foot_slides(body, rotations, root, floor).max(axis=1, initial=0.0)
+    greatest = {
+        "root speed": FPS * np.linalg.norm(np.diff(root, axis=0), axis=1),
+        "root acceleration": FPS**2 * np.linalg.norm(np.diff(root, 2, axis=0), axis=1),
+        "slide": FPS * slides,
+        "legs": legs_depth(body, rotations),
+    }
+    joints = FPS * rot.angle(rotations[:-1], rotations[1:])
+    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, support.airborne)
+
+
+class Limits(NamedTuple):
+    """The limits of movement of some length.
+
+    Attributes:
+        most: of each of `MEASURES`; that of the joints as a multiple of `joints`.
+        joints: what each joint's greatest speed exceeds in one window of two hundred [J], rad/s.
+        own: share of the dancers' windows that are beyond any of them.
+    """
+
+    most: dict[str, float]
+    joints: Floats
+    own: float
+
+
+@dataclass(frozen=True, eq=False)
+class Dancers:
+    """A corpus's clips at 30 frames a second, and its postures.
+
+    Attributes:
+        body: the skeleton.
+        clips: the unbroken pieces.
+        floors: height of the floor under each, metres.
+        seen: how a viewer sees each.
+        ends: postures that pairs are drawn from, each with the height of its floor.
+    """
+
+    body: Skeleton
+    clips: list[Motion]
+    floors: list[float]
+    seen: list[Seen]
+    ends: list[tuple[Posture, float]]
+    _limits: dict[int, Limits] = field(default_factory=dict)
+
+    def limits(self, frames: int) -> Limits:
+        """Limits of movement of so many frames."""
+        if frames not in self._limits:
+            self._limits[frames] = self._find_limits(frames)
+        return self._limits[frames]
+
+    def _find_limits(self, frames: int) -> Limits:
+        long = [seen for clip, seen in zip(self.clips, self.seen, strict=True) if len(clip) >= frames]
+        windows = sum(len(seen.airborne) - frames + 1 for seen in long)
+        chosen = long if windows >= _FEW else self.seen
+
+        def greatest(values: list[Floats], less: int) -> Floats:
+            """The greatest in each window of values that are `less` fewer than their frames [W, ...]."""
+            size = max(frames - less, 1)
+            windows = (np.lib.stride_tricks.sliding_window_view(v, min(size, len(v)), axis=0) for v in values)
+            return np.concatenate([found.max(axis=-1) for found in windows])
+
+        joints = greatest([seen.joints for seen in chosen], 1)
+        each = np.maximum(np.percentile(joints, BEYOND, axis=0), STILL_JOINT)
+        all_of = {
+            "root speed": greatest([seen.greatest["root speed"] for seen in chosen], 1),
+            "root acceleration": greatest([seen.greatest["root acceleration"] for seen in chosen], 2),
+            "slide": greatest([seen.greatest["slide"] for seen in chosen], 1),
+            "joints": (joints / each).max(axis=1),
+            "legs": greatest([seen.greatest["legs"] for seen in chosen], 0),
+        }
+        most = {name: float(np.percentile(values, BEYOND)) for name, values in all_of.items()}
+        most["legs"] = max(most["legs"], TOUCHING)
+        count = min(map(len, all_of.values()))
+        beyond = np.any([all_of[name][:count] > most[name] for name in MEASURES], axis=0)
+        return Limits(most, each, float(beyond.mean()))
+
+    def worst(self, seen: Seen) -> tuple[dict[str, float], float]:
+        """How many times as great as its limit the greatest of each of `MEASURES` is, and the windows' own share."""
+        limits = self.limits(len(seen.airborne))
+        out = {name: float(values.max(initial=0.0)) / limits.most[name] for name, values in seen.greatest.items()}
+        out["joints"] = float((seen.joints.max(axis=0, initial=0.0) / limits.joints).max()) / limits.most["joints"]
+        return out, limits.own
+
+    @property
+    def bounce(self) -> float:
+        """The 99th percentile of the vertical acceleration of the dancers' mass, m/s^2."""
+        return _percentile([seen.bounce for seen in self.seen])
+
+    @property
+    def lean(self) -> float:
+        """The 99th percentile of how far it is outside of what they stand on, on one limb and at ease, metres."""
+        return _percentile([seen.lean[np.isfinite(seen.lean)] for seen in self.seen])
+
+    def far_pairs(self, count: int, seed: int) -> list[tuple[int, int]]:
+        """Random pairs of postures."""
+        rng = np.random.default_rng(seed)
+        return [tuple(map(int, rng.choice(len(self.ends), size=2, replace=False))) for _ in range(count)]
+
+    def one_leg_pairs(self, count: int, seed: int) -> list[tuple[int, int]]:
+        """Random pairs of postures that stand on the same single leg."""
+        rng, legs = np.random.default_rng(seed), self._legs()
+        limbs = [limb for limb, ends in legs.items() if len(ends) > 1]
+        chosen = [legs[limbs[int(rng.integers(len(limbs)))]] for _ in range(count)] if limbs else []
+        return [tuple(map(int, rng.choice(ends, size=2, replace=False))) for ends in chosen]
+
+    def jumps(self, count: int, seed: int) -> list[tuple[int, int]]:
+        """Random pairs of a posture and one in the air."""
+        rng = np.random.default_rng(seed)
+        up = [k for k, (posture, floor) in enumerate(self.ends) if _is_airborne(posture, floor)]
+        return [(int(rng.integers(len(self.ends))), int(rng.choice(up))) for _ in range(count)] if up else []
+
+    def _legs(self) -> dict[int, Ints]:
+        postures = [posture for posture, _ in self.ends]
+        rotations, root = np.stack([p.rotations for p in postures]), np.stack([p.root for p in postures])
+        alone = stands_alone(self.body, rotations, root)
+        return {int(limb): np.flatnonzero(alone == limb) for limb in np.unique(alone) if limb >= 0}
+
+
+@lru_cache(maxsize=2)
+def dancers(data: str | None, name: str) -> Dancers:
+    """The dancers of a corpus, bundled or recorded."""
+    clips, floors = [], []
+    for pieces in movement(data, name, 1).values():
+        low = np.concatenate([lowest_height(piece.skeleton, piece.rotations, piece.root) for piece in pieces])
+        long = [piece for piece in pieces if len(piece) > 3]
+        clips += long
+        floors += [floor_height(low)] * len(long)
+    seen = [see(clip, floor) for clip, floor in zip(clips, floors, strict=True)]
+    if name in RECORDED:
+        ends = [(clip.posture(k), floor) for clip, floor in zip(clips, floors, strict=True) for k in range(len(clip))]
+    else:  # keyframes are what an author writes, and asks for
+        whole = corpus(data, name)
+        keyed = [whole.motion(clip) for clip in whole.clips]
+        heights = [floor_height(lowest_height(one.skeleton, one.rotations, one.root)) for one in keyed]
+        ends = [(one.posture(k), floor) for one, floor in zip(keyed, heights, strict=True) for k in range(len(one))]
+    return Dancers(clips[0].skeleton, clips, floors, seen, ends)
+
+
+def nearer(a: Posture, b: Posture, metres: float) -> Posture:
+    """Posture `b`, moved level so that its root is within so many metres of that of `a`."""
+    way = (b.root - a.root) * np.array([1.0, 0.0, 1.0])
+    far = float(np.linalg.norm(way))
+    return b if far <= metres else Posture(b.skeleton, b.rotations, b.root - way * (1.0 - metres / far))
+
+
+def on_the_same_spot(a: Posture, b: Posture) -> Posture:
+    """Posture `b`, turned about the vertical and moved level so that the leg that it stands on is where that of `a` is.
+
+    The two stand on the same leg; its foot points the same way then, by the bone above its lowest joint.
+    """
+    body = a.skeleton
+    places = [body.positions(p.rotations, p.root) for p in (a, b)]
+    low = int(min(range(len(body)), key=lambda joint: places[0][joint, 1]))
+    above = body.parents[low]
+    headings = [np.arctan2(*(place[low] - place[above])[[0, 2]]) for place in places]
+    turn = rot.about_vertical(np.array(headings[0] - headings[1]))
+    rotations = b.rotations.copy()
+    rotations[0] = rot.mul(turn, rotations[0])
+    moved = (places[0][low] - places[1][low]) * np.array([1.0, 0.0, 1.0])
+    return Posture(body, rotations, rot.mul_vec(turn, b.root - places[1][low]) + places[1][low] + moved)
+
+
+def _is_airborne(posture: Posture, floor: float) -> bool:
+    body = posture.skeleton
+    return bool(find_support(body, posture.rotations[None], posture.root[None], FPS, floor).airborne[0])
+
+
+def _percentile(values: list[Floats]) -> float:
+    known = np.concatenate([*values, np.zeros(0)])
+    return float(np.percentile(known, 99.0)) if len(known) else float("nan")

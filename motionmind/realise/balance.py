@@ -1,0 +1,107 @@
+"""Balance: rows that keep a body's weight over its support, as far as a corpus's bodies keep it there.
+
+Two points are kept near the support, the hull of what bears on the floor. The *zero-moment point* is where the floor's
+force acts, c - (h / g) c'' for a centre of mass c at height h: it cannot leave the support, however a body accelerates.
+Source: Kajita et al., "Biped walking pattern generation by using preview control of zero-moment point", ICRA (2003).
+The centre of mass itself may be as far beyond as the corpus's bodies have theirs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.jit import jit
+from motionmind.realise.least_squares import Rows
+
+GRAVITY = 9.81  # metres a second squared
+OVER = 0.03  # metres beyond what is allowed, standard deviation
+ROOM = 0.03  # metres that the zero-moment point may be beyond the support, which is smaller than a foot
+SWAYS = 0.5  # seconds in which a body that is given beyond its support comes back over it
+
+
+def balance_rows(
+    points: Floats,
+    touches: Bools,
+    centre: Floats,
+    own: Floats,
+    height: Floats,
+    overhang: float,
+    gravity: float,
+    fps: float,
+) -> list[Rows]:
+    """Return rows for the root's trajectory that bring the weight back over the support where it is beyond it.
+
+    Args:
+        points: level places of points of the body [N, P, 2], metres.
+        touches: which of them bear the body on the floor [N, P]; none where it is in the air.
+        centre: level place of the centre of mass [N, 2], metres.
+        own: the same relative to the root.
+        height: of the centre of mass above the floor [N], metres.
+        overhang: how far beyond the support the centre of mass may be, metres.
+        gravity: metres a second squared.
+        fps: frames a second.
+    """
+    lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
+    pressure = centre.copy()
+    pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
+    since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)[:, None]
+    fades = 1.0 - since * since * (3.0 - 2.0 * since)
+    rows = []
+    for point, share, room in ((pressure, lever, ROOM), (centre, 0.0 * lever, overhang)):
+        nearest = nearest_in_support(points, touches, point)
+        beyond = point - nearest
+        far = np.linalg.norm(beyond, axis=1, keepdims=True)
+        # Ends may be beyond the support; the body comes back from there, and goes there, within a while.
+        allowed = np.maximum(np.maximum(far[0] * fades, far[-1] * fades[::-1]), room)
+        target = nearest + beyond * np.minimum(allowed / np.maximum(far, 1e-9), 1.0)
+        weights = np.where((far > allowed)[:, 0], OVER**-2.0, 0.0)[1:-1]
+        for k, axis in enumerate((0, 2)):
+            coefficients = np.zeros((len(weights), 9))
+            coefficients[:, axis::3] = np.stack([-share, 1.0 + 2.0 * share, -share], axis=1)
+            already = own[1:-1, k] - share * np.diff(own[:, k], 2)
+            rows.append(Rows(np.arange(len(weights)), coefficients, target[1:-1, k] - already, weights))
+    return rows
+
+
+@jit
+def nearest_in_support(points: Floats, touches: Bools, wanted: Floats) -> Floats:
+    """Return the point [N, 2] of each support that is nearest to a wanted one [N, 2]; that itself where none bears.
+
+    The support is the convex hull of the points that touch the floor. A point outside of it is nearest to one of the
+    segments between two of them; one inside sees them all around itself, with no gap of half a turn.
+
+    Args:
+        points: level places of points on the floor [N, P, 2], metres.
+        touches: which of them bear the body [N, P].
+        wanted: level places [N, 2], metres.
+    """
+    out = wanted.copy()
+    angles = np.empty(points.shape[1])
+    for t in range(len(points)):
+        count = 0
+        best = np.inf
+        for i in range(points.shape[1]):
+            if not touches[t, i]:
+                continue
+            dx, dy = points[t, i, 0] - wanted[t, 0], points[t, i, 1] - wanted[t, 1]
+            angles[count] = np.arctan2(dy, dx)
+            count += 1
+            for j in range(i + 1):
+                if not touches[t, j]:
+                    continue
+                ex, ey = points[t, j, 0] - points[t, i, 0], points[t, j, 1] - points[t, i, 1]
+                length = ex * ex + ey * ey
+                share = 0.0 if length < 1e-12 else min(max(-(dx * ex + dy * ey) / length, 0.0), 1.0)
+                x, y = dx + share * ex, dy + share * ey
+                if x * x + y * y < best:
+                    best = x * x + y * y
+                    out[t, 0], out[t, 1] = wanted[t, 0] + x, wanted[t, 1] + y
+        if count > 2:
+            angles[:count].sort()
+            gap = angles[0] + 2.0 * np.pi - angles[count - 1]
+            for i in range(1, count):
+                gap = max(gap, angles[i] - angles[i - 1])
+            if gap < np.pi:
+                out[t] = wanted[t]
+    return out

@@ -1,0 +1,172 @@
+"""Bearing: what bears a body at each frame, and where on the floor: feet by their stances, other parts where they are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Indices
+from motionmind.body.contact import contact_points
+from motionmind.body.limbs import limb_of_points, limbs_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.realise.feet import Foot, foot_points, track_of
+from motionmind.realise.footfalls import Stance, find_stances, standing_costs
+
+UNDER = 0.02  # metres above the lowest limb at which a limb's share in bearing the body has fallen to 1/e
+BEARS = 4  # a limb bears the body by this power of how firmly it stands
+TOUCHES = 0.03  # metres above a limb's lowest point below which another point of it touches the floor
+MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
+LOADS = 0.12  # seconds in which a foot takes over the body's weight
+ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
+NEAR = 0.1  # metres within which a foot is in one place
+
+
+class Shape(NamedTuple):
+    """A body in each frame relative to its root, and its parts.
+
+    Attributes:
+        places: of the points that may touch the floor [N, P, 3], metres.
+        feet: which of them are each foot's [feet, P].
+        others: which of them are each other part's: limbs without their feet, and last the trunk [parts, P].
+        low: height of each foot's lowest point [N, feet], metres.
+        low_others: the same of the other parts [N, parts]; infinite for one without points.
+        tracks: level places of the feet, which do not move while they stand or roll [N, feet, 2], metres.
+        outward: level unit vectors from the middle of the hips to each leg's [N, feet, 2].
+    """
+
+    places: Floats
+    feet: Bools
+    others: Bools
+    low: Floats
+    low_others: Floats
+    tracks: Floats
+    outward: Floats
+
+    @property
+    def lowest(self) -> Floats:
+        """Height of the lowest point of all [N], metres."""
+        return np.asarray(self.places[..., 1].min(axis=1))
+
+
+def shape_of(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Shape:
+    """Return the shape of a body with local rotations [N, J, 4]."""
+    places, joints = contact_points(skeleton, rotations, np.zeros((len(rotations), 3)))
+    limb = limb_of_points(skeleton)[joints]
+    of_feet = points_of_feet(skeleton, joints, feet)
+    others = (limb == np.arange(len(limbs_of(skeleton)) + 1)[:, None]) & ~of_feet.any(axis=0)
+    hips = places[:, [foot.leg[0] for foot in feet]][..., [0, 2]]
+    outward = hips - hips.mean(axis=1, keepdims=True) if feet else hips
+    outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-9)
+    tracks = [track_of(foot, places[:, : 2 * len(skeleton)]) for foot in feet]
+    along = np.stack(tracks, axis=1) if feet else np.zeros((len(places), 0, 2))
+    return Shape(places, of_feet, others, lowest(places, of_feet), lowest(places, others), along, outward)
+
+
+def points_of_feet(skeleton: Skeleton, joints: Indices, feet: list[Foot]) -> Bools:
+    """Return which points are each foot's [feet, P]; `joints` are those that the points belong to [P]."""
+    own = [foot_points(foot, joints, len(skeleton)) for foot in feet]
+    return np.stack(own) if own else np.zeros((0, len(joints)), dtype=np.bool_)
+
+
+def lowest(places: Floats, parts: Bools) -> Floats:
+    """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points."""
+    out = np.full((len(places), len(parts)), np.inf)
+    for number, points in enumerate(parts):
+        out[:, number] = places[:, points, 1].min(axis=1, initial=np.inf)
+    return out
+
+
+class Bearing(NamedTuple):
+    """What bears a body at each frame.
+
+    Attributes:
+        stances: when and where each foot stands.
+        loads: how much of the weight each foot may bear [N, feet], from 0 to 1: less as a stance begins and ends.
+        stands: whether each foot stands [N, feet].
+        targets: the feet's places, less their tracks [N, feet, 2], metres: where each would have the root.
+        others: how much each other part bears [N, parts], from 0 to 1.
+    """
+
+    stances: list[list[Stance]]
+    loads: Floats
+    stands: Bools
+    targets: Floats
+    others: Floats
+
+    def touching(self, shape: Shape) -> Bools:
+        """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
+        out = np.zeros(shape.places.shape[:2], dtype=np.bool_)
+        parts = [(shape.feet, shape.low, self.stands), (shape.others, shape.low_others, self.others > MOSTLY)]
+        for points_of_parts, low, bears in parts:
+            for number, points in enumerate(points_of_parts):
+                near = shape.places[:, points, 1] < low[:, number, None] + TOUCHES
+                out[:, points] = near & bears[:, number, None]
+        return out
+
+
+def find_bearing(
+    shape: Shape, root: Floats, firm: Floats, flying: Bools, staying: int | None, feet: list[Foot], fps: float
+) -> Bearing:
+    """Find what bears a body, and where its feet step.
+
+    Args:
+        shape: the body.
+        root: level places of the root on which feet would slide to where they have to be [N, 2], metres.
+        firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
+        flying: whether the body is in the air [N].
+        staying: a foot that stands throughout, or None.
+        feet: its feet.
+        fps: frames a second.
+    """
+    low = shape.lowest[:, None]
+    far = np.minimum(shape.low_others - low, 1.0)
+    others = np.maximum(firm, 1e-3) ** BEARS * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
+    others[flying] = 0.0
+    rests = others.max(axis=1, initial=0.0) > MOSTLY
+    costs = [standing_costs(shape.low[:, k] - low[:, 0], firm[:, foot.limb]) for k, foot in enumerate(feet)]
+    tracks = shape.tracks + root[:, None]
+    stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
+    if staying is not None:
+        costs[staying] = np.zeros(len(root)), np.full(len(root), np.inf)
+        stands[:, staying] = True
+    stances: list[list[Stance]] = [[] for _ in feet]
+    for _ in range(2):  # each foot steps where others stand, as they did the last time
+        for k in range(len(feet)):
+            bears = np.delete(stands, k, axis=1).any(axis=1) | rests
+            stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps)
+            stands[:, k] = False
+            for stance in stances[k]:
+                stands[stance.start : stance.end + 1, k] = True
+    loads, places = np.zeros(stands.shape), tracks.copy()
+    for k, own in enumerate(stances):
+        for stance in own:
+            here = slice(stance.start, stance.end + 1)
+            places[here, k] = stance.places
+            loads[here, k] = _load(stance, len(root), fps)
+    return Bearing(stances, loads, stands, places - shape.tracks, others)
+
+
+def find_staying(shape: Shape, root: Floats) -> int | None:
+    """Return the foot that stays where it stands: one that bears alone in the first and in the last frame, in one place.
+
+    Args:
+        shape: the body.
+        root: level places of the root [N, 2], metres.
+    """
+    low = np.concatenate([shape.low, shape.low_others], axis=1)[[0, -1]]
+    bears = low < low.min(axis=1, keepdims=True) + ALONE
+    if np.any(bears.sum(axis=1) != 1) or np.any(bears[0] != bears[1]) or not bears[0, : shape.low.shape[1]].any():
+        return None
+    foot = int(bears[0].argmax())
+    moved = shape.tracks[-1, foot] + root[-1] - shape.tracks[0, foot] - root[0]
+    return foot if np.linalg.norm(moved) < NEAR else None
+
+
+def _load(stance: Stance, count: int, fps: float) -> Floats:
+    """Return how much of the weight a foot may bear in the frames of a stance: 1 well within it, less at its ends."""
+    frames = np.arange(stance.start, stance.end + 1)
+    since = frames - stance.start + 1.0 if stance.start > 0 else np.full(len(frames), np.inf)
+    until = stance.end - frames + 1.0 if stance.end < count - 1 else np.full(len(frames), np.inf)
+    s = np.minimum(np.minimum(since, until) / (LOADS * fps), 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))

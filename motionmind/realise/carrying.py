@@ -1,0 +1,258 @@
+"""Carrying: the root's trajectory as what bears the body carries it, smoothly and in balance.
+
+It is a least-squares solution, found in a few rounds, for some of its rows depend on where the root is: legs that are
+too short, parts that would be in the floor, weight that is beyond its support. Standard deviations say what is worth
+what; they were chosen on cmu-05 and ballet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.contact import contact_points
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import centre_of_mass
+from motionmind.realise.balance import balance_rows
+from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
+from motionmind.realise.corrections import Correction
+from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure
+from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
+from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
+from motionmind.realise.legs import SOFT
+
+HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
+RIGID = 0.004  # metres that a part which is no foot is off the floor
+REACH = 0.002  # metres by which a leg is too short
+LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
+PLACE = 0.08  # metres that a standing leg leans more than the movement has it
+PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
+TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
+PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
+ROUNDS = 2, 3  # of placing feet, and of the root in each
+
+
+class Ends(NamedTuple):
+    """What is known of a movement's ends.
+
+    Attributes:
+        aloft: share of the corpus's walks that are in the air in each frame [N], from 0 to 1.
+        leaps: height of their lowest points above the floor there [N], metres.
+        moving: whether the velocity is given in the first and in the last frame.
+        rates: vertical velocities of the root there, metres a second; None where unknown.
+    """
+
+    aloft: Floats
+    leaps: Floats
+    moving: tuple[bool, bool]
+    rates: tuple[float | None, float | None]
+
+
+class Carried(NamedTuple):
+    """A body carried.
+
+    Attributes:
+        root: positions of the root [N, 3], metres.
+        off: displacements of the feet from where the rotations have them [N, feet, 3], metres.
+        heights: of the feet's lowest points that these lead to [N, feet], metres.
+    """
+
+    root: Floats
+    off: Floats
+    heights: Floats
+
+
+def carry(
+    skeleton: Skeleton,
+    rotations: Floats,
+    root: Floats,
+    floor: Floats,
+    firm: Floats,
+    feet: list[Foot],
+    known: Ends,
+    overhang: float,
+    gravity: float,
+    fps: float,
+    without: Collection[Correction],
+) -> Carried:
+    """Return the trajectory of a body's root, and displacements of its feet, in three frames or more.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root as feet have it by themselves [N, 3], metres; the first and the last do not change.
+        floor: height of the floor [N], metres.
+        firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
+        feet: those that may be placed.
+        known: what is known of its ends, and of its flights.
+        overhang: how far beyond its support the centre of mass may be, metres.
+        gravity: metres a second squared.
+        fps: frames a second.
+        without: corrections to leave out.
+    """
+    count = len(rotations)
+    shape = shape_of(skeleton, rotations, feet)
+    mass = _mass(skeleton, rotations)
+    standing = floor - shape.lowest
+    hovering = [known.aloft[end] > SURELY and root[end, 1] - standing[end] > HOVERS for end in (0, -1)]
+    flights = []
+    staying = None if any(hovering) else find_staying(shape, root[:, [0, 2]])
+    if "flight" not in without and staying is None:
+        masses = root[[0, -1], 1] + mass[[0, -1], 1]
+        up = standing + mass[:, 1]
+        flights = find_flights(
+            known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
+        )
+    flying = flying_frames(flights, (hovering[0], hovering[1]), count)
+    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, feet, fps)
+    if "steps" in without:
+        bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
+    touches = bearing.touching(shape)
+    fixed = np.zeros(count, dtype=np.bool_)
+    fixed[[0, -1]] = True
+    fixed[[1, -2]] |= known.moving
+    places = skeleton.positions_and_tips(rotations, np.zeros((count, 3)))
+    start, off, posed = root, np.zeros((count, len(feet), 3)), rotations
+    for _ in range(ROUNDS[0]):
+        mass = _mass(skeleton, posed)
+        steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
+        steady += _prior_rows(root, bearing, fps)
+        steady += _standing_rows(shape, bearing, floor, leg_freedom(flights, count, fps))
+        steady += flight_rows(flights, mass, standing, gravity, fps)
+        for _ in range(ROUNDS[1]):
+            rows = [*steady, _sunk_rows(shape, floor, start)]
+            rows += _reach_rows(skeleton, places, shape, bearing, floor, start, feet, fps)
+            if "balance" not in without and mass.any():
+                points = shape.places[..., [0, 2]] + start[:, None, [0, 2]]
+                for number, own in enumerate(shape.feet):
+                    points[:, own] += (bearing.targets[:, number] - start[:, [0, 2]])[:, None]
+                centre, level = start + mass, [0, 2]
+                height = centre[:, 1] - floor
+                rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
+            start = solve(rows, start, fixed)
+        for number, foot in enumerate(feet):
+            height = shape.low[:, number] + start[:, 1] - floor
+            tracks = shape.tracks[:, number] + start[:, [0, 2]]
+            places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
+            stances, leg = bearing.stances[number], foot.length(skeleton)
+            off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
+        posed = bend_legs(skeleton, rotations, start, feet, off)
+    return Carried(start, off, shape.low + start[:, 1:2] + off[..., 1])
+
+
+def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:
+    """Return the height of each foot's lowest point [N, feet], metres."""
+    places, joints = contact_points(skeleton, rotations, root)
+    return lowest(places, points_of_feet(skeleton, joints, feet))
+
+
+def _mass(skeleton: Skeleton, rotations: Floats) -> Floats:
+    """Return the centre of mass relative to the root [N, 3], metres; the root itself where masses are not known."""
+    still = np.zeros((len(rotations), 3))
+    mass = centre_of_mass(skeleton, rotations, still)
+    return still if mass is None else mass
+
+
+def _prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
+    """Return rows for being, and moving, as on the trajectory that feet have the root on by themselves [N, 3]."""
+    count = len(prior)
+    rests = np.minimum(bearing.others.max(axis=1, initial=0.0), 1.0)
+    share = 0.5 * (rests[1:-1] + rests[:-2])
+    travel = (1.0 - share) * TRAVEL[0] ** -2.0 + share * TRAVEL[1] ** -2.0
+    rows = []
+    for axis in (0, 2):
+        rows.append(_axis_rows(axis, prior[:, axis], np.full(count, PRIOR**-2.0)))
+        rows.append(difference_rows(axis, (-fps, fps, 0.0), fps * np.diff(prior[:-1, axis]), travel))
+    return rows
+
+
+def _smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:
+    """Return rows for the accelerations of the centre of mass, `mass` [N, 3] relative to the root.
+
+    At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
+    """
+    rows, last = [], len(prior) - 3
+    for axis, share in enumerate((1.0, vertical, 1.0)):
+        weights = np.full(last + 1, share * PUSH**-2.0)
+        bends = -(fps**2) * np.diff(mass[:, axis], 2)
+        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), bends, weights))
+        for first, shares in ((0, (-(fps**2), fps**2, 0.0)), (last, (0.0, -(fps**2), fps**2))):
+            leaves = prior[first : first + 3, axis] @ np.array(shares)
+            row = difference_rows(axis, shares, np.array([leaves]), weights[:1])
+            rows.append(row._replace(first=np.array([first])))
+    return rows
+
+
+def _standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:
+    """Return rows for what bears to be on the floor, and for standing legs not to lean elsewhere."""
+    rows = []
+    height = (HEIGHT[0] ** (1.0 - freedom) * HEIGHT[1] ** freedom) ** -2.0
+    for number in range(shape.low.shape[1]):
+        load = bearing.loads[:, number]
+        rows.append(_axis_rows(1, floor - shape.low[:, number], load * height))
+        for k, axis in enumerate((0, 2)):
+            rows.append(_axis_rows(axis, bearing.targets[:, number, k], load * PLACE**-2.0))
+    for part in np.flatnonzero(np.isfinite(shape.low_others[0])):
+        rows.append(_axis_rows(1, floor - shape.low_others[:, part], bearing.others[:, part] * RIGID**-2.0))
+    # Where nothing bears, or hardly, the lowest point is near the floor.
+    rows.append(_axis_rows(1, floor - shape.lowest, np.full(len(floor), 0.01) * height))
+    return rows
+
+
+def _sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
+    """Return rows that lift parts other than feet out of the floor, where the root [N, 3] has them in it."""
+    height = floor - shape.low_others.min(axis=1, initial=np.inf)
+    sunk = root[:, 1] < height
+    return _axis_rows(1, np.where(sunk, height, 0.0), np.where(sunk, RIGID**-2.0, 0.0))
+
+
+def _reach_rows(
+    skeleton: Skeleton,
+    places: Floats,
+    shape: Shape,
+    bearing: Bearing,
+    floor: Floats,
+    root: Floats,
+    feet: list[Foot],
+    fps: float,
+) -> list[Rows]:
+    """Return rows that bring the root [N, 3] near enough to feet that stand farther than their legs reach.
+
+    A leg may be as long as the movement has it; leaning elsewhere, not quite straight.
+
+    Args:
+        skeleton: the body.
+        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+        shape: the body.
+        bearing: what bears it.
+        floor: height of the floor [N], metres.
+        root: positions of the root [N, 3], metres.
+        feet: its feet.
+        fps: frames a second.
+    """
+    rows, every = [], np.arange(len(root))
+    within = np.minimum(np.minimum(every, every[::-1]) / (SETTLES * fps), 1.0)
+    for number, foot in enumerate(feet):
+        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
+        aim = end - hip
+        aim[:, [0, 2]] += bearing.targets[:, number]
+        aim[:, 1] += floor - shape.low[:, number]
+        leans = np.linalg.norm(bearing.targets[:, number] - root[:, [0, 2]], axis=-1) / LEANS
+        straight = np.linalg.norm(end - hip, axis=-1) / foot.length(skeleton)
+        longest = np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
+        longest *= foot.length(skeleton)
+        leg = aim - root
+        far = np.linalg.norm(leg, axis=-1)
+        along = leg / np.maximum(far, 1e-9)[:, None]
+        short = (far > longest + 1e-6) & bearing.stands[:, number]
+        target = np.sum(along * aim, axis=-1) - longest
+        rows.append(position_rows(every, along, target, np.where(short, (within / REACH) ** 2, 0.0)))
+    return rows
+
+
+def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
+    """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
+    return position_rows(np.arange(len(targets)), np.tile(np.eye(3)[axis], (len(targets), 1)), targets, weights)

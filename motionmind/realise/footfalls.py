@@ -1,0 +1,178 @@
+"""Footfalls: when each foot stands, where, and how it goes from one place to the next.
+
+A foot stands or swings. While it stands it has one place on the floor; a foot that stands at A stays there until it
+steps, and the last place is B's. Between two places it swings, and is lifted over the floor as far as the movement's
+own postures do not lift it. When it swings is found by dynamic programming over all ways to part the time, so that far
+travel takes as many steps as there is time for, and feet that the movement itself lifts step then.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.jit import jit
+
+LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
+HIGH = 8.0  # a second: cost of standing with a foot that the movement lifts
+MOVING = 3.0  # a second: cost of standing with a foot that the corpus moves there
+FIRM = 1.0  # a second: cost of swinging a foot that stands firmly
+STRAYS = 0.10  # metres off its track at which a standing foot costs 1 a second
+STEP_COST = 0.5  # of each step
+QUICK = 1.8  # metres a second: a step's mean speed that costs as much as standing STRAYS off
+BRIEF = 0.27  # seconds that a step takes at least
+ALONE = 30.0  # a second: cost of swinging where nothing else bears the body
+OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
+CROSSES = 4.0  # how much more it costs to be off the track towards the other feet than elsewhere
+SHIFTS = 0.12  # seconds in which a body shifts its weight from one foot to another
+SOON = 6.0  # a second: cost of swinging before that
+SLIPS = 0.02  # metres that a foot may slip without a step
+
+
+class Stance(NamedTuple):
+    """An interval in which a foot stands, from one frame to another, both included; and the foot's place there [2].
+
+    A foot that does not quite end where it began, for both are given, slips by `slip` [2] meanwhile, metres.
+    """
+
+    start: int
+    end: int
+    place: Floats
+    slip: Floats
+
+    @property
+    def places(self) -> Floats:
+        """The foot's place in each of the frames [frames, 2], metres."""
+        return self.place + np.linspace(0.0, 1.0, self.end + 1 - self.start)[:, None] * self.slip
+
+
+def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
+    """Return what it costs a foot to stand and to swing [N] each, a second.
+
+    Args:
+        above: height of its lowest point above that of the lowest limb [N], metres.
+        firm: how firmly the corpus's feet stand there [N], from 0 to 1.
+    """
+    low, high = LIFTED
+    stand = HIGH * np.clip((above - low) / (high - low), 0.0, 1.0) + MOVING * (1.0 - firm) ** 2
+    swing = FIRM * firm * np.clip(1.0 - above / high, 0.0, 1.0)
+    return stand, swing
+
+
+def find_stances(
+    track: Floats, outward: Floats, stand: Floats, swing: Floats, others: Bools, flying: Bools, fps: float
+) -> list[Stance]:
+    """Return when and where a foot stands: the way to part the time into standing and swinging that costs least.
+
+    Standing costs the square of how far the foot is off its track, in units of STRAYS, and what `stand` says; swinging
+    what `swing` says, STEP_COST, the square of its speed in units of QUICK, and ALONE where nothing else bears.
+
+    Args:
+        track: where the movement has the foot [N, 2], metres, level.
+        outward: unit vectors to the leg's side of the body [N, 2].
+        stand: what it costs to stand [N], a second.
+        swing: what it costs to swing [N], a second.
+        others: whether another limb bears the body [N].
+        flying: whether the body is in the air [N].
+        fps: frames a second.
+    """
+    around = round(SHIFTS * fps)
+    surely = np.lib.stride_tricks.sliding_window_view(np.pad(others, around), 2 * around + 1).all(axis=1)
+    swing = np.where(flying, 0.0, swing + np.where(others, np.where(surely, 0.0, SOON), ALONE)) / fps
+    stand = np.where(flying, 1e3, stand) / fps
+    origin = track - track[0]
+    brief = max(2, round(BRIEF * fps))
+    parted = _part(np.ascontiguousarray(origin), np.ascontiguousarray(outward), stand, swing, brief, fps)
+    out, last = [], len(track) - 1
+    for start, end in parted:
+        here, side = track[start : end + 1], outward[start : end + 1].mean(axis=0)
+        place = here.mean(axis=0)
+        # On its own side of where the movement has it: feet that travel sideways do not cross.
+        place = place + OUTSIDE * max(float(np.max((here - place) @ side)), 0.0) * side
+        # A foot that comes from the air has no time to go elsewhere.
+        place = here[0] + min(start / brief, 1.0) * (place - here[0])
+        place = here[-1] + min((last - end) / brief, 1.0) * (place - here[-1])
+        slip = np.zeros(2)
+        if start == 0:
+            place = track[0]
+            if end == last:
+                slip = track[last] - track[0]
+        elif end == last:
+            place = track[last]
+        out.append(Stance(int(start), int(end), place, slip))
+    return out
+
+
+@jit
+def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float) -> Ints:
+    """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`)."""
+    count = len(track)
+    stand_sum, swing_sum = np.zeros(count + 1), np.zeros(count + 1)
+    sums, squares = np.zeros((count + 1, 2)), np.zeros(count + 1)
+    for t in range(count):
+        stand_sum[t + 1], swing_sum[t + 1] = stand_sum[t] + stand[t], swing_sum[t] + swing[t]
+        sums[t + 1] = sums[t] + track[t]
+        squares[t + 1] = squares[t] + track[t, 0] ** 2 + track[t, 1] ** 2
+    last = count - 1
+    # What it costs that a foot which stays at A, or comes to B early, crosses to the other side meanwhile.
+    crosses = np.zeros((2, count + 1))
+    for t in range(count):
+        for side in range(2):
+            off = track[t] - track[side * last]
+            inward = max(off[0] * outward[t, 0] + off[1] * outward[t, 1], 0.0)
+            crosses[side, t + 1] = crosses[side, t] + CROSSES * inward * inward
+    # best[0, t]: standing up to frame t, and swinging from t + 1 on; best[1, t]: swinging, and standing from t + 1 on.
+    best = np.full((2, count), np.inf)
+    came = np.full((2, count), -1)
+    for t in range(count):
+        for s in range(t + 1):  # standing from s to t
+            before = 0.0 if s == 0 else best[1, s - 1]
+            if before == np.inf:
+                continue
+            n = t - s + 1
+            x, y = sums[t + 1, 0] - sums[s, 0], sums[t + 1, 1] - sums[s, 1]
+            off = squares[t + 1] - squares[s]
+            if s == 0 and t == last:
+                far = np.sqrt((track[last, 0] - track[0, 0]) ** 2 + (track[last, 1] - track[0, 1]) ** 2)
+                spread = off - (x * x + y * y) / n + n * (max(far - SLIPS, 0.0) / SLIPS) ** 2 * STRAYS**2
+            elif s == 0 or t == last:
+                px, py = (track[0, 0], track[0, 1]) if s == 0 else (track[last, 0], track[last, 1])
+                spread = off - 2.0 * (px * x + py * y) + n * (px * px + py * py)
+                side = 0 if s == 0 else 1
+                spread += crosses[side, t + 1] - crosses[side, s]
+            else:
+                spread = off - (x * x + y * y) / n
+                across = 0.5 * OUTSIDE * np.sum((track[t] - track[s]) * outward[(s + t) // 2])
+                spread += n * across * across
+            cost = before + stand_sum[t + 1] - stand_sum[s] + max(spread, 0.0) / (STRAYS**2 * fps)
+            if cost < best[0, t]:
+                best[0, t], came[0, t] = cost, s
+        for s in range(t + 1):  # swinging from s to t
+            n = t - s + 1
+            if (s == 0 and stand[0] * fps < FIRM) or (t == last and stand[last] * fps < FIRM):
+                continue  # it stands where it is given
+            steps = s > 0 and t < last
+            if n < brief and steps:
+                continue
+            before = 0.0 if s == 0 else best[0, s - 1]
+            if before == np.inf:
+                continue
+            off = track[min(t + 1, last)] - track[max(s - 1, 0)]
+            cost = before + swing_sum[t + 1] - swing_sum[s]
+            cost += (off[0] ** 2 + off[1] ** 2) / ((n + 1) / fps * QUICK**2)
+            if steps:
+                cost += STEP_COST
+            if cost < best[1, t]:
+                best[1, t], came[1, t] = cost, s
+    out = np.empty((count, 2), np.int64)
+    found = 0
+    kind, t = (0 if best[0, last] <= best[1, last] else 1), last
+    while t >= 0:
+        s = came[kind, t]
+        if kind == 0:
+            out[found, 0], out[found, 1] = s, t
+            found += 1
+        kind, t = 1 - kind, s - 1
+    return out[:found][::-1].copy()

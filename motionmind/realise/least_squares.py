@@ -1,0 +1,103 @@
+"""Least squares over a trajectory in space: rows that look at three successive frames each, in one banded system.
+
+The unknowns are x, y and z of all frames in turn, so that a row of three frames spans nine of them, and the normal
+equations have seventeen diagonals.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.jit import jit
+
+_BAND = 9
+
+
+class Rows(NamedTuple):
+    """Rows of a least-squares problem: weight (coefficients . unknowns - target)^2 each.
+
+    Attributes:
+        first: frame that each row begins with [R].
+        coefficients: of x, y and z of that frame and the next two [R, 9].
+        targets: what they should add up to [R].
+        weights: of the rows' squares [R].
+    """
+
+    first: Ints
+    coefficients: Floats
+    targets: Floats
+    weights: Floats
+
+
+def position_rows(frames: Ints, directions: Floats, targets: Floats, weights: Floats) -> Rows:
+    """Return rows for how far along directions [R, 3] a trajectory is at some frames [R]: targets [R]."""
+    coefficients = np.zeros((len(frames), _BAND))
+    coefficients[:, :3] = directions
+    return Rows(frames, coefficients, targets, weights)
+
+
+def difference_rows(axis: int, shares: tuple[float, float, float], targets: Floats, weights: Floats) -> Rows:
+    """Return rows for sums of one coordinate over each three successive frames, weighted by `shares`.
+
+    Args:
+        axis: the coordinate, 0 to 2.
+        shares: of the three frames.
+        targets: of the sums [N - 2].
+        weights: of the rows [N - 2].
+    """
+    coefficients = np.zeros((len(targets), _BAND))
+    coefficients[:, axis::3] = shares
+    return Rows(np.arange(len(targets)), coefficients, targets, weights)
+
+
+def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
+    """Return the trajectory [N, 3] whose weighted sum of squares over all rows is least.
+
+    Args:
+        rows: of the problem; each frame that is not fixed must matter to one.
+        start: a trajectory with the right places at the fixed frames [N, 3].
+        fixed: frames that do not change [N].
+    """
+    from scipy.linalg import solveh_banded
+
+    joined = Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+    diagonals, right = _normal_equations(*joined, np.ascontiguousarray(start))
+    keep = np.repeat(fixed, 3)
+    # A change of 0 at the fixed frames: their own equations outweigh all others.
+    diagonals[0, keep] = 1e12 * max(diagonals[0].max(), 1.0)
+    right[keep] = 0.0
+    change = solveh_banded(diagonals, right, lower=True).reshape(-1, 3)
+    change[fixed] = 0.0
+    return np.asarray(start + change)
+
+
+@jit
+def _normal_equations(
+    first: Ints, coefficients: Floats, targets: Floats, weights: Floats, start: Floats
+) -> tuple[Floats, Floats]:
+    """Return the normal equations of a change from `start` [N, 3]: lower diagonals [9, 3 N], right side [3 N]."""
+    flat = start.ravel()
+    count = len(flat)
+    diagonals, right = np.zeros((_BAND, count)), np.zeros(count)
+    for i in range(count):
+        diagonals[0, i] = 1e-9
+    for r in range(len(first)):
+        if weights[r] == 0.0:
+            continue
+        at = 3 * first[r]
+        missing = targets[r]
+        for k in range(_BAND):
+            if coefficients[r, k] != 0.0:
+                missing -= coefficients[r, k] * flat[at + k]
+        for k in range(_BAND):
+            weighted = weights[r] * coefficients[r, k]
+            if weighted == 0.0:
+                continue
+            right[at + k] += weighted * missing
+            for m in range(k + 1):
+                if coefficients[r, m] != 0.0:
+                    diagonals[k - m, at + m] += weighted * coefficients[r, m]
+    return diagonals, right
