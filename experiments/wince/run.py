@@ -162,7 +162,7 @@ def tell(rows: list[Row]) -> str:
         "skates over the dancers'": lambda r: f"{_mean(r['rows'], 'skates') / r['rows'][0]['own_skates']:.2f}",
         "standing feet that rise": lambda r: _rises(r["one leg"]),
         "falls in the air": lambda r: _falls(r["rows"] + r["jump"]),
-        "their own": lambda r: f"{r['rows'][0]['own_falls']:.0%}",
+        "their own": lambda r: _percent(r["rows"][0]["own_falls"]),
     }
     lasts: dict[str, Callable[[Row], object]] = {
         "pairs of": lambda r: r["by"],
@@ -238,6 +238,10 @@ def _rises(rows: list[Row]) -> str:
     known = _all(rows, "rise")
     known = known[np.isfinite(known)]
     return f"{int((known > LIFTED).sum())} of {len(known)}"
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if np.isfinite(share) else "none"
 
 
 def _falls(rows: list[Row]) -> str:
