@@ -229,20 +229,38 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
     return np.asarray(solveh_banded(diagonals, right, lower=True))
 
 
-def bend_legs(
-    skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot], off: Floats, holds: Floats
-) -> Floats:
+class Posed(NamedTuple):
+    """A movement as its rotations have it, about its root: what legs are bent from.
+
+    Attributes:
+        rotations: local rotations [N, J, 4].
+        turned: orientations of the joints in the world [N, J, 4].
+        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+    """
+
+    rotations: Floats
+    turned: Floats
+    places: Floats
+
+
+def pose(skeleton: Skeleton, rotations: Floats) -> Posed:
+    """Return a movement of local rotations [N, J, 4] about its root."""
+    still = np.zeros((len(rotations), 3))
+    turned = skeleton.global_rotations(rotations)
+    return Posed(rotations, turned, skeleton.positions_and_tips(rotations, still))
+
+
+def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, holds: Floats) -> Floats:
     """Return rotations [N, J, 4] whose legs bring the feet to their places; feet keep their orientations.
 
     Args:
         skeleton: the body.
-        rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
+        posed: the movement, whose legs are to bend.
         feet: those to place.
         off: how far each is from where the rotations have it [N, feet, 3], metres.
         holds: how much each holds its place [N, feet], from 0 to 1: legs that swing keep their knees loose.
     """
-    turned, places = skeleton.global_rotations(rotations), skeleton.positions_and_tips(rotations, root)
+    rotations, turned, places = posed
     out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * holds
     for number, foot in enumerate(feet):
         hip, knee, end = chain = foot.chain(skeleton)
