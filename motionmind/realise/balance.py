@@ -15,7 +15,7 @@ from motionmind.jit import jit
 from motionmind.realise.least_squares import Rows
 
 GRAVITY = 9.81  # metres a second squared
-OVER = 0.03  # metres beyond what is allowed, standard deviation
+OVER = 0.025  # metres beyond what is allowed, standard deviation
 ROOM = 0.03  # metres that the zero-moment point may be beyond the support, which is smaller than a foot
 SWAYS = 0.5  # seconds in which a body that is given beyond its support comes back over it
 

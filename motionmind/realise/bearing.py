@@ -19,6 +19,7 @@ TOUCHES = 0.03  # metres above a limb's lowest point below which another point o
 MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
 LOADS = 0.12  # seconds in which a foot takes over the body's weight
 ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
+HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of a body at rest
 RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
 NEAR = 0.1  # metres within which a foot is in one place
 
@@ -95,6 +96,16 @@ class Bearing(NamedTuple):
     targets: Floats
     others: Floats
 
+    def holds(self, fps: float) -> Floats:
+        """Return how much each foot holds its place [N, feet], from 0 to 1: 1 while it stands, fading as it swings."""
+        out = self.stands.astype(np.float64)
+        fades = max(1, round(LOADS * fps))
+        for away in range(1, min(fades, len(out))):
+            share = 1.0 - away / fades
+            out[away:] = np.maximum(out[away:], share * self.stands[:-away])
+            out[:-away] = np.maximum(out[:-away], share * self.stands[away:])
+        return out
+
     def touching(self, shape: Shape) -> Bools:
         """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
         out = np.zeros(shape.places.shape[:2], dtype=np.bool_)
@@ -109,6 +120,7 @@ class Bearing(NamedTuple):
 def find_bearing(
     shape: Shape,
     root: Floats,
+    mass: Floats,
     firm: Floats,
     flying: Bools,
     staying: int | None,
@@ -121,6 +133,7 @@ def find_bearing(
     Args:
         shape: the body.
         root: level places of the root on which feet would slide to where they have to be [N, 2], metres.
+        mass: level places of the centre of mass relative to the root [N, 2], metres.
         firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
         flying: whether the body is in the air [N].
         staying: a foot that stands throughout, or None.
@@ -143,6 +156,8 @@ def find_bearing(
         standing_costs(shape.low[:, k] - low[:, 0], np.maximum(firm[:, foot.limb], still))
         for k, foot in enumerate(feet)
     ]
+    weighs = HEAVY * still[:, None] * _weights(shape, mass)
+    costs = [(stand, swing + weighs[:, k]) for k, (stand, swing) in enumerate(costs)]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
     if staying is not None:
@@ -163,6 +178,13 @@ def find_bearing(
             places[here, k] = stance.places
             loads[here, k] = _load(stance, len(root), fps)
     return Bearing(stances, loads, stands, places - shape.tracks, others)
+
+
+def _weights(shape: Shape, mass: Floats) -> Floats:
+    """Return about how much of the weight each foot would bear if all stood [N, feet]: the more the nearer it is."""
+    far = np.linalg.norm(shape.tracks - mass[:, None], axis=-1)
+    near = 1.0 / np.maximum(far, 0.03) ** 2
+    return np.asarray(near / np.maximum(near.sum(axis=1, keepdims=True), 1e-9)) ** 2
 
 
 def find_staying(shape: Shape, root: Floats) -> int | None:

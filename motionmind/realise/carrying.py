@@ -19,7 +19,7 @@ from motionmind.body.support import centre_of_mass
 from motionmind.realise.balance import balance_rows
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure
+from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, pose
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT
@@ -57,11 +57,13 @@ class Carried(NamedTuple):
     Attributes:
         root: positions of the root [N, 3], metres.
         off: displacements of the feet from where the rotations have them [N, feet, 3], metres.
+        holds: how much each foot holds its place [N, feet], from 0 to 1.
         heights: of the feet's lowest points that these lead to [N, feet], metres.
     """
 
     root: Floats
     off: Floats
+    holds: Floats
     heights: Floats
 
 
@@ -107,14 +109,14 @@ def carry(
             known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
         )
     flying = flying_frames(flights, (hovering[0], hovering[1]), count)
-    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
+    bearing = find_bearing(shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
-    touches = bearing.touching(shape)
+    touches, holds = bearing.touching(shape), bearing.holds(fps)
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
-    places = skeleton.positions_and_tips(rotations, np.zeros((count, 3)))
+    own = pose(skeleton, rotations)
     start, off, posed = root, np.zeros((count, len(feet), 3)), rotations
     for _ in range(ROUNDS[0]):
         mass = _mass(skeleton, posed)
@@ -124,11 +126,11 @@ def carry(
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start)]
-            rows += _reach_rows(skeleton, places, shape, bearing, floor, start, feet, fps)
+            rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
             if "balance" not in without and mass.any():
                 points = shape.places[..., [0, 2]] + start[:, None, [0, 2]]
-                for number, own in enumerate(shape.feet):
-                    points[:, own] += (bearing.targets[:, number] - start[:, [0, 2]])[:, None]
+                for number, foot_points in enumerate(shape.feet):
+                    points[:, foot_points] += (bearing.targets[:, number] - start[:, [0, 2]])[:, None]
                 centre, level = start + mass, [0, 2]
                 height = centre[:, 1] - floor
                 rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
@@ -139,8 +141,8 @@ def carry(
             places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
             stances, leg = bearing.stances[number], foot.length(skeleton)
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
-        posed = bend_legs(skeleton, rotations, start, feet, off)
-    return Carried(start, off, shape.low + start[:, 1:2] + off[..., 1])
+        posed = bend_legs(skeleton, own, feet, off, holds)
+    return Carried(start, off, holds, shape.low + start[:, 1:2] + off[..., 1])
 
 
 def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:

@@ -10,13 +10,14 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.legs import find_hinge, find_legs, reach
+from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
+LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-SLIDES = 2.0  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
 RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
 LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
 KNEE = 8.0  # radians a second at which knees bend at most in a step, which is lifted less if it is quick
@@ -228,21 +229,44 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
     return np.asarray(solveh_banded(diagonals, right, lower=True))
 
 
-def bend_legs(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot], off: Floats) -> Floats:
+class Posed(NamedTuple):
+    """A movement as its rotations have it, about its root: what legs are bent from.
+
+    Attributes:
+        rotations: local rotations [N, J, 4].
+        turned: orientations of the joints in the world [N, J, 4].
+        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+    """
+
+    rotations: Floats
+    turned: Floats
+    places: Floats
+
+
+def pose(skeleton: Skeleton, rotations: Floats) -> Posed:
+    """Return a movement of local rotations [N, J, 4] about its root."""
+    still = np.zeros((len(rotations), 3))
+    turned = skeleton.global_rotations(rotations)
+    return Posed(rotations, turned, skeleton.positions_and_tips(rotations, still))
+
+
+def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, holds: Floats) -> Floats:
     """Return rotations [N, J, 4] whose legs bring the feet to their places; feet keep their orientations.
 
     Args:
         skeleton: the body.
-        rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
+        posed: the movement, whose legs are to bend.
         feet: those to place.
         off: how far each is from where the rotations have it [N, feet, 3], metres.
+        holds: how much each holds its place [N, feet], from 0 to 1: legs that swing keep their knees loose.
     """
-    turned, places = skeleton.global_rotations(rotations), skeleton.positions_and_tips(rotations, root)
-    out = rotations.copy()
+    rotations, turned, places = posed
+    out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * holds
     for number, foot in enumerate(feet):
         hip, knee, end = chain = foot.chain(skeleton)
-        thigh, shank = reach(turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge)
+        thigh, shank = reach(
+            turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge, soft[:, number]
+        )
         thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
         out[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
         out[:, knee] = rot.inv_mul(thigh, shank)

@@ -19,7 +19,7 @@ LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly 
 HIGH = 8.0  # a second: cost of standing with a foot that the movement lifts
 MOVING = 3.0  # a second: cost of standing with a foot that the corpus moves there
 FIRM = 1.0  # a second: cost of swinging a foot that stands firmly
-STRAYS = 0.10  # metres off its track at which a standing foot costs 1 a second
+STRAYS = 0.08  # metres off its track at which a standing foot costs 1 a second
 STEP_COST = 0.5  # of each step
 QUICK = 1.2  # metres a second: a step's mean speed that costs as much as standing STRAYS off
 BRIEF = 0.33  # seconds that a step takes at least
@@ -27,7 +27,7 @@ ALONE = 30.0  # a second: cost of swinging where nothing else bears the body
 OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
 CROSSES = 4.0  # how much more it costs to be off the track towards the other feet than elsewhere
 SHIFTS = 0.08  # seconds in which a body shifts its weight from one foot to another
-SOON = 6.0  # a second: cost of swinging before that
+SOON = 12.0  # a second: cost of swinging before that
 SLIPS = 0.02  # metres that a foot may slip without a step
 
 

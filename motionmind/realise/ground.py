@@ -23,9 +23,11 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.realise.balance import GRAVITY
 from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import Foot, bend_legs, fade_at_ends, find_free_feet
+from motionmind.realise.feet import Foot, bend_legs, fade_at_ends, find_free_feet, pose
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
+
+NEAR = 0.001  # metres off its height that a foot is let be
 
 
 class Stance(NamedTuple):
@@ -179,11 +181,14 @@ def _reach_floor(
     out, off = rotations.copy(), carried.off
     if not joints:
         return out, carried.root
+    posed = pose(skeleton, rotations)
     for again in (True, False):
-        planted = bend_legs(skeleton, rotations, carried.root, feet, off)
+        planted = bend_legs(skeleton, posed, feet, off, carried.holds)
         out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
         if again:
             missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
+            if np.abs(missing).max() < NEAR:
+                break
             off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     return out, carried.root
 

@@ -10,7 +10,7 @@ from motionmind.body.limbs import limbs_of, stem_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
-SOFT = 0.02  # of a leg's length: this near to its full length a leg stretches less than it would have to
+SOFT = 0.02  # of a leg's length: this near to its full length a leg that stands stretches less than it would have to
 HINGE = 0.1  # sine of a knee's bend below which its axis is mostly the one of other frames
 
 
@@ -51,7 +51,9 @@ def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
     return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)
 
 
-def reach(hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None) -> tuple[Floats, Floats]:
+def reach(
+    hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None, soft: Floats | float = SOFT
+) -> tuple[Floats, Floats]:
     """Return rotations [N, 4] of thigh and shank, in the world, that bring the leg's end to its target.
 
     The knee bends about its own axis until the end is as far from the hip as the target, by the law of cosines; the
@@ -63,6 +65,7 @@ def reach(hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None)
         target: positions for the end [N, 3], metres.
         hinge: axis in the hip's frame about which the knee bends where the leg is all but straight [3]; None for that
             of frames where it is not.
+        soft: of the leg's length: this near to its full length it stretches less than it would have to [N].
     """
     thigh, shank = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 1]
     axis = _hinge(hip, thigh, shank, hinge)
@@ -71,7 +74,7 @@ def reach(hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None)
     across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
     least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
     now, wanted = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=-1), np.linalg.norm(target - leg[:, 0], axis=-1)
-    far = now + _soft_stretch(wanted - now, np.sqrt(least + product) - now, SOFT * np.sqrt(least + product))
+    far = now + _soft_stretch(wanted - now, np.sqrt(least + product) - now, soft * np.sqrt(least + product))
     bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
     bend = rot.from_axis_angle(axis, bends[1] - bends[0])
     turn = rot.between(thigh + rot.mul_vec(bend, shank), target - leg[:, 0])

@@ -189,8 +189,8 @@ def test_followed_is_what_the_motion_does_and_sources_are_shown_by_it(name: str)
     for a, b in pairs(engine, 5, seed=9):
         tween = engine.tween(a, b, fps=120.0)
         off = degrees_from(engine, tween, tween.path)
-        np.testing.assert_allclose(off, tween.path_degrees, atol=0.2)  # an arc between two of 120 frames a second
-        sure = np.abs(off - engine.space.tolerances) > 0.2
+        np.testing.assert_allclose(off, tween.path_degrees, atol=0.4)  # an arc between two of 120 frames a second
+        sure = np.abs(off - engine.space.tolerances) > 0.4
         np.testing.assert_array_equal(tween.followed[sure], (off <= engine.space.tolerances)[sure])
         edges = engine.grammar.transitions.edges(tween.path)
         for t, chain in np.ndindex(*edges.shape):

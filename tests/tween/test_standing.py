@@ -194,8 +194,8 @@ def test_a_body_with_nowhere_to_go_stays_where_it_is(name: str, row: int) -> Non
     engine = engine_of(name)
     here = posture(engine, row)
     motion = engine.tween(here, here, duration=1.5).motion
-    np.testing.assert_allclose(motion.root, np.broadcast_to(here.root, motion.root.shape), atol=2e-3)
-    assert np.degrees(rot.angle(motion.rotations, here.rotations)).max() < 5.0
+    np.testing.assert_allclose(motion.root, np.broadcast_to(here.root, motion.root.shape), atol=5e-3)
+    assert np.degrees(rot.angle(motion.rotations, here.rotations)).max() < 8.0
 
 
 def test_a_body_in_the_air_lands_and_jumps_where_there_is_time() -> None:
