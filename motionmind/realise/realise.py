@@ -114,7 +114,7 @@ def realise(
         if fastest is not None:
             moving = leaving is not None, arriving is not None
             missing = (b.root - a.root) / size - travel.sum(axis=0)
-            longer *= keep_pace(walk, corpus, fastest, travel + missing / len(travel), moving)
+            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
@@ -128,12 +128,15 @@ def realise(
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
+    given = [0, *(2 * move for move in through), -1]
+    flies = trusted * aloft
+    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
         trusted,
         walk.moments @ carriage.stands,
-        trusted * aloft,
+        flies,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
         size * float(carriage.overhang[0]),
