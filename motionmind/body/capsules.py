@@ -178,9 +178,9 @@ def pair_depths(ends: Floats, radii: Floats, pairs: Ints) -> tuple[Floats, Float
             i, j = pairs[p]
             far, s, u = nearest_points(ends[t, i], ends[t, j])
             depths[t, p] = radius_at(radii[i], s) + radius_at(radii[j], u) - far
-            if far > 0.0:
-                one = ends[t, i, 0] + s * (ends[t, i, 1] - ends[t, i, 0])
-                directions[t, p] = (one - ends[t, j, 0] - u * (ends[t, j, 1] - ends[t, j, 0])) / far
+            for k in range(3 if far > 0.0 else 0):
+                one = ends[t, i, 0, k] + s * (ends[t, i, 1, k] - ends[t, i, 0, k])
+                directions[t, p, k] = (one - ends[t, j, 0, k] - u * (ends[t, j, 1, k] - ends[t, j, 0, k])) / far
     return depths, directions
 
 

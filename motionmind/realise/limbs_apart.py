@@ -29,7 +29,7 @@ from motionmind.realise.legs import find_legs, reach
 
 ROUNDS = 8  # corrections, each of what those before it have left
 TOUCHES = 0.005  # metres that any two limbs may be in each other
-LEAST = 1e-4  # metres that are not corrected
+LEAST = 1e-3  # metres that are not corrected
 SPREADS = 0.12  # seconds in which a correction begins and ends
 FIRMLY = 100.0  # weight of a correction where it is needed, that of none being 1
 PLACE = 1000.0  # weight of a standing foot's place, and of that it does not slide
@@ -224,6 +224,7 @@ def _eased(need: Floats, frozen: Bools, rise: int) -> Floats:
     return np.where(frozen, 0.0, np.maximum(eased, need))
 
 
+@jit
 def _smooth(
     steps: Floats, needed: Bools, axis: Floats, still: Floats, held: Floats, frozen: Bools, spread: float
 ) -> Floats:
@@ -241,42 +242,72 @@ def _smooth(
         frozen: frames that must not change [N].
         spread: frames in which a correction begins and ends.
     """
-    from scipy.linalg import solveh_banded
+    count = len(steps)
+    # Unknowns frame by frame, three each: an equation reaches six unknowns back. matrix[i, k] is that of i and i - k.
+    matrix, out = np.zeros((3 * count, 7)), np.zeros(3 * count)
+    for t in range(count):
+        pull = FIRMLY if needed[t] else 0.0
+        for row in range(3):
+            matrix[3 * t + row, 0] += 1.0 + pull
+            out[3 * t + row] = pull * steps[t, row]
+            for column in range(3):
+                across = PLACE * ((1.0 if row == column else 0.0) - axis[t, row] * axis[t, column])
+                slide = across * min(still[t], still[t - 1]) if t > 0 else 0.0
+                if column <= row:
+                    matrix[3 * t + row, row - column] += held[t] * across + slide
+                    if t > 0:
+                        matrix[3 * t - 3 + row, row - column] += slide
+                if t > 0:
+                    matrix[3 * t + row, 3 + row - column] -= slide
+            if t > 1:
+                for one, weight in enumerate((1.0, -2.0, 1.0)):
+                    for other, factor in enumerate((1.0, -2.0, 1.0)):
+                        if other <= one:
+                            i = 3 * (t - 2 + one) + row
+                            matrix[i, 3 * (one - other)] += spread**4 * weight * factor
+    for i in range(3 * count):  # frozen frames stand apart
+        if frozen[i // 3]:
+            out[i] = 0.0
+        for k in range(min(i, 6) + 1):
+            if frozen[i // 3] or frozen[(i - k) // 3]:
+                matrix[i, k] = 1.0 if k == 0 else 0.0
+    _solve_banded(matrix, out)
+    return out.reshape(count, 3)
 
-    pull = FIRMLY * needed
-    across = PLACE * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
-    blocks = held[:, None, None] * across + (1.0 + pull)[:, None, None] * np.eye(3)
-    slides = np.minimum(still[1:], still[:-1])[:, None, None] * across[1:]
-    blocks[1:] += slides
-    blocks[:-1] += slides
-    slides[frozen[1:] | frozen[:-1]] = 0.0
-    # Second differences span three frames, so that unknowns, which are three a frame, are coupled over six rows.
-    outer = np.ones(len(steps) - 2)
-    bends = [np.convolve(outer, kernel) for kernel in ([1.0, 4.0, 1.0], [-2.0, -2.0], [1.0])]
-    diagonals = np.zeros((7, len(steps), 3))
-    for later in range(3):
-        diagonals[6 - 3 * later, later:] = spread**4 * bends[later][:, None]
-    for later in (1, 2):
-        diagonals[6 - 3 * later, later:][frozen[:-later]] = 0.0
-    for row in range(3):
-        for column in range(3):
-            if row <= column:
-                diagonals[6 - column + row, :, column] += blocks[:, row, column]
-            diagonals[3 - column + row, 1:, column] -= slides[:, row, column]
-    diagonals[:, frozen] = 0.0
-    diagonals[6, frozen] = 1.0
-    pulled = np.where(frozen[:, None], 0.0, pull[:, None] * steps)
-    return np.asarray(solveh_banded(diagonals.reshape(7, -1), pulled.ravel()).reshape(-1, 3))
+
+@jit
+def _solve_banded(matrix: Floats, right: Floats) -> None:
+    """Solve a positive definite system in place, by Cholesky's factors: matrix[i, k] is that of i and i - k [M, B]."""
+    size, width = matrix.shape
+    for i in range(size):
+        for k in range(min(i, width - 1), -1, -1):
+            total = matrix[i, k]
+            for m in range(k + 1, min(i, width - 1) + 1):
+                if m - k < width:
+                    total -= matrix[i, m] * matrix[i - k, m - k]
+            matrix[i, k] = np.sqrt(total) if k == 0 else total / matrix[i - k, 0]
+    for i in range(size):
+        for k in range(1, min(i, width - 1) + 1):
+            right[i] -= matrix[i, k] * right[i - k]
+        right[i] /= matrix[i, 0]
+    for i in range(size - 1, -1, -1):
+        right[i] /= matrix[i, 0]
+        for k in range(1, min(i, width - 1) + 1):
+            right[i - k] -= matrix[i, k] * right[i]
 
 
+@jit
 def _held(still: Floats, frozen: Bools) -> Floats:
     """Return how firmly limbs stand where a frozen frame has them [N, 4]: the least of `still` [N, 4] from it on."""
     out = np.zeros_like(still)
-    for order in (slice(None), slice(None, None, -1)):
-        least = np.zeros(still.shape[1])
-        for now, then, stays in zip(still[order], out[order], frozen[order], strict=True):
-            least = now if stays else np.minimum(least, now)
-            then[:] = np.maximum(then, least)
+    count = len(still)
+    for limb in range(still.shape[1]):
+        for backward in (False, True):
+            least = 0.0
+            for step in range(count):
+                t = count - 1 - step if backward else step
+                least = still[t, limb] if frozen[t] else min(least, still[t, limb])
+                out[t, limb] = max(out[t, limb], least)
     return out
 
 
@@ -340,10 +371,13 @@ def _steps(
             one, other = placed.ends[t, pairs[p, 0]], placed.ends[t, pairs[p, 1]]
             gap, s, u = nearest_points(one, other)
             reach = radius_at(radii[pairs[p, 0]], s) + radius_at(radii[pairs[p, 1]], u)
+            side = sides[t, p]
+            parted = side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0
+            if not parted and reach - gap - allowed[t, p] <= LEAST:
+                continue
             points[0] = one[0] + s * (one[1] - one[0])
             points[1] = other[0] + u * (other[1] - other[0])
-            side = sides[t, p]
-            if np.any(side != 0.0):
+            if parted:
                 ahead, behind = one @ side, other @ side
                 points[0], points[1] = one[ahead.argmin()], other[behind.argmax()]
                 gap = ahead.min() - behind.max()

@@ -17,7 +17,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.marginals import posterior_marginals
-from motionmind.realise.minimal import departure, minimal_movement, trust
+from motionmind.realise.minimal import LASTS, departure, minimal_movement, trust
 from motionmind.realise.stops import Rates, Stop
 from motionmind.realise.walks import (
     FOLLOWS_WITHIN,
@@ -31,6 +31,7 @@ from motionmind.realise.walks import (
     variance_at_ends,
 )
 
+STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on
 
 
@@ -114,7 +115,7 @@ def _mean_between(
     poses, trusted = np.empty_like(minimal), np.empty(joints)
 
     def walk(number: int) -> tuple[Floats, float]:
-        return _part_marginals(number, parts[number], carriage, rates, ends, len(times), path)
+        return _part_marginals(number, parts[number], carriage, rates, ends, times, path)
 
     groups = _joints_by_parts(parts, joints)
     larger = sorted({number for numbers in groups for number in numbers[:-1]})
@@ -155,15 +156,15 @@ def _part_marginals(
     carriage: Carriage,
     rates: Rates | None,
     ends: tuple[Stop, Stop],
-    count: int,
+    times: Floats,
     path: Floats | None,
 ) -> tuple[Floats, float]:
-    """Return the posterior marginals [count, N] of walks of one part of the body, and how far to trust them.
+    """Return the posterior marginals [S + 1, N] of walks of one part of the body, and how far to trust them.
 
     Arguments are those of `_mean_between`.
     """
     shown = carriage.orientations
-    near = np.ones((count, len(carriage.weights)))
+    near = np.ones((len(times), len(carriage.weights)))
     if path is not None:
         followed = (squared_distances(shown, part, pose) for pose in path[:, part])
         near[2:-2:2] = [likelihood(off / FOLLOWS_WITHIN**2) for off in followed]
@@ -174,8 +175,22 @@ def _part_marginals(
         near[-k] = likelihood(off / variance_at_ends(off), *_rate_terms(part, rates, stop))
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
     marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, carriage.weights, near)
-    way = np.sqrt(squared_distances(ends[0].chains[None], part, ends[1].chains[part])[0])
-    return marginals, trust(nearest, float(way))
+    return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0])))
+
+
+def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
+    """Return how far a part of the body has to go, radians a joint, root mean square.
+
+    It is the root of the sum of three squares: of the turn from one end to the other; of how far the part's speed at
+    the ends goes if it fades as (1 - t / LASTS)^2, sooner where there is less time; and of STRIDE for each of the
+    body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
+    get elsewhere.
+    """
+    turn = float(squared_distances(ends[0].chains[None], part, ends[1].chains[part])[0])
+    rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
+    speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
+    travel = float(np.sum((ends[1].place - ends[0].place) ** 2))
+    return float(np.sqrt(turn + (min(seconds, LASTS) / 3.0) ** 2 * speed + STRIDE**2 * travel))
 
 
 def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:

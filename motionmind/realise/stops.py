@@ -38,21 +38,28 @@ class Rates(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """A posture that a movement passes: orientations of the chains [L, 4], and its velocity; None if unknown."""
+    """A posture that a movement passes.
+
+    Attributes:
+        chains: orientations of the chains [L, 4].
+        place: of the root [3], in heights of the body.
+        rates: its velocity; None if unknown.
+    """
 
     chains: Floats
+    place: Floats
     rates: Rates | None = None
 
 
 def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) -> Stop:
     """Return a stop at a posture of the corpus's skeleton that is passed with the given velocity."""
-    chains = corpus.to_chains(posture.rotations)
+    chains, place = corpus.to_chains(posture.rotations), posture.root / (posture.skeleton.height or 1.0)
     if velocity is None:
-        return Stop(chains)
+        return Stop(chains, place)
     soon = corpus.to_chains(rot.mul(posture.rotations, rot.exp(_SOON * velocity.rotations)))
     ahead = rot.about_vertical(-rot.heading(posture.rotations[0]))
     turned = rot.log(rot.inv_mul(chains, soon)) / _SOON
-    return Stop(chains, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
+    return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
 
 
 @lru_cache(maxsize=1)

@@ -109,6 +109,23 @@ def test_without_a_way_to_go_no_joint_moves(engine: Engine) -> None:
         assert rot.angle(found.poses, stop.chains[:joints]).max() < 1e-6
 
 
+@pytest.mark.parametrize("goes", ["elsewhere", "on"])
+def test_in_one_posture_of_a_cycle_there_is_a_way_to_go_for_a_body_that_goes(engine: Engine, goes: str) -> None:
+    """It travels, or moves at its ends: what the corpus knows of such movement is trusted, as it is not at rest."""
+    a = clip_of(engine).posture(5)
+    off = np.random.default_rng(6).normal(size=(len(a.skeleton), 3))
+    a = replace(a, rotations=rot.mul(a.rotations, rot.exp(1e-3 * off)))
+    ahead = np.array([0.0, 0.0, 0.8 * a.skeleton.height if goes == "elsewhere" else 0.0])
+    moving = Velocity(np.full((len(a.skeleton), 3), 1.0), np.zeros(3)) if goes == "on" else None
+    stops = {
+        0: stop_at(engine.corpus, a, moving),
+        STEPS: stop_at(engine.corpus, replace(a, root=a.root + ahead), moving),
+    }
+    still = dict.fromkeys((0, STEPS), stop_at(engine.corpus, a))
+    assert expected(engine, still).trust.max() == 0.0
+    assert expected(engine, stops).trust.min() > 0.9
+
+
 def test_a_path_draws_the_walks_to_it(engine: Engine) -> None:
     """Of two recorded ways on, walks take the one that they are told of."""
     clip, joints = clip_of(engine), len(engine.corpus.skeleton)
@@ -131,7 +148,7 @@ def test_velocities_choose_among_walks(engine: Engine) -> None:
         """How likely the moment is in which the body was there, with one of its velocities by `sign`."""
         own = {"joints": rates.joints[row], "turn": rates.turn[row], "travel": rates.travel[row]}
         own[which] = sign * own[which]
-        stop = Stop(stop_at(corpus, clip.posture(row)).chains, Rates(**own))
+        stop = stop_at(corpus, clip.posture(row))._replace(rates=Rates(**own))
         return float(expected(engine, {0: stop, STEPS: last}).moments[0, row])
 
     inner = slice(2, len(clip) - 2)
