@@ -22,6 +22,7 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Posture, Velocity
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
 from motionmind.realise.detour import detour
@@ -65,7 +66,10 @@ def make_guide(
         walked = max(1, round(length / seconds))
         half_steps = np.linspace(0.0, length, 2 * walked + 1)
         expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps, path)
-        chains = expected.chains(learned.corpus, np.linspace(0.0, length, moves + 1)[1:-1])
+        at = np.linspace(0.0, length, moves + 1)[1:-1]
+        chains = expected.chains(learned.corpus, at)
+        if path is not None:  # the walks near it are its mean with what is like it, and move less
+            chains[:, : path.shape[1]] = rotation_spline(half_steps[::2], path, at)
         price = kappa * length / moves / MOVE
         return price * departures(chains, space.centres, space.starts, np.radians(space.tolerances))[:, rows]
 
