@@ -30,7 +30,8 @@ from motionmind.realise.expectation import expect
 from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
 
-CREEPING = 0.1  # share of the time in which walks may creep
+CREEPING = 0.25  # share of the time in which walks may creep
+SELDOM = 1.6449  # standard deviations: dancers seldom, one time in twenty, take so long for so far a way
 MOVE = 0.2  # seconds of a move that pays kappa for a tolerance's departure
 
 
@@ -83,7 +84,7 @@ def find_detour(
     duration: float,
 ) -> Floats | None:
     """Return a detour that fills the time [T + 1, J, 4] (`motionmind.realise.detour`), by moves of the usual length;
-    None where walks from one posture to the other do not creep in that time.
+    None where walks from one posture to the other do not creep in that time, or dancers might well take it.
 
     Args:
         learned: the corpus.
@@ -92,7 +93,7 @@ def find_detour(
         duration: seconds of the whole.
     """
     seconds, own = usual(learned.grammar.transitions), float(learned.pace.expected(way_between(*ends)))
-    if duration <= own:
+    if np.log(duration / own) <= SELDOM * learned.pace.spread:
         return None
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
     walked = max(1, round(duration / seconds))
