@@ -238,7 +238,9 @@ def test_unless_attested_bridges_run_both_ways_along_a_shortest_tree_and_else_to
     for size in (1, 2, 3, 12):
         centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
         graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
-        bridges = bridge_edges(graph, find_bridges(centres, graph), 0)
+        found = find_bridges(centres, graph)
+        bridges = bridge_edges(graph, found, 0)
+        assert all(found.span(before, after) == degrees for (before, after), degrees in bridges.items())
         angles = np.degrees(2.0 * np.arccos(np.clip(np.abs(centres @ centres.T), 0.0, 1.0)))
         complete = nx.Graph((i, j, {"weight": angles[i, j]}) for i in range(size) for j in range(i))
         tree = set(nx.minimum_spanning_tree(complete).edges)
@@ -287,6 +289,8 @@ def test_compiled_coordination_equals_the_network_entry_by_entry(seed: int) -> N
             table = learned.coordination.table(chain, learned.transitions.starts)
             np.testing.assert_allclose(table, -np.log(cpd.T), rtol=0.0, atol=1e-12)
             np.testing.assert_allclose(np.exp(-table).sum(axis=1), 1.0, atol=1e-12)
+            for (above, state), cost in np.ndenumerate(table):
+                assert learned.coordination.cost(chain, above, state, learned.transitions.starts) == pytest.approx(cost)
 
 
 def test_the_facing_coordinates_with_nothing(seed: int) -> None:
