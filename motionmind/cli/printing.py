@@ -150,6 +150,8 @@ def _tempo(result: Tween) -> str:
         said.append(f"the {moves} of usual length that the duration holds would not lead there")
     if tempo.faster and (result.request.fixes_length or result.request.pace > 1.0):
         said.append(f"faster than anything in the corpus: {worded(tempo.faster)}")
+    if tempo.detours:
+        said.append("what it does after such an A, and before such a B, fills the time")
     if tempo.creeps > 0.0:
         said.append(f"slower than all but its slowest seconds in {tempo.creeps:.0%} of the time")
     return "; ".join(said)

@@ -245,7 +245,7 @@ class Engine(LearnedCorpus):
             certificate.path, searched, self.grammar, self.space, formulation.coordination, request.coordination_factor
         )
         motion = _with_bridges(motion, bridges)
-        tempo = tempo_of(self, formulation.times, formulation.usual_moves, motion)
+        tempo = tempo_of(self, formulation.times, formulation.usual_moves, formulation.detours, motion)
         if tempo.faster and (request.fixes_length or request.pace > 1.0):
             warnings.warn(
                 f"faster than anything in the corpus: {worded(tempo.faster)}", MotionMindWarning, stacklevel=3

@@ -29,7 +29,7 @@ from motionmind.search.length import fewest_moves
 from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
-from motionmind.tween.guide import make_guide
+from motionmind.tween.guide import find_detour, make_guide
 from motionmind.tween.nearest_body import nearest_posture
 from motionmind.tween.pacing import UsualTime, tolls, usual_times
 from motionmind.tween.problem import build_model
@@ -66,6 +66,7 @@ class Formulation:
         times: the corpus's usual time from each stop to the next [1 + K].
         usual_moves: how many moves of the corpus's usual length a given duration holds, where that is too few to lead
             to B, and more are made; None elsewhere.
+        detours: whether what the corpus does before and after such postures fills time that is left over.
     """
 
     a: Posture
@@ -85,6 +86,7 @@ class Formulation:
     coordination: Coordination
     times: tuple[UsualTime, ...]
     usual_moves: int | None
+    detours: bool
 
     @property
     def wished(self) -> Bools:
@@ -165,9 +167,12 @@ def formulate(
     searched, coordination = problem, learned.grammar.coordination
     if by_moves:
         searched, coordination = _lifted(learned, problem, factor)
+    detour = None
     if request.kappa:
         rows = problem.model.starts[:-1].repeat(np.diff(searched.model.starts)) + searched.model.place
-        guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows)
+        if request.paced and request.duration is not None:
+            detour = find_detour(learned, (a, b), (leaving, arriving), request.duration)
+        guide = make_guide(learned, (a, b), (leaving, arriving), request.kappa, request.duration, rows, detour)
         searched = replace(searched, guide=guide)
     times = usual_times(learned, (a, *through, b))
     if request.paced:
@@ -190,6 +195,7 @@ def formulate(
         coordination,
         times,
         usual_moves,
+        detour is not None,
     )
 
 

@@ -21,11 +21,17 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Posture, Velocity
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
 from motionmind.learned.model import LearnedCorpus
+from motionmind.learned.pace import over_seconds, way_between
+from motionmind.realise.detour import detour
 from motionmind.realise.expectation import expect
 from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
 
+CREEPING = 0.25  # share of the time in which walks may creep
+SELDOM = 1.6449  # standard deviations: dancers seldom, one time in twenty, take so long for so far a way
 MOVE = 0.2  # seconds of a move that pays kappa for a tolerance's departure
 
 
@@ -36,12 +42,12 @@ def make_guide(
     kappa: float,
     duration: float | None,
     rows: Ints,
+    path: Floats | None = None,
 ) -> Callable[[int], Floats]:
     """Return the guide of a search from one posture to another, as `motionmind.search.problem.Problem` takes it.
 
     It depends on both ends and on the number of moves, not on pins, vias or other wishes: answers that differ in these
     are judged by one energy.
-
     Args:
         learned: the corpus.
         ends: postures A and B on its skeleton.
@@ -49,6 +55,8 @@ def make_guide(
         kappa: nats for a chain that is off by its tolerance for 0.2 s.
         duration: seconds of the whole; None for moves of the corpus's usual length.
         rows: the row of the grammar's states that each row of the searched model is at [G].
+        path: orientations of the joints that walks are to be near to, after each move of the corpus's usual length
+            that the duration holds, as `find_detour` gives them; None for all walks.
     """
     space, seconds = learned.space, usual(learned.grammar.transitions)
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
@@ -58,12 +66,55 @@ def make_guide(
         length = moves * seconds if duration is None else duration
         walked = max(1, round(length / seconds))
         half_steps = np.linspace(0.0, length, 2 * walked + 1)
-        expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
-        chains = expected.chains(learned.corpus, np.linspace(0.0, length, moves + 1)[1:-1])
+        expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps, path)
+        at = np.linspace(0.0, length, moves + 1)[1:-1]
+        chains = expected.chains(learned.corpus, at)
+        if path is not None:  # the walks near it are its mean with what is like it, and move less
+            chains[:, : path.shape[1]] = rotation_spline(half_steps[::2], path, at)
         price = kappa * length / moves / MOVE
         return price * departures(chains, space.centres, space.starts, np.radians(space.tolerances))[:, rows]
 
     return costs
+
+
+def find_detour(
+    learned: LearnedCorpus,
+    ends: tuple[Posture, Posture],
+    velocities: tuple[Velocity | None, Velocity | None],
+    duration: float,
+) -> Floats | None:
+    """Return a detour that fills the time [T + 1, J, 4] (`motionmind.realise.detour`), by moves of the usual length;
+    None where walks from one posture to the other do not creep in that time, or dancers might well take it.
+
+    Args:
+        learned: the corpus.
+        ends: postures A and B on its skeleton.
+        velocities: those of the ends; None where unknown.
+        duration: seconds of the whole.
+    """
+    seconds, own = usual(learned.grammar.transitions), float(learned.pace.expected(way_between(*ends)))
+    if np.log(duration / own) <= SELDOM * learned.pace.spread:
+        return None
+    stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]
+    walked = max(1, round(duration / seconds))
+    half_steps = np.linspace(0.0, duration, 2 * walked + 1)
+    expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
+    if creeps(learned, expected.poses, half_steps) <= CREEPING:
+        return None
+    return detour(learned.corpus, (stops[0].chains, stops[1].chains), walked, max(1, round(own / seconds)))
+
+
+def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:
+    """Return the share of the time in which a movement is slower than all but the slowest seconds of the corpus.
+
+    Args:
+        learned: the corpus.
+        poses: orientations of the joints [S + 1, J, 4].
+        times: of these, evenly spaced [S + 1], seconds.
+    """
+    steps = np.diff(times)
+    speeds = rot.angle(poses[:-1], poses[1:]).mean(axis=1) / steps
+    return float(np.mean(over_seconds(speeds, 1.0 / float(steps.mean())) < learned.pace.slowest[0]))
 
 
 def departures(expected: Floats, centres: Floats, starts: Ints, tolerances: Floats) -> Floats:

@@ -81,6 +81,8 @@ class Tempo(msgspec.Struct, frozen=True):
         usual_moves: how many moves of the corpus's usual length a given duration holds, where that is fewer than lead
             to B, so that more are made in that time; None elsewhere.
         faster: the parts that move faster than ever in the corpus, the worst first, a few of them.
+        detours: whether there was so much time that what the corpus does after a posture like A, and before one like B,
+            fills it.
         creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
             seconds.
     """
@@ -90,16 +92,20 @@ class Tempo(msgspec.Struct, frozen=True):
     slowest: str
     usual_moves: int | None
     faster: list[FasterPart]
+    detours: bool
     creeps: float
 
 
-def tempo_of(learned: LearnedCorpus, times: Sequence[UsualTime], usual_moves: int | None, motion: Motion) -> Tempo:
+def tempo_of(
+    learned: LearnedCorpus, times: Sequence[UsualTime], usual_moves: int | None, detours: bool, motion: Motion
+) -> Tempo:
     """Compare a motion's time with the corpus's.
 
     Args:
         learned: the corpus.
         times: its usual time of each segment.
         usual_moves: as in `Tempo`.
+        detours: as in `Tempo`.
         motion: the motion, on its joints.
     """
     faster: list[FasterPart] = []
@@ -115,7 +121,7 @@ def tempo_of(learned: LearnedCorpus, times: Sequence[UsualTime], usual_moves: in
         creeps = float(np.mean(seconds < pace.slowest[0]))
     longest = max(times, key=lambda time: time.least)
     total = sum(time.median for time in times), sum(time.least for time in times)
-    return Tempo(*total, longest.slowest, usual_moves, faster, creeps)
+    return Tempo(*total, longest.slowest, usual_moves, faster, detours, creeps)
 
 
 def worded(faster: Sequence[FasterPart]) -> str:
