@@ -318,7 +318,7 @@ def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     )
     assert (whole.start, whole.end) == (0, 12)
     first, last = find_flights(
-        np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), 30.0
+        np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
     )
     assert (first.start, last.end) == (0, 60)
     assert first.rates[0] == last.rates[1] == 0.0
