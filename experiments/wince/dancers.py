@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -79,11 +79,13 @@ class Limits(NamedTuple):
         most: of each of `MEASURES`; that of the joints as a multiple of `joints`.
         joints: what each joint's greatest speed exceeds in one window of two hundred [J], rad/s.
         own: share of the dancers' windows that are beyond any of them.
+        leans: share of the dancers' windows in which the mass is beyond `Dancers.lean`.
     """
 
     most: dict[str, float]
     joints: Floats
     own: float
+    leans: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,7 @@ class Dancers:
         windows = sum(len(seen.airborne) - frames + 1 for seen in long)
         chosen = long if windows >= _FEW else self.seen
 
-        def greatest(values: list[Floats], less: int) -> Floats:
+        def greatest(values: list[Floats] | list[Bools], less: int) -> Floats:
             """The greatest in each window of values that are `less` fewer than their frames [W, ...]."""
             size = max(frames - less, 1)
             windows = (np.lib.stride_tricks.sliding_window_view(v, min(size, len(v)), axis=0) for v in values)
@@ -135,21 +137,22 @@ class Dancers:
         most["legs"] = max(most["legs"], TOUCHING)
         count = min(map(len, all_of.values()))
         beyond = np.any([all_of[name][:count] > most[name] for name in MEASURES], axis=0)
-        return Limits(most, each, float(beyond.mean()))
+        leans = [np.nan_to_num(seen.lean) > self.lean for seen in chosen if len(seen.lean)]
+        return Limits(most, each, float(beyond.mean()), float(greatest(leans, 0).mean()) if leans else 0.0)
 
-    def worst(self, seen: Seen) -> tuple[dict[str, float], float]:
-        """How many times as great as its limit the greatest of each of `MEASURES` is, and the windows' own share."""
+    def worst(self, seen: Seen) -> dict[str, float]:
+        """How many times as great as its limit the greatest of each of `MEASURES` is."""
         limits = self.limits(len(seen.airborne))
         out = {name: float(values.max(initial=0.0)) / limits.most[name] for name, values in seen.greatest.items()}
         out["joints"] = float((seen.joints.max(axis=0, initial=0.0) / limits.joints).max()) / limits.most["joints"]
-        return out, limits.own
+        return out
 
-    @property
+    @cached_property
     def bounce(self) -> float:
         """The 99th percentile of the vertical acceleration of the dancers' mass, m/s^2."""
         return _percentile([seen.bounce for seen in self.seen])
 
-    @property
+    @cached_property
     def lean(self) -> float:
         """The 99th percentile of how far it is outside of what they stand on, on one limb and at ease, metres."""
         return _percentile([seen.lean[np.isfinite(seen.lean)] for seen in self.seen])

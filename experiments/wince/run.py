@@ -106,6 +106,7 @@ def _row(
         "travel": float(np.hypot(*(b.root - a.root)[[0, 2]])),
         "turn": float(turns.mean()),
         "own": float("nan"),
+        "own_leans": float("nan"),
         "any": 0,
         **dict.fromkeys(MEASURES, float("nan")),
         "leans": 0,
@@ -117,10 +118,11 @@ def _row(
     }
     if motion is None or seen is None or danced is None:
         return row
-    worst, own = danced.worst(seen)
+    worst, limits = danced.worst(seen), danced.limits(len(motion))
     return row | {
         "seconds": float(motion.times[-1]),
-        "own": own,
+        "own": limits.own,
+        "own_leans": limits.leans,
         "any": int(max(worst.values()) > 1.0),
         **worst,
         "leans": int(bool(np.any(seen.lean > danced.lean))),
@@ -158,11 +160,12 @@ def tell(rows: list[Row]) -> str:
         "made by": lambda r: r["maker"],
         "bounce over the dancers'": lambda r: f"{r['rows'][0]['bounce']:.2f}",
         "leans": lambda r: _interval(r["rows"], "leans"),
+        "their own windows": lambda r: f"{_mean(r['rows'], 'own_leans'):.0%}",
         "legs over 3 cm": lambda r: _interval(r["rows"], "crossed"),
         "skates over the dancers'": lambda r: f"{_mean(r['rows'], 'skates') / r['rows'][0]['own_skates']:.2f}",
         "standing feet that rise": lambda r: _rises(r["one leg"]),
         "falls in the air": lambda r: _falls(r["rows"] + r["jump"]),
-        "their own": lambda r: f"{r['rows'][0]['own_falls']:.0%}",
+        "their own": lambda r: _percent(r["rows"][0]["own_falls"]),
     }
     lasts: dict[str, Callable[[Row], object]] = {
         "pairs of": lambda r: r["by"],
@@ -238,6 +241,10 @@ def _rises(rows: list[Row]) -> str:
     known = _all(rows, "rise")
     known = known[np.isfinite(known)]
     return f"{int((known > LIFTED).sum())} of {len(known)}"
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if np.isfinite(share) else "none"
 
 
 def _falls(rows: list[Row]) -> str:

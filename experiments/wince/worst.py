@@ -41,7 +41,7 @@ def main() -> None:
             motion = found.tween(a, b, node_budget=BUDGET, fps=float(FPS)).motion
         except NoPathError:
             continue
-        worst, _ = danced.worst(see(motion, np.linspace(floor_a, floor_b, len(motion))))
+        worst = danced.worst(see(motion, np.linspace(floor_a, floor_b, len(motion))))
         beyond = ", ".join(f"{name} {times:.2f}" for name, times in worst.items() if times > 1.0)
         tried.append((max(worst.values()), f"pair {number}, {motion.times[-1]:.2f} s: {beyond or 'nothing'}", motion))
     tried.sort(key=lambda one: -one[0])

@@ -113,6 +113,7 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+    lines.insert(1, ("pace", _tempo(result)))
     lines += [("seen", sentence) for sentence in _beyond(result.shown)]
     lines += [("without", format_what_if(one, result.request)) for one in result.what_if]
     for name, line in lines:
@@ -133,6 +134,25 @@ _SEEN = {
 def _beyond(shown: Mapping[str, Sighting]) -> list[str]:
     """Say in words what a viewer sees in a movement that goes beyond all that the corpus shows."""
     return [_SEEN[name].format(one.value, one.most, one.part) for name, one in shown.items() if one.is_beyond]
+
+
+def _tempo(result: Tween) -> str:
+    """Say in words why a tween takes as long as it does, and where that is not the corpus's way."""
+    from motionmind.tween.pacing import worded
+
+    tempo, said = result.tempo, []
+    if tempo.least > tempo.usual:
+        said.append(f"{tempo.slowest} needs {tempo.least:.2f} s, so as not to be faster than is fast in the corpus")
+    else:
+        said.append(f"the corpus takes about {tempo.usual:.2f} s for so far a way")
+    if tempo.usual_moves is not None:
+        moves = count(tempo.usual_moves, "move")
+        said.append(f"the {moves} of usual length that the duration holds would not lead there")
+    if tempo.faster and (result.request.fixes_length or result.request.pace > 1.0):
+        said.append(f"faster than anything in the corpus: {worded(tempo.faster)}")
+    if tempo.creeps > 0.0:
+        said.append(f"slower than all but its slowest seconds in {tempo.creeps:.0%} of the time")
+    return "; ".join(said)
 
 
 def format_what_if(one: WhatIf, request: TweenRequest) -> str:

@@ -95,11 +95,15 @@ class Pace:
     Attributes:
         usual: usual speeds of the mean joint and of the body's turning, rad/s, and of its travel, heights/s [3].
         fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel [J + 2].
+        greatest: greatest speeds of the same in any frame [J + 2].
+        slowest: the speed of the mean joint over a second, rad/s, that only a hundredth of all seconds is below [1].
         law: level, slope and spread of the logarithm of durations [3].
     """
 
     usual: Floats
     fastest: Floats
+    greatest: Floats
+    slowest: Floats
     law: Floats
 
     @property
@@ -120,6 +124,7 @@ def learn_pace(corpus: Corpus) -> Pace:
     steps = [way_of(clip) for clip in clips]
     joints = len(corpus.skeleton)
     usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
+    greatest, slowest = fastest, np.zeros(1)
     if steps:
         speeds = FPS * np.concatenate([step.parts for step in steps])
         each = np.stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]], axis=1)
@@ -128,10 +133,18 @@ def learn_pace(corpus: Corpus) -> Pace:
         median = float(np.median(rare[:joints]))
         least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
         fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
+        greatest = np.maximum(speeds.max(axis=0), fastest)
+        seconds = [over_seconds(FPS * step.joints.mean(axis=1), FPS) for step in steps]
+        slowest = np.percentile(np.concatenate(seconds), [100.0 - RARE])
     windows = [_windows(clip, step.joints.mean(axis=1)) for clip, step in zip(clips, steps, strict=True)]
     efforts = np.concatenate([np.zeros(0), *(_effort(way, usual) for way, _ in windows)])
     logs = np.concatenate([np.zeros(0), *(np.log(seconds) for _, seconds in windows)])
-    return Pace(usual, fastest, _fit(efforts, logs))
+    return Pace(usual, fastest, greatest, slowest, _fit(efforts, logs))
+
+
+def over_seconds(speeds: Floats, fps: float) -> Floats:
+    """Return the means of speeds [T] over every second of them, or over all of them if they are fewer."""
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(speeds, min(round(fps), len(speeds))).mean(axis=1))
 
 
 def _effort(way: Way, usual: Floats) -> Floats:

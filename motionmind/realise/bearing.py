@@ -1,4 +1,4 @@
-"""Bearing: what bears a body at each frame, and where on the floor: feet by their stances, other parts where they are."""
+"""Bearing: what bears a body at each frame, and where: feet by their stances, other parts where they are."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ TOUCHES = 0.03  # metres above a limb's lowest point below which another point o
 MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the body up
 LOADS = 0.12  # seconds in which a foot takes over the body's weight
 ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
+RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
 NEAR = 0.1  # metres within which a foot is in one place
 
 
@@ -106,7 +107,14 @@ class Bearing(NamedTuple):
 
 
 def find_bearing(
-    shape: Shape, root: Floats, firm: Floats, flying: Bools, staying: int | None, feet: list[Foot], fps: float
+    shape: Shape,
+    root: Floats,
+    firm: Floats,
+    flying: Bools,
+    staying: int | None,
+    moving: tuple[bool, bool],
+    feet: list[Foot],
+    fps: float,
 ) -> Bearing:
     """Find what bears a body, and where its feet step.
 
@@ -116,6 +124,7 @@ def find_bearing(
         firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
         flying: whether the body is in the air [N].
         staying: a foot that stands throughout, or None.
+        moving: whether the body passes the first and the last frame with a velocity; else feet that are low rest there.
         feet: its feet.
         fps: frames a second.
     """
@@ -124,7 +133,16 @@ def find_bearing(
     others = np.maximum(firm, 1e-3) ** BEARS * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
     others[flying] = 0.0
     rests = others.max(axis=1, initial=0.0) > MOSTLY
-    costs = [standing_costs(shape.low[:, k] - low[:, 0], firm[:, foot.limb]) for k, foot in enumerate(feet)]
+    frames = np.arange(len(root)) / fps
+    rest = [
+        np.zeros(len(root)) if moves else np.maximum(1.0 - away / RESTS, 0.0)
+        for moves, away in zip(moving, (frames, frames[::-1]), strict=True)
+    ]
+    still = np.maximum(*rest)
+    costs = [
+        standing_costs(shape.low[:, k] - low[:, 0], np.maximum(firm[:, foot.limb], still))
+        for k, foot in enumerate(feet)
+    ]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)
     if staying is not None:
@@ -148,7 +166,7 @@ def find_bearing(
 
 
 def find_staying(shape: Shape, root: Floats) -> int | None:
-    """Return the foot that stays where it stands: one that bears alone in the first and in the last frame, in one place.
+    """Return the foot that stays where it stands: one that bears alone in the first and the last frame, in one place.
 
     Args:
         shape: the body.

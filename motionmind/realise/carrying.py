@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats
+from motionmind._typing import Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
@@ -107,7 +107,7 @@ def carry(
             known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
         )
     flying = flying_frames(flights, (hovering[0], hovering[1]), count)
-    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, feet, fps)
+    bearing = find_bearing(shape, root[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
     touches = bearing.touching(shape)
@@ -193,8 +193,7 @@ def _standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Float
     for number in range(shape.low.shape[1]):
         load = bearing.loads[:, number]
         rows.append(_axis_rows(1, floor - shape.low[:, number], load * height))
-        for k, axis in enumerate((0, 2)):
-            rows.append(_axis_rows(axis, bearing.targets[:, number, k], load * PLACE**-2.0))
+        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], load * PLACE**-2.0) for axis in (0, 2)]
     for part in np.flatnonzero(np.isfinite(shape.low_others[0])):
         rows.append(_axis_rows(1, floor - shape.low_others[:, part], bearing.others[:, part] * RIGID**-2.0))
     # Where nothing bears, or hardly, the lowest point is near the floor.

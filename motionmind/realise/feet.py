@@ -44,7 +44,7 @@ class Foot(NamedTuple):
         return self.leg[self.knee + 1 :]
 
     def chain(self, skeleton: Skeleton) -> list[int]:
-        """Return hip, knee and the point that they bring to its place, the next joint or the tip, as of points [2 J]."""
+        """Return hip, knee and the point that they bring to its place: the next joint, or its tip as J + joint."""
         return [*self.leg, self.leg[-1] + len(skeleton)][self.knee - 1 : self.knee + 2]
 
     def length(self, skeleton: Skeleton) -> float:
@@ -197,8 +197,8 @@ def _settled(height: Floats, stance: Stance, fps: float) -> Floats:
 def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: float) -> Floats:
     """Return departures [N, 3] that are as wanted where a foot stands, smooth, and elsewhere near 0.
 
-    They minimise sum_t 1e6 s^2 |d - wanted|^2 + (1 - s) |d|^2 + (BENDS^4) |d''|^2 + SLIDES^2 l |d' + track'|^2, with s how
-    much it stands, and l how low it is in a step. They are 0, and depart smoothly, at both ends.
+    They minimise sum_t 1e6 s^2 |d - wanted|^2 + (1 - s) |d|^2 + BENDS^4 |d''|^2 + SLIDES^2 l |d' + track'|^2, with s
+    how much it stands, and l how low it is in a step. They are 0, and depart smoothly, at both ends.
 
     Args:
         wanted: displacements of a foot that stands [N, 3], metres.

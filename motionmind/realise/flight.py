@@ -88,8 +88,8 @@ def find_flights(
         middles = np.interp((np.arange(count) + 0.5) / max(count, 1), np.cumsum(share) / share.sum(), frames)
         for middle in middles:
             half = min(0.5 * seconds * fps, 0.5 * (end - begin))
-            middle = float(np.clip(middle, begin + half, max(end - half, begin + half)))
-            flight = Flight(round(middle - half), round(middle + half), (None, None))
+            top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
+            flight = Flight(round(top - half), round(top + half), (None, None))
             if half >= 0.5 * SHORTEST * fps and flight.end - flight.start > 2:
                 out.append(flight)
                 begin = flight.end + push

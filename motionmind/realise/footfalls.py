@@ -21,12 +21,12 @@ MOVING = 3.0  # a second: cost of standing with a foot that the corpus moves the
 FIRM = 1.0  # a second: cost of swinging a foot that stands firmly
 STRAYS = 0.10  # metres off its track at which a standing foot costs 1 a second
 STEP_COST = 0.5  # of each step
-QUICK = 1.8  # metres a second: a step's mean speed that costs as much as standing STRAYS off
-BRIEF = 0.27  # seconds that a step takes at least
+QUICK = 1.2  # metres a second: a step's mean speed that costs as much as standing STRAYS off
+BRIEF = 0.33  # seconds that a step takes at least
 ALONE = 30.0  # a second: cost of swinging where nothing else bears the body
 OUTSIDE = 0.8  # share of a sideways course during a stance that a foot spends on its own side of its track
 CROSSES = 4.0  # how much more it costs to be off the track towards the other feet than elsewhere
-SHIFTS = 0.12  # seconds in which a body shifts its weight from one foot to another
+SHIFTS = 0.08  # seconds in which a body shifts its weight from one foot to another
 SOON = 6.0  # a second: cost of swinging before that
 SLIPS = 0.02  # metres that a foot may slip without a step
 
@@ -106,7 +106,9 @@ def find_stances(
 
 
 @jit
-def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float) -> Ints:
+def _part(  # noqa: PLR0915 - one table, filled in one go
+    track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: int, fps: float
+) -> Ints:
     """Return the intervals [K, 2] in which a foot stands, in order (see `find_stances`)."""
     count = len(track)
     stand_sum, swing_sum = np.zeros(count + 1), np.zeros(count + 1)
@@ -116,13 +118,7 @@ def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: i
         sums[t + 1] = sums[t] + track[t]
         squares[t + 1] = squares[t] + track[t, 0] ** 2 + track[t, 1] ** 2
     last = count - 1
-    # What it costs that a foot which stays at A, or comes to B early, crosses to the other side meanwhile.
-    crosses = np.zeros((2, count + 1))
-    for t in range(count):
-        for side in range(2):
-            off = track[t] - track[side * last]
-            inward = max(off[0] * outward[t, 0] + off[1] * outward[t, 1], 0.0)
-            crosses[side, t + 1] = crosses[side, t] + CROSSES * inward * inward
+    crosses = _crossing(track, outward)
     # best[0, t]: standing up to frame t, and swinging from t + 1 on; best[1, t]: swinging, and standing from t + 1 on.
     best = np.full((2, count), np.inf)
     came = np.full((2, count), -1)
@@ -176,3 +172,16 @@ def _part(track: Floats, outward: Floats, stand: Floats, swing: Floats, brief: i
             found += 1
         kind, t = 1 - kind, s - 1
     return out[:found][::-1].copy()
+
+
+@jit
+def _crossing(track: Floats, outward: Floats) -> Floats:
+    """Return what it costs, up to each frame [2, N + 1], that a foot stays at A, or comes to B early, while the body
+    goes to its other side."""
+    out, last = np.zeros((2, len(track) + 1)), len(track) - 1
+    for t in range(len(track)):
+        for side in range(2):
+            off = track[t] - track[side * last]
+            inward = max(off[0] * outward[t, 0] + off[1] * outward[t, 1], 0.0)
+            out[side, t + 1] = out[side, t] + CROSSES * inward * inward
+    return out

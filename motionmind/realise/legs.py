@@ -47,7 +47,8 @@ def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
     angle = max(described.angles.values(), key=lambda one: one.range[1] - one.range[0])
     axis = np.eye(3)[angle.axis] * angle.sign * np.sign(sum(angle.range))
     # A turn is mirrored as its axis is, and reversed.
-    return axis * np.array([1.0, -1.0, -1.0]) if anatomy.paired(joint) and name.startswith("right_") else axis
+    mirrored = anatomy.paired(joint) and name.startswith("right_")
+    return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)
 
 
 def reach(hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None) -> tuple[Floats, Floats]:

@@ -4,9 +4,9 @@ Limbs are capsules (`motionmind.body.capsules`). While two are in each other the
 It lies between them as they meet and as they part; where these are opposite sides, as of a leg that goes from in front
 of the other to behind it, the plane turns on the way by the line from one hip (or shoulder) to the other, so that the
 limbs open. Each limb turns as a whole about its hip or shoulder, as little as will do, and smoothly in time; feet keep
-their orientations, and a foot that stands its place: such a leg turns about the line from hip to ankle alone. A foot
-that would sink into the floor is lifted by its knee. The given postures do not change; what they have in each other, or
-the corpus usually has, stays.
+their orientations. A foot that stands does not slide: it stands elsewhere from the step that leads there on or, where a
+given posture has it, its leg turns about the line from hip to ankle alone. A foot that would sink into the floor is
+lifted by its knee. The given postures do not change; what they have in each other, or the corpus usually has, stays.
 
 Constants were chosen on random pairs of `cmu-05` and ballet.
 """
@@ -32,7 +32,7 @@ TOUCHES = 0.005  # metres that any two limbs may be in each other
 LEAST = 1e-4  # metres that are not corrected
 SPREADS = 0.12  # seconds in which a correction begins and ends
 FIRMLY = 100.0  # weight of a correction where it is needed, that of none being 1
-PLACE = 1000.0  # weight of a standing foot's place
+PLACE = 1000.0  # weight of a standing foot's place, and of that it does not slide
 LEVER = 0.1  # metres: touched so near to its joint, a limb turns half as far as it would have to
 MOST = 0.3  # radians that a limb turns in one correction
 STEADY = 0.08  # metres a second at which a foot stands half as firmly as one at rest
@@ -63,19 +63,19 @@ class _Placed(NamedTuple):
         ends: of the capsules' axes [N, C, 2, 3].
         pivots: places of the limbs' first joints [N, 4, 3].
         anchors: places of their last [N, 4, 3].
-        still: how firmly each limb stands where it is [N, 4], from 0 to 1.
+        held: how firmly each limb stands where a given posture has it [N, 4], from 0 to 1.
     """
 
     ends: Floats
     pivots: Floats
     anchors: Floats
-    still: Floats
+    held: Floats
 
 
 def keep_limbs_apart(
     skeleton: Skeleton,
     rotations: Floats,
-    root: Floats,
+    root: Floats | None,
     times: Floats,
     given: Floats,
     fixed: Bools,
@@ -86,7 +86,7 @@ def keep_limbs_apart(
     Args:
         skeleton: the body; if it has no capsules, nothing changes.
         rotations: local rotations [N, J, 4].
-        root: positions of the root [N, 3], metres.
+        root: positions of the root [N, 3], metres; None where they are not known yet, and no foot stands anywhere.
         times: of the frames [N], seconds, evenly spaced.
         given: times of postures that must not change, in frames, whole or not, from the first to the last [G]. The
             frames next to them do not change either.
@@ -108,10 +108,11 @@ def keep_limbs_apart(
         return rotations
     limbs = _limbs_of(skeleton, capsules)
     still = np.zeros((len(rotations), 4))
-    still[:, :2] = _standing(capsules, places + root[:, None], fps)
-    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], still)
-    sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
+    if root is not None:
+        still[:, :2] = _standing(capsules, places + root[:, None], fps)
     frozen = np.isin(frames, held + np.array([[-1], [0], [1]]))
+    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], _held(still, frozen))
+    sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
     free = ~(fixed[limbs.first] | fixed[limbs.last])
     turned = np.tile(rot.IDENTITY, (len(rotations), 4, 1))
     for _ in range(ROUNDS):
@@ -123,10 +124,13 @@ def keep_limbs_apart(
         for limb in np.flatnonzero(needed.any(axis=0)):
             axis = placed.anchors[:, limb] - placed.pivots[:, limb]
             axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
-            turns[:, limb] = _smooth(steps[:, limb], needed[:, limb], axis, still[:, limb], frozen, SPREADS * fps)
+            own = steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
+            turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
         _turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)
     out = _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+    if root is None:
+        return out
     lowest = lowest_height(skeleton, rotations, root)
     floor = np.minimum(lowest, np.linspace(lowest[0], lowest[-1], len(lowest)))
     return _lift_feet(skeleton, out, root, floor, fixed, frozen, fps)
@@ -220,40 +224,60 @@ def _eased(need: Floats, frozen: Bools, rise: int) -> Floats:
     return np.where(frozen, 0.0, np.maximum(eased, need))
 
 
-def _smooth(steps: Floats, needed: Bools, axis: Floats, still: Floats, frozen: Bools, spread: float) -> Floats:
+def _smooth(
+    steps: Floats, needed: Bools, axis: Floats, still: Floats, held: Floats, frozen: Bools, spread: float
+) -> Floats:
     """Return rotation vectors d [N, 3] that are near `steps` [N, 3] where needed, and smooth in time.
 
-    They minimise sum_t n |d - step|^2 + |d|^2 + PLACE still |d - (d . axis) axis|^2 + spread^4 |d''|^2, with n FIRMLY
-    where needed and 0 elsewhere, and d = 0 in frozen frames.
+    They minimise sum_t n |d - step|^2 + |d|^2 + PLACE (held |e|^2 + still |e'|^2) + spread^4 |d''|^2, with n FIRMLY
+    where needed and 0 elsewhere, e the part of d across the axis, differences for derivatives, and d = 0 where frozen.
 
     Args:
         steps: wanted rotation vectors [N, 3], radians.
         needed: where they are wanted [N].
         axis: unit vectors about which a limb that stands may turn [N, 3].
         still: how firmly it stands [N].
+        held: how firmly it stands where a frozen frame has it [N].
         frozen: frames that must not change [N].
         spread: frames in which a correction begins and ends.
     """
     from scipy.linalg import solveh_banded
 
     pull = FIRMLY * needed
-    blocks = (PLACE * still)[:, None, None] * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
-    blocks += (1.0 + pull)[:, None, None] * np.eye(3)
-    # Second differences: three frames each, so that unknowns, which are three a frame, are coupled over six rows.
+    across = PLACE * (np.eye(3) - axis[:, :, None] * axis[:, None, :])
+    blocks = held[:, None, None] * across + (1.0 + pull)[:, None, None] * np.eye(3)
+    slides = np.minimum(still[1:], still[:-1])[:, None, None] * across[1:]
+    blocks[1:] += slides
+    blocks[:-1] += slides
+    slides[frozen[1:] | frozen[:-1]] = 0.0
+    # Second differences span three frames, so that unknowns, which are three a frame, are coupled over six rows.
     outer = np.ones(len(steps) - 2)
     bends = [np.convolve(outer, kernel) for kernel in ([1.0, 4.0, 1.0], [-2.0, -2.0], [1.0])]
     diagonals = np.zeros((7, len(steps), 3))
-    for above in range(3):
-        for column in range(above, 3):
-            diagonals[6 - above, :, column] = blocks[:, column - above, column]
     for later in range(3):
-        diagonals[6 - 3 * later, later:] += spread**4 * bends[later][:, None]
-    diagonals[:, frozen] = 0.0
-    diagonals[6, frozen] = 1.0
+        diagonals[6 - 3 * later, later:] = spread**4 * bends[later][:, None]
     for later in (1, 2):
         diagonals[6 - 3 * later, later:][frozen[:-later]] = 0.0
+    for row in range(3):
+        for column in range(3):
+            if row <= column:
+                diagonals[6 - column + row, :, column] += blocks[:, row, column]
+            diagonals[3 - column + row, 1:, column] -= slides[:, row, column]
+    diagonals[:, frozen] = 0.0
+    diagonals[6, frozen] = 1.0
     pulled = np.where(frozen[:, None], 0.0, pull[:, None] * steps)
     return np.asarray(solveh_banded(diagonals.reshape(7, -1), pulled.ravel()).reshape(-1, 3))
+
+
+def _held(still: Floats, frozen: Bools) -> Floats:
+    """Return how firmly limbs stand where a frozen frame has them [N, 4]: the least of `still` [N, 4] from it on."""
+    out = np.zeros_like(still)
+    for order in (slice(None), slice(None, None, -1)):
+        least = np.zeros(still.shape[1])
+        for now, then, stays in zip(still[order], out[order], frozen[order], strict=True):
+            least = now if stays else np.minimum(least, now)
+            then[:] = np.maximum(then, least)
+    return out
 
 
 @jit
@@ -338,8 +362,8 @@ def _steps(
                 lever = np.cross(touched - placed.pivots[t, limb], side) * (1.0 - 2.0 * k)
                 axis = placed.anchors[t, limb] - placed.pivots[t, limb]
                 along = np.sum(lever * axis) / max(np.sum(axis**2), 1e-9) * axis
-                still = placed.still[t, limb]
-                levers[k] = (1.0 - still) * lever + still * along
+                held = placed.held[t, limb]
+                levers[k] = (1.0 - held) * lever + held * along
                 size += np.sum(lever * levers[k])
             for k in range(2):
                 limb = limbs.owner[pairs[p, k]]

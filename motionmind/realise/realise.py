@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -11,6 +11,7 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
+from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -113,24 +114,29 @@ def realise(
         if fastest is not None:
             moving = leaving is not None, arriving is not None
             missing = (b.root - a.root) / size - travel.sum(axis=0)
-            longer *= keep_pace(walk, corpus, fastest, travel + missing / len(travel), moving)
+            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
     rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
     rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
-    rotations = _limit(rotations, postures, carriage.loose)
+    # Once so that feet find places to stand at, and once for where they have been put.
+    keep_apart = _keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
+    rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     trust = walk.trust[:, 0]
     aloft = walk.moments @ carriage.aloft
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
+    given = [0, *(2 * move for move in through), -1]
+    flies = trusted * aloft
+    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
         size * (walk.moments @ carriage.clearance),
         trusted,
         walk.moments @ carriage.stands,
-        trusted * aloft,
+        flies,
         size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
         size * travel,
         size * float(carriage.overhang[0]),
@@ -147,14 +153,7 @@ def realise(
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         without,
     )
-    if "limbs" not in without:
-        given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
-        # As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
-        legs = [joint for leg, _ in find_legs(a.skeleton)[1] for joint in leg]
-        may_not = np.where(
-            np.isin(np.arange(len(a.skeleton)), legs), *(each[: len(a.skeleton)] for each in (fixed, wished))
-        )
-        rotations = keep_limbs_apart(a.skeleton, rotations, root, clock.frames, given, may_not, carriage.touches)
+    rotations = keep_apart(rotations, root)
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
 
@@ -265,6 +264,30 @@ def _with_rates(
         return rotations
     until = clock.moves[stops[1]], clock.moves[stops[-2]]
     return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
+
+
+def _keeper(
+    clock: Timeline,
+    stops: Sequence[int],
+    fixed: Bools,
+    wished: Bools,
+    carriage: Carriage,
+    skeleton: Skeleton,
+    without: Collection[Correction],
+) -> Callable[[Floats, Floats | None], Floats]:
+    """Return what keeps limbs apart in rotations [N, J, 4] of a body whose root is at some places [N, 3], if known.
+
+    As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
+    """
+    if "limbs" in without:
+        return lambda rotations, root: rotations
+    legs = [joint for leg, _ in find_legs(skeleton)[1] for joint in leg]
+    stays = wished[: len(skeleton)].copy()
+    stays[legs] = fixed[legs]
+    given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
+    return lambda rotations, root: keep_limbs_apart(
+        skeleton, rotations, root, clock.frames, given, stays, carriage.touches
+    )
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

@@ -16,13 +16,13 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import way_of
 from motionmind.realise.expectation import Expectation
 
-# A peak within a half step, and the fine detail that is added later, are faster than the half step on average.
-HEADROOM = 0.85
+HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
 SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
 
 
 def keep_pace(
     walk: Expectation,
+    frames: Floats,
     corpus: Corpus,
     fastest: Floats,
     travel: Floats,
@@ -32,19 +32,20 @@ def keep_pace(
 
     Args:
         walk: the movement at its half steps.
+        frames: times at which to look how fast it is, in order, seconds.
         corpus: what it was learned from.
         fastest: speeds of the joints, rad/s, of the body's turning, and of its travel, heights/s [J + 2].
         travel: level displacement of the root in each half step [2 T, 3], metres, on the corpus's skeleton.
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
     """
-    chains = walk.poses
-    if corpus.facing == "free":
-        chains = np.concatenate([chains, rot.about_vertical(walk.headings)[:, None]], axis=1)
-    root = np.concatenate([np.zeros((1, 3)), np.cumsum(travel, axis=0)])
     times = walk.half_steps
-    speeds = way_of(Motion(corpus.skeleton, rot.normalise(corpus.from_chains(chains)), root, times)).parts
-    speeds /= np.diff(times)[:, None]
-    slower = np.maximum((speeds / (HEADROOM * fastest)).max(axis=1), 1.0)
+    root = np.concatenate([np.zeros((1, 3)), np.cumsum(travel, axis=0)])
+    at = np.stack([np.interp(frames, times, axis) for axis in root.T], axis=1)
+    rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, frames)))
+    speeds = way_of(Motion(corpus.skeleton, rotations, at, frames)).parts / np.diff(frames)[:, None]
+    slower = np.ones(len(travel))
+    step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
+    np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
     # The greatest of three, twice, covers the mean of five: no half step is slowed less than it needs.
     around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, 2, mode="edge"), 5).max(axis=1)
     weights = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0

@@ -59,15 +59,7 @@ def choose_length(problem: Problem) -> LengthChoice:
     if tolls is None or tolls.shape != hastes.shape or not np.isfinite(tolls).all():
         raise ValueError(f"there must be finite tolls of the shape {hastes.shape}")
     costs = hastes + tolls
-    # Least cost of the first segments together, by the move after which they end [N + 1], from none to all.
-    so_far = [np.where(np.arange(rules.longest + 1) == 0, 0.0, np.inf)]
-    for number, row in enumerate(costs):
-        least = np.full(rules.longest + 1, np.inf)
-        for first in np.flatnonzero(np.isfinite(so_far[-1])):
-            np.minimum(least[first:], so_far[-1][first] + row[: len(row) - first], out=least[first:])
-        if number < len(problem.vias) and (move := problem.vias[number].move) is not None:
-            least[np.arange(len(least)) != move] = np.inf
-        so_far.append(least)
+    so_far = _so_far(problem, costs)
     so_far[-1][: rules.shortest] = np.inf
     ends = [int(so_far[-1].argmin())]
     if not np.isfinite(so_far[-1][ends[0]]):
@@ -77,6 +69,35 @@ def choose_length(problem: Problem) -> LengthChoice:
     cost, haste = float(so_far[-1][ends[-1]]), sum(hastes[k, b - a] for k, (a, b) in enumerate(pairwise(ends)))
     elsewhere = float(np.delete(so_far[-1], ends[-1]).min(initial=np.inf))
     return LengthChoice(ends[-1], cost, cost, elsewhere, 0, float(haste), tuple(ends[1:-1]))
+
+
+def fewest_moves(problem: Problem) -> int | None:
+    """Return the least number of moves, of those that the rules allow, in which a path satisfies the problem; None if
+    there is none."""
+    rules = problem.rules
+    found = _so_far(problem, _hastes(problem))[-1]
+    possible = np.flatnonzero(np.isfinite(found[rules.shortest :]))
+    return rules.shortest + int(possible[0]) if len(possible) else None
+
+
+def _so_far(problem: Problem, costs: Floats) -> list[Floats]:
+    """Return the least cost of the first segments together, from none to all, by the move after which they end
+    [N + 1].
+
+    Args:
+        problem: the problem.
+        costs: nats of each segment in each number of moves [K, N + 1].
+    """
+    count = costs.shape[1]
+    out = [np.where(np.arange(count) == 0, 0.0, np.inf)]
+    for number, row in enumerate(costs):
+        least = np.full(count, np.inf)
+        for first in np.flatnonzero(np.isfinite(out[-1])):
+            np.minimum(least[first:], out[-1][first] + row[: count - first], out=least[first:])
+        if number < len(problem.vias) and (move := problem.vias[number].move) is not None:
+            least[np.arange(count) != move] = np.inf
+        out.append(least)
+    return out
 
 
 def _hastes(problem: Problem) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
-from motionmind.errors import InfeasibleError, NoPathError
+from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
@@ -26,6 +27,7 @@ from motionmind.tween.certificate import Bridge, Source, break_down_cost, source
 from motionmind.tween.constraints import find_conflicts
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
+from motionmind.tween.pacing import tempo_of, worded
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.tween.what_if import Answer, WhatIf, find_what_if
@@ -243,6 +245,11 @@ class Engine(LearnedCorpus):
             certificate.path, searched, self.grammar, self.space, formulation.coordination, request.coordination_factor
         )
         motion = _with_bridges(motion, bridges)
+        tempo = tempo_of(self, formulation.times, formulation.usual_moves, motion)
+        if tempo.faster and (request.fixes_length or request.pace > 1.0):
+            warnings.warn(
+                f"faster than anything in the corpus: {worded(tempo.faster)}", MotionMindWarning, stacklevel=3
+            )
         moves = self.corpus.moves
         # A curve through the frames: a move may fall between two, and the arc between them is a chord.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
@@ -275,6 +282,7 @@ class Engine(LearnedCorpus):
             request=request,
             length=certificate.length,
             times=formulation.times,
+            tempo=tempo,
             before=formulation.before,
             after=formulation.after,
             plausibility=self.plausibility,

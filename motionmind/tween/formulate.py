@@ -25,6 +25,7 @@ from motionmind.learned.model import LearnedCorpus
 from motionmind.realise.timeline import usual
 from motionmind.retarget.joint_mapping import joint_mapping
 from motionmind.retarget.retarget import to_human23
+from motionmind.search.length import fewest_moves
 from motionmind.search.problem import Model, Problem, Rules, Via
 from motionmind.search.solve import MOST_STATES_OF_CHAIN
 from motionmind.tween.constraints import Constraint, constraints_of, restrict
@@ -63,6 +64,8 @@ class Formulation:
             by their moves.
         coordination: the network in the costs of `searched`.
         times: the corpus's usual time from each stop to the next [1 + K].
+        usual_moves: how many moves of the corpus's usual length a given duration holds, where that is too few to lead
+            to B, and more are made; None elsewhere.
     """
 
     a: Posture
@@ -81,6 +84,7 @@ class Formulation:
     searched: Problem
     coordination: Coordination
     times: tuple[UsualTime, ...]
+    usual_moves: int | None
 
     @property
     def wished(self) -> Bools:
@@ -150,6 +154,14 @@ def formulate(
         rules,
         tuple(Via(state, None if move is None else int(move)) for state, (_, move) in zip(passing, vias, strict=True)),
     )
+    usual_moves = None
+    if request.duration is not None and request.moves is None and not (request.unlike or request.posturewise):
+        most = max(longest, request.max_moves)
+        fewest = fewest_moves(replace(problem, rules=replace(rules, longest=most)))
+        if fewest is not None and fewest > longest:
+            usual_moves, longest = longest, fewest
+            rules = replace(rules, shortest=fewest, longest=fewest)
+            problem = replace(problem, rules=rules)
     searched, coordination = problem, learned.grammar.coordination
     if by_moves:
         searched, coordination = _lifted(learned, problem, factor)
@@ -177,6 +189,7 @@ def formulate(
         searched,
         coordination,
         times,
+        usual_moves,
     )
 
 

@@ -21,16 +21,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.motion import Posture
+from motionmind.body.motion import Motion, Posture
 from motionmind.learned.model import LearnedCorpus
-from motionmind.learned.pace import way_between
+from motionmind.learned.pace import over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 
 A_CHAIN = 10.0  # w: how often the duration's density counts for each chain
 HURRIES = 1e4  # nats for half of the least time
+WORST = 3  # parts of the body that are named as faster than ever
+BEYOND = 1.2  # times the corpus's greatest speed: what is no faster than that is not worth a word
 PEAK = 15.0 / 8.0  # of a smooth movement's speed over its mean
 
 
@@ -51,7 +54,7 @@ class UsualTime:
 
 def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
     """Return the corpus's usual time from each of the postures to the next."""
-    parts = (*learned.corpus.skeleton.names, "turning", "travel")
+    parts = _parts(learned)
     out = []
     for a, b in pairwise(stops):
         way = way_between(a, b)
@@ -59,6 +62,70 @@ def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[Usual
         slowest = int(needs.argmax())
         out.append(UsualTime(float(learned.pace.expected(way)), float(needs[slowest]), parts[slowest]))
     return tuple(out)
+
+
+class FasterPart(msgspec.Struct, frozen=True):
+    """A part of the body, by its name, that is so many times as fast as it ever is in the corpus."""
+
+    part: str
+    times: float
+
+
+class Tempo(msgspec.Struct, frozen=True):
+    """How the time that a tween takes compares with the corpus's.
+
+    Attributes:
+        usual: the corpus's median for ways as far, seconds.
+        least: seconds in which nothing need be faster than all but the corpus's fastest hundredth of moments.
+        slowest: the part that needs them: a joint, "turning" or "travel".
+        usual_moves: how many moves of the corpus's usual length a given duration holds, where that is fewer than lead
+            to B, so that more are made in that time; None elsewhere.
+        faster: the parts that move faster than ever in the corpus, the worst first, a few of them.
+        creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
+            seconds.
+    """
+
+    usual: float
+    least: float
+    slowest: str
+    usual_moves: int | None
+    faster: list[FasterPart]
+    creeps: float
+
+
+def tempo_of(learned: LearnedCorpus, times: Sequence[UsualTime], usual_moves: int | None, motion: Motion) -> Tempo:
+    """Compare a motion's time with the corpus's.
+
+    Args:
+        learned: the corpus.
+        times: its usual time of each segment.
+        usual_moves: as in `Tempo`.
+        motion: the motion, on its joints.
+    """
+    faster: list[FasterPart] = []
+    creeps = 0.0
+    if len(motion) > 1:
+        pace, way = learned.pace, way_of(motion)
+        speeds = way.parts / np.diff(motion.times)[:, None]
+        beyond = speeds.max(axis=0) / pace.greatest
+        names = _parts(learned)
+        worst = [k for k in np.argsort(-beyond, kind="stable")[:WORST] if beyond[k] > BEYOND]
+        faster = [FasterPart(names[k], float(beyond[k])) for k in worst]
+        seconds = over_seconds(speeds[:, : len(motion.skeleton)].mean(axis=1), max(motion.fps, 1.0))
+        creeps = float(np.mean(seconds < pace.slowest[0]))
+    longest = max(times, key=lambda time: time.least)
+    total = sum(time.median for time in times), sum(time.least for time in times)
+    return Tempo(*total, longest.slowest, usual_moves, faster, creeps)
+
+
+def worded(faster: Sequence[FasterPart]) -> str:
+    """Return parts that are faster than ever in words: "left_knee 2.1 times, travel 1.4 times"."""
+    return ", ".join(f"{one.part} {one.times:.1f} times" for one in faster)
+
+
+def _parts(learned: LearnedCorpus) -> tuple[str, ...]:
+    """Return the names of the parts of a way."""
+    return (*learned.corpus.skeleton.names, "turning", "travel")
 
 
 def tolls(learned: LearnedCorpus, times: Sequence[UsualTime], longest: int) -> Floats:

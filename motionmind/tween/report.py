@@ -14,6 +14,7 @@ from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
 from motionmind.search.length import LengthChoice
 from motionmind.tween.certificate import Bridge, Source, Wait
+from motionmind.tween.pacing import Tempo
 from motionmind.tween.what_if import WhatIf
 
 
@@ -46,6 +47,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         gap: (cost - lower bound) / cost.
         moves: number of moves T.
         length: how that number was chosen, by what paths cost without the guide; null where it was given.
+        tempo: how the time compares with the corpus's; null in reports of 0.1.
         expansions: nodes that A* expanded.
         peak_nodes: greatest number of nodes that A* held.
         node_budget: number of nodes that it might hold.
@@ -90,6 +92,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     gap: float
     moves: int = 0
     length: LengthChoice | None = None
+    tempo: Tempo | None = None
     expansions: int = 0
     peak_nodes: int = 0
     node_budget: int = 0

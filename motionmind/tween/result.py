@@ -15,7 +15,7 @@ from motionmind.search.length import LengthChoice
 from motionmind.search.problem import Problem, Via
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, CostBreakdown, Source, Wait, gap_of
-from motionmind.tween.pacing import UsualTime
+from motionmind.tween.pacing import Tempo, UsualTime
 from motionmind.tween.report import PassedPosture, ReportedCosts, TweenReport, plain
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.what_if import WhatIf
@@ -56,6 +56,7 @@ class Tween:
         request: what was asked.
         length: how the number of moves was chosen; None where it was given, and without a guide.
         times: the corpus's usual time from each posture that is passed exactly to the next.
+        tempo: how the time that the tween takes compares with the corpus's.
         before: seconds of the movement before A that shows its velocity; None where A was given alone.
         after: seconds of the movement after B that shows its velocity; None where B was given alone.
         plausibility: what the corpus's own movement shows a viewer at most.
@@ -94,6 +95,7 @@ class Tween:
     request: TweenRequest
     length: LengthChoice | None
     times: tuple[UsualTime, ...]
+    tempo: Tempo
     before: float | None
     after: float | None
     plausibility: Plausibility
@@ -152,6 +154,7 @@ def report_of(tween: Tween) -> TweenReport:
         gap=tween.gap,
         moves=tween.moves,
         length=tween.length,
+        tempo=tween.tempo,
         expansions=tween.expansions,
         peak_nodes=tween.peak_nodes,
         node_budget=tween.node_budget,

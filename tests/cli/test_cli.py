@@ -27,7 +27,7 @@ from motionmind.tween.engine import Engine
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
 REPORT = {
-    *("asked", "status", "cost", "lower_bound", "gap", "moves", "length"),
+    *("asked", "status", "cost", "lower_bound", "gap", "moves", "length", "tempo"),
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
     *("sources", "detail", "shown", "times", "names", "degrees", "likelihood", "costs"),
@@ -84,7 +84,19 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
     table.pop("seen", None)  # where it goes beyond the corpus
-    assert list(table) == ["moves", "cost", "proven", "attested", "bridged", "waited", "A", "B", "motion", "written"]
+    assert list(table) == [
+        "moves",
+        "pace",
+        "cost",
+        "proven",
+        "attested",
+        "bridged",
+        "waited",
+        "A",
+        "B",
+        "motion",
+        "written",
+    ]
     assert f" {report['moves']}, in " in table["moves"]
     assert f"{report['cost']:.3f}" in table["cost"]
     assert f"{report['lower_bound']:.3f}, gap {report['gap']:.2%}" in table["proven"]

@@ -100,7 +100,7 @@ def test_six_segments_are_joined_from_a_to_b(joined: Tween) -> None:
     assert_sound(joined, CLIPS[0].posture(3), CLIPS[1].posture(30))
     assert joined.joints == (*insect().names, "facing")
     assert joined.moves >= 1
-    assert joined.motion.times[-1] == pytest.approx(0.1 * joined.moves, abs=0.02)
+    assert joined.motion.times[-1] >= 0.1 * joined.moves - 0.02  # longer where it would be too fast
 
 
 @pytest.mark.parametrize("pair", [(0, 20), (5, 11), (29, 2)])
@@ -230,6 +230,7 @@ REPORT = [
     "gap",
     "moves",
     "length",
+    "tempo",
     "expansions",
     "peak_nodes",
     "node_budget",

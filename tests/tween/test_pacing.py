@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from itertools import pairwise
 from typing import Any
 
@@ -11,10 +12,12 @@ from command_line import Run
 
 from motionmind.body.motion import Posture
 from motionmind.corpus.bundled import bundled
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
+from motionmind.learned.pace import way_of
 from motionmind.tween.engine import Engine
+from motionmind.tween.report import read_report
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
 from motionmind.variation.variation import vary
@@ -146,3 +149,74 @@ def test_the_command_line_takes_it(run: Run) -> None:
     assert (fast["asked"]["pace"], fast["moves"]) == (2.0, own["moves"])
     assert old["moves"] < own["moves"]
     assert run("tween", A, B, "--corpus", "ballet", "--pace", 0).code == 2
+
+
+# --- forced --------------------------------------------------------------------------------------------------------
+
+
+def test_a_duration_that_its_moves_cannot_make_is_made_from_the_fewest_that_can(engine: Engine) -> None:
+    usual = float(np.median(engine.corpus.moves.seconds))
+    more = 0
+    for seed in range(10):
+        a, b = ends(engine, seed)
+        tween = engine.tween(a, b, duration=usual)
+        assert seconds(tween) == pytest.approx(usual)
+        if tween.tempo.usual_moves is None:
+            assert tween.moves == 1
+            continue
+        more += 1
+        assert tween.tempo.usual_moves == 1 < tween.moves
+        for moves in range(1, tween.moves):
+            with pytest.raises(NoPathError):
+                engine.tween(a, b, duration=usual, moves=moves)
+    assert more > 3
+
+
+def test_a_given_number_of_moves_that_is_impossible_stays_an_error(ballet: Engine) -> None:
+    with pytest.raises(NoPathError, match="allow more moves"):
+        ballet.tween(*ENDS, moves=3)
+
+
+def test_who_is_hurried_is_told_of_it_by_part(ballet: Engine) -> None:
+    with pytest.warns(MotionMindWarning, match=r"faster than anything in the corpus: right_knee \d\.\d times"):
+        tween = ballet.tween(*ENDS, duration=0.3)
+    pace, way = ballet.pace, way_of(tween.motion)
+    times = (way.parts / np.diff(tween.motion.times)[:, None]).max(axis=0) / pace.greatest
+    worst = tween.tempo.faster[0]
+    assert worst.part == [*ballet.corpus.skeleton.names, "turning", "travel"][times.argmax()]
+    assert worst.times == pytest.approx(times.max())
+    assert [one.times for one in tween.tempo.faster] == sorted((one.times for one in tween.tempo.faster), reverse=True)
+
+
+def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -> None:
+    """Of the corpus's own frames a hundredth is; what holds the feet moves the legs as it must."""
+    shares = []
+    for without in (["bounce", "balance", "flight", "steps", "limbs"], ["pace"]):
+        fast = []
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", MotionMindWarning)
+            for seed in range(12):
+                motion = engine.tween(*ends(engine, seed), without=without).motion
+                speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
+                fast.append(speeds[:, : len(motion.skeleton)] > engine.pace.fastest[: len(motion.skeleton)])
+        shares.append(np.concatenate(fast).mean())
+    assert shares[0] < 0.01 < 0.3 * shares[1]
+
+
+def test_who_has_too_much_time_creeps_and_it_is_said(ballet: Engine) -> None:
+    own, slow = ballet.tween(*ENDS), ballet.tween(*ENDS, duration=20.0)
+    assert own.tempo.creeps == 0.0
+    assert 0.1 < slow.tempo.creeps <= 1.0
+
+
+def test_the_report_and_the_summary_say_why_it_takes_so_long(run: Run) -> None:
+    ran = run("tween", A, B, "--corpus", "ballet", "--duration", 0.3, "--report", "r.json")
+    assert "note: faster than anything in the corpus" in ran.err
+    line = next(line for line in ran.out.splitlines() if line.startswith("pace "))
+    assert "the corpus takes about 2.3" in line
+    assert "the 1 move of usual length that the duration holds would not lead there" in line
+    tempo = read_report("r.json").tempo
+    assert tempo is not None
+    assert tempo.usual_moves == 1
+    assert tempo.faster[0].part == "right_knee"
+    assert tempo.usual > tempo.least > 0.0

@@ -110,7 +110,7 @@ def test_reports_of_0_1_are_read(ballet: Engine, tmp_path: Path) -> None:
     """They lack what came later, and may have what is gone."""
     old = ballet.tween(FIRST, PLIE).report()
     del old["asked"]["posturewise"]
-    for name in ("detail", "path_degrees", "vias", "differs", "length", "followed"):
+    for name in ("detail", "path_degrees", "vias", "differs", "length", "tempo", "followed"):
         del old[name]
     del old["costs"]["guide"]
     (tmp_path / "old.json").write_text(json.dumps(old | {"renderer": 1, "shared": 0}), "utf-8")

