@@ -74,8 +74,11 @@ def find_support(
 
 
 def size_of(skeleton: Skeleton) -> float:
-    """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well."""
-    return _extent(skeleton) / _extent(human23())
+    """Return how large a body is beside human23, by its greatest extent at rest: legs that spread count as well.
+
+    A body that is a single point counts as one as large.
+    """
+    return (_extent(skeleton) / _extent(human23())) or 1.0
 
 
 def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:

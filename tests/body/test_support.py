@@ -120,6 +120,11 @@ def test_in_the_air_nothing_bears() -> None:
     assert raised.bears[:, [LEFT, RIGHT]].all()
 
 
+def test_a_single_point_is_as_large_as_any_body() -> None:
+    """It has no size to measure lengths by, and may be moved all the same."""
+    assert size_of(Skeleton("point", ("root",), (-1,), np.zeros((1, 3)))) == 1.0
+
+
 @pytest.mark.parametrize("size", [0.5, 1.3])
 def test_what_bears_does_not_depend_on_size(size: float) -> None:
     rng = np.random.default_rng(1)
