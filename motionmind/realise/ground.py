@@ -190,7 +190,7 @@ def _reach_floor(
     posed = pose(skeleton, rotations)
     for again in (True, False):
         planted = bend_legs(skeleton, posed, feet, off, carried.holds)
-        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
         if again:
             missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
             if np.abs(missing).max() < NEAR:
