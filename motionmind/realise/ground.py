@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
@@ -28,6 +29,9 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
 NEAR = 0.001  # metres off its height that a foot is let be
+
+SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
+LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
 
 class Stance(NamedTuple):
@@ -161,6 +165,8 @@ def _set_down(
             without,
         )
         rotations[part], root[part] = _reach_floor(skeleton, rotations[part], carried, feet, loose, known.moving, fps)
+        sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
+        root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
 
 
@@ -184,13 +190,24 @@ def _reach_floor(
     posed = pose(skeleton, rotations)
     for again in (True, False):
         planted = bend_legs(skeleton, posed, feet, off, carried.holds)
-        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
         if again:
             missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
             if np.abs(missing).max() < NEAR:
                 break
             off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     return out, carried.root
+
+
+def _cover(need: Floats, fps: float) -> Floats:
+    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
+    if not need.any():
+        return need
+    width = max(1, round(0.5 * LIFTS * fps))
+    window = np.hanning(2 * width + 3)[1:-1]
+    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
+    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
