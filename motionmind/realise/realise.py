@@ -104,7 +104,7 @@ def realise(
     stops[0] = stop_at(corpus, a, _times(slower, leaving))
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-    walk = _walk_near(states, clock, stops, corpus, carriage)
+    walk = _walk_near(states, clock, stops, corpus, carriage, length is None and not through)
     within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
@@ -163,9 +163,11 @@ def _times(factor: float, velocity: Velocity | None) -> Velocity | None:
 
 
 def _walk_near(
-    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage
+    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage, near: bool
 ) -> Expectation:
     """Return the mean of the walks that pass the stops and are near a path's states [T + 1, L, 4].
+
+    The body turns the `near` way from stop to stop, or as walks do.
 
     A path may take more moves than there is time for; the corpus's walks are not to be hurried, and take as many as it
     usually does.
@@ -176,7 +178,7 @@ def _walk_near(
         half_steps = np.linspace(0.0, clock.moves[-1], 2 * clock.usual_moves + 1)
         path = rotation_spline(clock.moves, path, half_steps[::2])
         stops = {0: stops[0], clock.usual_moves: stops[last]}
-    return expect(corpus, carriage, stops, half_steps, path)
+    return expect(corpus, carriage, stops, half_steps, path, near)
 
 
 def _bounds(
