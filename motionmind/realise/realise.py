@@ -18,7 +18,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
-from motionmind.realise.detail import detail_of, likest_moves
+from motionmind.realise.detail import detail_of, likest_moves, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
@@ -238,16 +238,19 @@ def _add_detail(
 ) -> tuple[Floats, Ints]:
     """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from.
 
-    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS.
+    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and the whole body
+    less of it where it moves much slower than the moves that it comes from.
     """
     between = corpus.detail.shape[1]
     if not between:
         return rotations, np.zeros(0, dtype=np.int64)
     joints = walk.poses.shape[1]
-    moves = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], walk.poses[::2])
-    times = subdivide_times(walk.half_steps[::2], between)
-    trust = np.repeat(walk.trust[::2] ** LINGERS, between + 1, axis=0)
-    detail = detail_of(corpus, moves) * np.concatenate([trust, trust[-1:]])[..., None]
+    orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
+    moves = likest_moves(corpus.moves, orientations, poses)
+    share = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
+    scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
+    times, detail = subdivide_times(at, between), detail_of(corpus, moves)
+    detail = detail * np.concatenate([scale, scale[-1:]])[..., None]
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 
