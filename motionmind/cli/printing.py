@@ -20,7 +20,6 @@ from motionmind.errors import MotionMindWarning, enumerated
 if TYPE_CHECKING:
     from motionmind.learned.plausibility import Sighting
     from motionmind.search.solve import Progress
-    from motionmind.tween.request import TweenRequest
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
 
@@ -115,7 +114,7 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
     lines.insert(1, ("pace", _tempo(result)))
     lines += [("seen", sentence) for sentence in _beyond(result.shown)]
-    lines += [("without", format_what_if(one, result.request)) for one in result.what_if]
+    lines += [("without", format_what_if(one)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
     print_written(files)
@@ -157,15 +156,15 @@ def _tempo(result: Tween) -> str:
     return "; ".join(said)
 
 
-def format_what_if(one: WhatIf, request: TweenRequest) -> str:
-    """Format what a restriction costs a tween of such a request: "hold neck: 12.400 nats and 1 move less"."""
+def format_what_if(one: WhatIf) -> str:
+    """Format what a restriction costs a tween: "hold neck: 12.400 nats and 1 move less"."""
     nats = f"at least {one.least:.3f}, at most {one.most:.3f} nats"
     if one.proven:
         nats = f"{one.most:.3f} nats" if one.most >= 0.0005 else "no nats"
     moves = count(abs(one.moves), "move")
     change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
-    of = " (haste and pace)" if request.paced else " (costs without the guide)"
-    return f"{one.without}: {nats}{change}{of * (request.kappa > 0.0 and not one.guided)}"
+    of = "" if one.compared == "cost" else f" ({one.compared})"
+    return f"{one.without}: {nats}{change}{of}"
 
 
 def print_written(files: Sequence[Path]) -> None:
@@ -233,7 +232,7 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
         )
         click.echo(line.rstrip())
     for one in results[0].what_if:
-        click.echo(f"without   {format_what_if(one, results[0].request)}")
+        click.echo(f"without   {format_what_if(one)}")
     print_written(files)
 
 

@@ -18,7 +18,7 @@ from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.realise.corrections import Correction
-from motionmind.tween.request import TweenRequest
+from motionmind.tween.request import PACES, TweenRequest
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -108,7 +108,7 @@ SEARCH_OPTIONS = (
         "--pace",
         _SEARCH,
         "Move this many times as fast as the corpus would, unless --duration is given.",
-        POSITIVE,
+        Number(*PACES),
         "FACTOR",
     ),
     SearchOption("strict", "--strict", _SEARCH, "Make only moves that the corpus attests: no bridges.", bool),

@@ -25,6 +25,7 @@ MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory hold
 MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
 SLOWEST = 0.01  # frames a second
+PACES = 0.05, 20.0  # times as fast as the corpus, the least and the most
 
 
 class HasPath(Protocol):
@@ -140,8 +141,9 @@ class TweenRequest:
             raise MotionMindError(
                 f"fps must be a number of frames a second from {SLOWEST:g} to {FASTEST:g}, not {self.fps}"
             )
-        if not (math.isfinite(self.pace) and self.pace > 0.0):
-            raise MotionMindError(f"pace must be a factor of the speed above 0, not {self.pace}")
+        if not PACES[0] <= self.pace <= PACES[1]:
+            slowest, fastest = PACES
+            raise MotionMindError(f"pace must be a factor of the speed from {slowest} to {fastest:g}, not {self.pace}")
         if self.duration is not None and self.pace != 1.0:
             raise MotionMindError("a duration says how fast to move; leave out pace")
         for name in ("novelty", "differ"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 from motionmind.search.bounding import PROVEN
 from motionmind.search.length import choose_length
@@ -13,6 +13,9 @@ from motionmind.search.solve import Certificate, solve
 from motionmind.tween.request import TweenRequest
 
 _Item = TypeVar("_Item")
+
+
+Compared = Literal["cost", "haste and pace", "costs without the guide"]
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,8 @@ class WhatIf:
         most: it costs at most this, nats.
         proven: whether the two agree to 1e-6 nats a search.
         moves: how many moves the answer has more without it; negative for fewer.
-        guided: whether these are costs with the guide, as the tween's own. Of a length or a duration it is False: in
-            another one there is another guide. Then haste and pace are compared; and without pace, what the cheapest
-            paths without the guide cost.
+        compared: which costs these are: "cost", the tween's own; or of a length or a duration, in another of which
+            there is another guide, "haste and pace", and without pace "costs without the guide".
     """
 
     without: str
@@ -35,7 +37,7 @@ class WhatIf:
     most: float
     proven: bool
     moves: int
-    guided: bool
+    compared: Compared
 
 
 class Answer(NamedTuple):
@@ -111,15 +113,18 @@ def _compare(name: str, asked: Answer, freed: Answer, moves: int) -> WhatIf:
     Every path that keeps a restriction is also one without it, so the difference is never negative.
     """
     same = _moves(asked) == _moves(freed) and asked.request.duration == freed.request.duration
-    if same or (asked.problem.guide is None and asked.problem.tolls is None):
-        (cost, bound), (freed_cost, freed_bound) = (
-            (one.certificate.cost, one.certificate.lower_bound) for one in (asked, freed)
-        )
-    else:
-        of_length = _unguided if asked.problem.tolls is None else _paced
-        (cost, bound), (freed_cost, freed_bound) = of_length(asked), of_length(freed)
+    compared: Compared = "cost" if same else "haste and pace"
+    if asked.problem.tolls is None and not same:
+        compared = "cost" if asked.problem.guide is None else "costs without the guide"
+    costs = {"cost": _cost, "haste and pace": _paced, "costs without the guide": _unguided}[compared]
+    (cost, bound), (freed_cost, freed_bound) = costs(asked), costs(freed)
     least, most = max(bound - freed_cost, 0.0), max(cost - freed_bound, 0.0)
-    return WhatIf(name, least, most, most - least <= 2.0 * PROVEN, moves, same and asked.problem.guide is not None)
+    return WhatIf(name, least, most, most - least <= 2.0 * PROVEN, moves, compared)
+
+
+def _cost(answer: Answer) -> tuple[float, float]:
+    """Return what an answer costs, and the bound on it, nats."""
+    return answer.certificate.cost, answer.certificate.lower_bound
 
 
 def _paced(answer: Answer) -> tuple[float, float]:

@@ -76,9 +76,9 @@ def check_prices_on_toy(seed: int, gap: float) -> list[bool]:
     found = find_what_if(answer(asked), answer)
     assert [one.without for one in found] == ["avoid chain0=0", f"moves {MOVES}"]
     for one, allowed, counts in zip(found, (free, avoiding), ([MOVES], range(1, MOVES + 1)), strict=True):
-        assert one.guided == (one.moves == 0)
-        judge = guide if one.guided else None
-        freed = best(toy, [MOVES] if one.guided else counts, allowed, [], judge)
+        assert (one.compared == "cost") == (one.moves == 0)
+        judge = guide if one.compared == "cost" else None
+        freed = best(toy, [MOVES] if one.compared == "cost" else counts, allowed, [], judge)
         assert one.least - SAME <= best(toy, [MOVES], avoiding, [], judge) - freed <= one.most + SAME
         assert one.least >= 0.0
     return [bool(one.proven) for one in found]
@@ -131,7 +131,7 @@ def test_a_duration_of_as_many_moves_is_priced_without_the_guide(ballet: Engine)
     found = ballet.tween(*ENDS, duration=(free.moves + 0.3) * seconds, what_if=True)
     assert found.moves == free.moves
     (one,) = found.what_if
-    assert (one.moves, one.guided, one.proven) == (0, False, True)
+    assert (one.moves, one.compared, one.proven) == (0, "haste and pace", True)
     assert one.most == pytest.approx(0.0, abs=SAME)
 
 
@@ -171,25 +171,29 @@ def test_an_interrupted_search_prices_nothing(ballet: Engine) -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "asked", "text"),
+    ("one", "text"),
     [
-        (WhatIf("hold neck", 12.4, 12.4, True, -1, False), {"guide": 0.0}, "hold neck: 12.400 nats and 1 move less"),
-        (WhatIf("via 1", 10.1, 12.4, False, 0, True), {}, "via 1: at least 10.100, at most 12.400 nats less"),
-        (WhatIf("pin neck=A", 0.0, 1e-9, True, 0, True), {}, "pin neck=A: no nats less"),
+        (WhatIf("hold neck", 12.4, 12.4, True, -1, "cost"), "hold neck: 12.400 nats and 1 move less"),
+        (WhatIf("via 1", 10.1, 12.4, False, 0, "cost"), "via 1: at least 10.100, at most 12.400 nats less"),
+        (WhatIf("pin neck=A", 0.0, 1e-9, True, 0, "cost"), "pin neck=A: no nats less"),
         (
-            WhatIf("moves 8", 5.0, 5.0, True, 2, False),
-            {},
+            WhatIf("moves 8", 5.0, 5.0, True, 2, "haste and pace"),
             "moves 8: 5.000 nats less, 2 moves more (haste and pace)",
         ),
         (
-            WhatIf("moves 8", 5.0, 5.0, True, 2, False),
-            {"without": ["pace"]},
+            WhatIf("moves 8", 5.0, 5.0, True, 2, "costs without the guide"),
             "moves 8: 5.000 nats less, 2 moves more (costs without the guide)",
         ),
     ],
 )
-def test_a_price_in_words(one: WhatIf, asked: dict[str, Any], text: str) -> None:
-    assert format_what_if(one, TweenRequest(**asked)) == text
+def test_a_price_in_words(one: WhatIf, text: str) -> None:
+    assert format_what_if(one) == text
+
+
+@pytest.mark.parametrize("without", [[], ["pace"]])
+def test_what_a_length_costs_is_named_though_no_guide_leads(ballet: Engine, without: list[str]) -> None:
+    (one,) = ballet.tween(*ENDS, moves=12, guide=0.0, without=without, what_if=True).what_if
+    assert one.compared == ("cost" if without else "haste and pace")
 
 
 def test_the_command_line_prints_a_line_for_each_restriction_and_the_report_has_them(run: Run) -> None:
@@ -199,7 +203,7 @@ def test_the_command_line_prints_a_line_for_each_restriction_and_the_report_has_
     lines = [line[10:] for line in ran.out.splitlines() if line.startswith("without   ")]
     report = read_report(Path("r.json"))
     assert [one.without for one in report.what_if] == ["pin left_wrist=A", "via 1 at move 4", "moves 8"]
-    assert lines == [format_what_if(one, TweenRequest()) for one in report.what_if]
+    assert lines == [format_what_if(one) for one in report.what_if]
     assert json.loads(Path("r.json").read_text())["what_if"][1].keys() == {
-        *("without", "least", "most", "proven", "moves", "guided"),
+        *("without", "least", "most", "proven", "moves", "compared"),
     }
