@@ -10,7 +10,7 @@ Boulic, "Parametrization and range of motion of the ball-and-socket joint", Defo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -154,18 +154,22 @@ class Anatomy:
             out[:, index] = rot.inv_mul(self._between(out, frame, index), out[:, index])
         return out
 
-    def degrees(self, rotations: Floats) -> Floats:
+    def degrees(self, rotations: Floats, joints: Sequence[int] | None = None) -> Floats:
         """Return angles [..., J, 3] in degrees about x, y and z of local rotations [..., J, 4].
 
         The inverse of `rotations`; a right joint has the angles of its mirror image.
+
+        Args:
+            rotations: local rotations [..., J, 4].
+            joints: those whose angles are wanted; the others' are 0. None for all.
         """
-        turned = rotations.copy()
-        for index, frame in self._measured_elsewhere():
-            turned[..., index, :] = rot.mul(self._between(rotations, frame, index), rotations[..., index, :])
+        wanted, elsewhere = range(len(self.skeleton)) if joints is None else joints, dict(self._measured_elsewhere())
         out = np.zeros((*rotations.shape[:-1], 3))
-        for index, name in enumerate(self.skeleton.names):
+        for index in wanted:
+            name, q = self.skeleton.names[index], rotations[..., index, :]
+            if index in elsewhere:
+                q = rot.mul(self._between(rotations, elsewhere[index], index), q)
             joint, anatomy = self.anatomy(name)
-            q = turned[..., index, :]
             out[..., index, :] = to_degrees(
                 anatomy, rot.mirror(q) if name.startswith("right_") and self.paired(joint) else q
             )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats
@@ -13,7 +15,9 @@ BEYOND = 5.0  # degrees past a limit from which a posture breaks it
 RARE = 0.01  # share of postures that may break a limit
 
 
-def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools) -> Floats:
+def within_limits(
+    skeleton: Skeleton, rotations: Floats, given: Floats, loose: Bools, joints: Sequence[int] | None = None
+) -> Floats:
     """Return the same movement, local rotations [T, J, 4], without angles beyond the limits of its joints.
 
     Limits are those of the anatomy of human23 or human44, widened to the angles of the given postures. Angles are
@@ -24,14 +28,17 @@ def within_limits(skeleton: Skeleton, rotations: Floats, given: Floats, loose: B
         rotations: local rotations [T, J, 4].
         given: local rotations of postures that are right as they are [G, J, 4].
         loose: joints without limits [J].
+        joints: those that may be beyond their limits; None for all.
     """
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
-    degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given])), [len(rotations)])
+    degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given]), joints), [len(rotations)])
     least, most = _limits(anatomy)
     clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
     beyond = np.any(clipped != degrees, axis=-1) & ~loose
+    if joints is not None:
+        beyond &= np.isin(np.arange(len(skeleton)), joints)
     frames = np.flatnonzero(beyond.any(axis=1))
     if len(frames) == 0:
         return rotations

@@ -21,6 +21,7 @@ LOADS = 0.12  # seconds in which a foot takes over the body's weight
 ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
 HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of a body at rest
 RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
+UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
 NEAR = 0.1  # metres within which a foot is in one place
 
 
@@ -143,7 +144,11 @@ def find_bearing(
     """
     low = shape.lowest[:, None]
     far = np.minimum(shape.low_others - low, 1.0)
-    others = np.maximum(firm, 1e-3) ** BEARS * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
+    bears = np.maximum(firm, 1e-3) ** BEARS
+    if feet:  # where no foot is near the floor, what is lowest bears, however the corpus's bodies hold it
+        lifted = np.clip((shape.low.min(axis=1, keepdims=True) - low) / UPSIDE - 1.0, 0.0, 1.0)
+        bears = np.maximum(bears, lifted)
+    others = bears * np.exp(-far / UNDER) * np.isfinite(shape.low_others)
     others[flying] = 0.0
     rests = others.max(axis=1, initial=0.0) > MOSTLY
     frames = np.arange(len(root)) / fps

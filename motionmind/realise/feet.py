@@ -293,21 +293,21 @@ def ease_knees(
     fixed = np.zeros(len(off), dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= moving
-    aims, lengths, slow = np.zeros(off.shape), np.zeros(off.shape[:2]), True
+    aims, lengths, most, slow = np.zeros(off.shape), np.zeros(off.shape[:2]), np.zeros(len(feet)), True
     for number, foot in enumerate(feet):
         hip, knee, end = foot.chain(skeleton)
-        thigh, shank = foot.bones(skeleton)
+        bones = foot.bones(skeleton)
         leg = posed.places[:, end] - posed.places[:, hip]
         now, aim = np.linalg.norm(leg, axis=-1), leg + off[:, number]
         wanted = np.linalg.norm(aim, axis=-1)
-        far = stretched(now, wanted, thigh + shank, softness(holds[:, number]))
-        own, bends = bend_of(now, thigh, shank), bend_of(far, thigh, shank)
-        bends[fixed] = own[fixed]
-        most = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own)).max()))
-        eased = slow_down(bends, holds[:, number] == 1.0, fixed, most, fps)
+        far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
+        far[fixed] = now[fixed]
+        own, bends = bend_of(now, *bones), bend_of(far, *bones)
+        most[number] = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own)).max()))
+        eased = slow_down(bends, holds[:, number] == 1.0, fixed, most[number], fps)
         slow &= eased is bends
         aims[:, number] = aim * (far / np.maximum(wanted, 1e-9))[:, None]
-        lengths[:, number] = distance_of(eased, thigh, shank)
+        lengths[:, number] = distance_of(eased, *bones)
     if slow:
         return off, np.zeros((len(off), 3))
     bears = holds**4
@@ -315,7 +315,13 @@ def ease_knees(
     shift, out = np.zeros((len(off), 3)), np.empty(off.shape)
     gives = np.sum(share * (aims - _lengthened(aims, lengths))[..., 1], axis=1)
     shift[:, 1] = smoothed(gives, GIVES, fps) * bound
-    aims = _lengthened(aims - shift[:, None], lengths)
+    aims -= shift[:, None]
+    # What the body does not give, the feet do: upward, for the floor is in the way of the rest.
+    for number, foot in enumerate(feet):
+        bones = foot.bones(skeleton)
+        bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
+        lengths[:, number] = distance_of(slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps), *bones)
+    aims = _lengthened(aims, lengths)
     for number, foot in enumerate(feet):
         hip, _, end = foot.chain(skeleton)
         out[:, number] = aims[:, number] - posed.places[:, end] + posed.places[:, hip]

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
@@ -37,6 +38,9 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
 NEAR = 0.001  # metres off its height that a foot is let be
+
+SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
+LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
 
 class Stance(NamedTuple):
@@ -177,6 +181,8 @@ def _set_down(
         rotations[part], root[part] = _reach_floor(
             skeleton, rotations[part], carried, feet, loose, known.moving, fastest, fps
         )
+        sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
+        root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
 
 
@@ -201,15 +207,26 @@ def _reach_floor(
         return out, root
     posed, soft = pose(skeleton, rotations), softness(carried.holds)
     planted = bend_legs(skeleton, posed, feet, carried.off, soft)
-    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     missing = carried.heights - foot_heights(skeleton, out, root, feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     eased, shift = ease_knees(skeleton, posed, feet, off, carried.holds, fades * carried.bound, moving, fastest, fps)
     if eased is off and np.abs(missing).max() < NEAR:
         return out, root
     planted = bend_legs(skeleton, posed, feet, eased, soft if eased is off else np.zeros(soft.shape))
-    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose)[1:-1, joints]
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
+
+
+def _cover(need: Floats, fps: float) -> Floats:
+    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
+    if not need.any():
+        return need
+    width = max(1, round(0.5 * LIFTS * fps))
+    window = np.hanning(2 * width + 3)[1:-1]
+    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
+    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
