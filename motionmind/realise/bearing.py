@@ -81,7 +81,7 @@ def lowest(places: Floats, parts: Bools) -> Floats:
 
 
 class Bearing(NamedTuple):
-    """What bears a body at each frame.
+    """The parts that bear a body at each frame.
 
     Attributes:
         stances: when and where each foot stands.

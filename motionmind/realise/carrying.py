@@ -36,7 +36,7 @@ ROUNDS = 2, 3  # of placing feet, and of the root in each
 
 
 class Ends(NamedTuple):
-    """What is known of a movement's ends.
+    """The facts that are known of a movement's ends.
 
     Attributes:
         aloft: share of the corpus's walks that are in the air in each frame [N], from 0 to 1.

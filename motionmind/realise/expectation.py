@@ -49,7 +49,12 @@ class Expectation(NamedTuple):
 
 
 def expect(
-    corpus: Corpus, carriage: Carriage, stops: Mapping[int, Stop], half_steps: Floats, path: Floats | None = None
+    corpus: Corpus,
+    carriage: Carriage,
+    stops: Mapping[int, Stop],
+    half_steps: Floats,
+    path: Floats | None = None,
+    near: bool = False,
 ) -> Expectation:
     """Return what walks through a corpus expect between the stops.
 
@@ -59,6 +64,8 @@ def expect(
         stops: what is passed exactly, by the number of moves that lead there; increasing, with the first and the last.
         half_steps: times of the moves and midway between them [2 T + 1], seconds.
         path: orientations of the joints at the moves that walks are to be near to [T + 1, J, 4]; None for all walks.
+        near: whether the body turns the near way, whatever walks do (`turn_with_walks`): where the time is what the
+            corpus takes for that.
     """
     moving = any(stop.rates is not None for stop in stops.values())
     rates = moments_rates(corpus, carriage) if moving else None
@@ -72,7 +79,7 @@ def expect(
         ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
         turn, spread = moves @ carriage.turn, moves @ carriage.turn**2
-        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]))
+        headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near)
     else:
         headings = rot.heading(walk.poses[:, 0])
     return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust)

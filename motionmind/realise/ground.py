@@ -44,7 +44,7 @@ LIFTS = 0.3  # seconds before and after a part would be lower, in which the body
 
 
 class Stance(NamedTuple):
-    """How a corpus's bodies hold themselves and travel along a movement, at its T moves and midway between them.
+    """The stance of a corpus's bodies, and their travel, along a movement, at its T moves and midway between them.
 
     Attributes:
         half_steps: times [2 T + 1], seconds.

@@ -11,6 +11,8 @@ from motionmind._typing import Floats
 from motionmind.geometry import rotations as rot
 from motionmind.realise.minimal import departure
 
+NEARLY = np.radians(150.0)  # of half a turn: by so much a body may as well turn the other way
+SPINS = 4.0  # radians a second from which a body goes on turning as the corpus does, even the far way
 RUN = 0.5  # seconds for which a body that turns goes on turning
 
 
@@ -21,6 +23,7 @@ def turn_with_walks(
     half_steps: Floats,
     facing: Mapping[int, Floats],
     rates: tuple[float | None, float | None],
+    near: bool = False,
 ) -> Floats:
     """Return headings [2 T + 1], unwrapped, of a body that turns as the walks do and meets the given facings.
 
@@ -28,8 +31,10 @@ def turn_with_walks(
     variance V the share M^2 / (M^2 + V) is taken, the linear estimate of least mean square error. Walks that turn do so
     for about RUN seconds, so V counts steps that vary together for as long. The turn still missing to each facing is
     distributed over the steps in proportion to their variance, as in the mean of normal variables given their sum; of
-    all facings that differ by whole turns, the nearest is meant. As far as walks are not trusted, the body does not
-    turn with them, and distributes what is missing evenly. A body that turns at an end does so there, too.
+    all facings that differ by whole turns, the nearest to what the walks do is meant, or, where it is to be the `near`
+    way and that is less than NEARLY half a turn, the nearest to the facing before; a body that SPINS at an end goes on.
+    As far as walks are not trusted, the body does not turn with them, and distributes what is missing evenly. A body
+    that turns at an end does so there, too.
 
     Args:
         turn: mean turn of the walks in each step [2 T], radians.
@@ -38,7 +43,9 @@ def turn_with_walks(
         half_steps: times of the steps' ends [2 T + 1], seconds.
         facing: the rotations [4] that the headings meet, by the number of moves; with the first and the last.
         rates: turning at the first and at the last, radians a second; None where it is unknown.
+        near: whether the body is to turn the near way from each facing to the next.
     """
+    near = near and all(rate is None or abs(rate) < SPINS for rate in rates)
     varies = np.maximum(spread - turn**2, 1e-4)
     variance = varies.sum() * RUN * len(turn) / (half_steps[-1] - half_steps[0])
     turn = trust * turn * (turn.sum() ** 2 / (turn.sum() ** 2 + variance))
@@ -46,7 +53,12 @@ def turn_with_walks(
     out = np.concatenate([[0.0], np.cumsum(turn)]) + rot.heading(facing[0])
     for start, end in pairwise(2 * move for move in facing):
         missing = rot.heading(facing[end // 2]) - out[end]
-        missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
+        way = rot.heading(facing[end // 2]) - rot.heading(facing[start // 2])
+        way -= 2.0 * np.pi * np.round(way / (2.0 * np.pi))
+        if near and abs(way) < NEARLY:
+            missing = out[start] + way - out[end]
+        else:
+            missing -= 2.0 * np.pi * np.round(missing / (2.0 * np.pi))
         share = np.cumsum(varies[start:end]) / varies[start:end].sum()
         out[start + 1 : end + 1] += missing * share
         out[end + 1 :] += missing

@@ -18,7 +18,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
-from motionmind.realise.detail import detail_of, likest_moves
+from motionmind.realise.detail import detail_of, likest_moves, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
@@ -104,7 +104,7 @@ def realise(
     stops[0] = stop_at(corpus, a, _times(slower, leaving))
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
-    walk = _walk_near(states, clock, stops, corpus, carriage)
+    walk = _walk_near(states, clock, stops, corpus, carriage, length is None and not through)
     within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
@@ -164,9 +164,11 @@ def _times(factor: float, velocity: Velocity | None) -> Velocity | None:
 
 
 def _walk_near(
-    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage
+    states: Floats, clock: Timeline, stops: Mapping[int, Stop], corpus: Corpus, carriage: Carriage, near: bool
 ) -> Expectation:
     """Return the mean of the walks that pass the stops and are near a path's states [T + 1, L, 4].
+
+    The body turns the `near` way from stop to stop, or as walks do.
 
     A path may take more moves than there is time for; the corpus's walks are not to be hurried, and take as many as it
     usually does.
@@ -177,7 +179,7 @@ def _walk_near(
         half_steps = np.linspace(0.0, clock.moves[-1], 2 * clock.usual_moves + 1)
         path = rotation_spline(clock.moves, path, half_steps[::2])
         stops = {0: stops[0], clock.usual_moves: stops[last]}
-    return expect(corpus, carriage, stops, half_steps, path)
+    return expect(corpus, carriage, stops, half_steps, path, near)
 
 
 def _bounds(
@@ -237,16 +239,19 @@ def _add_detail(
 ) -> tuple[Floats, Ints]:
     """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from.
 
-    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS.
+    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and the whole body
+    less of it where it moves much slower than the moves that it comes from.
     """
     between = corpus.detail.shape[1]
     if not between:
         return rotations, np.zeros(0, dtype=np.int64)
     joints = walk.poses.shape[1]
-    moves = likest_moves(corpus.moves, carriage.orientations[: len(corpus), :joints], walk.poses[::2])
-    times = subdivide_times(walk.half_steps[::2], between)
-    trust = np.repeat(walk.trust[::2] ** LINGERS, between + 1, axis=0)
-    detail = detail_of(corpus, moves) * np.concatenate([trust, trust[-1:]])[..., None]
+    orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
+    moves = likest_moves(corpus.moves, orientations, poses)
+    share = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
+    scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
+    times, detail = subdivide_times(at, between), detail_of(corpus, moves)
+    detail = detail * np.concatenate([scale, scale[-1:]])[..., None]
     return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
 
 

@@ -27,6 +27,7 @@ from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between
 from motionmind.realise.detour import detour
 from motionmind.realise.expectation import expect
+from motionmind.realise.minimal import NO_WAY
 from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
 
@@ -66,7 +67,8 @@ def make_guide(
         length = moves * seconds if duration is None else duration
         walked = max(1, round(length / seconds))
         half_steps = np.linspace(0.0, length, 2 * walked + 1)
-        expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps, path)
+        passed = {0: stops[0], walked: stops[1]}
+        expected = expect(learned.corpus, learned.carriage, passed, half_steps, path, duration is None)
         at = np.linspace(0.0, length, moves + 1)[1:-1]
         chains = expected.chains(learned.corpus, at)
         if path is not None:  # the walks near it are its mean with what is like it, and move less
@@ -92,7 +94,10 @@ def find_detour(
         velocities: those of the ends; None where unknown.
         duration: seconds of the whole.
     """
-    seconds, own = usual(learned.grammar.transitions), float(learned.pace.expected(way_between(*ends)))
+    seconds, way = usual(learned.grammar.transitions), way_between(*ends)
+    if way.parts.max() < NO_WAY:  # who is to end as they began holds still
+        return None
+    own = float(learned.pace.expected(way))
     if np.log(duration / own) <= SELDOM * learned.pace.spread:
         return None
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]

@@ -72,7 +72,7 @@ class FasterPart(msgspec.Struct, frozen=True):
 
 
 class Tempo(msgspec.Struct, frozen=True):
-    """How the time that a tween takes compares with the corpus's.
+    """The time that a tween takes, beside the corpus's.
 
     Attributes:
         usual: the corpus's median for ways as far, seconds.

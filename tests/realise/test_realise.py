@@ -21,7 +21,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
-from motionmind.realise.detail import GOES_OVER, detail_of, likest_moves
+from motionmind.realise.detail import GOES_OVER, LIVELIER, detail_of, likest_moves, share_of_detail
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
@@ -224,6 +224,38 @@ def test_detail_lingers_where_walks_are_hardly_trusted(monkeypatch: pytest.Monke
     assert size(0.0) < 1e-6
     assert size(0.01) == pytest.approx(0.01**LINGERS * size(1.0), rel=0.5)
     assert size(0.01) > 0.3 * size(1.0)
+
+
+@pytest.mark.parametrize("slower", [0.5, 1.0, LIVELIER, 4.0, 100.0])
+def test_a_movement_gets_detail_in_proportion_to_its_speed(slower: float) -> None:
+    corpus = gather("walks", [walk(8), walk(8, seed=1)], reverse=1.0)
+    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)[:, :23]
+    copied = np.flatnonzero((moves.begins < 8) & (moves.ends > moves.begins))[:6]
+    poses = shown[[*moves.begins[copied], moves.ends[copied[-1]]]]
+    share = share_of_detail(moves, shown, copied, poses, slower * moves.seconds[copied])
+    np.testing.assert_allclose(share, min(1.0, LIVELIER / slower), rtol=1e-12)
+
+
+def test_rest_gets_no_detail_of_movement() -> None:
+    corpus = gather("walk", [walk(4)], reverse=0.0)
+    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)[:, :23]
+    share = share_of_detail(moves, shown, np.arange(3), shown[[1, 1, 1, 1]], moves.seconds[:3])
+    np.testing.assert_allclose(share, 0.0, atol=1e-6)
+
+
+def test_a_quiet_tween_trembles_less_than_a_lively_one() -> None:
+    clip = recorded()
+    known = learned(clip, rate=5.0)
+    smooth = replace(known, corpus=replace(known.corpus, detail=known.corpus.detail[:, :0]))
+    a, b, carried = clip.posture(12), clip.posture(96), parts_of(human23())[2]
+
+    def size(pace: float) -> float:
+        found, plain = (realised(one, list(range(2, 17)), a, b, pace=pace) for one in (known, smooth))
+        apart = rot.angle(found.rotations, plain.rotations)[:, carried]
+        return float(np.sqrt(np.mean(apart**2)))
+
+    assert size(0.75) == pytest.approx(size(1.0), rel=0.1)
+    assert size(0.125) == pytest.approx(0.125 * LIVELIER * size(1.0), rel=0.3)
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------

@@ -182,7 +182,7 @@ def test_a_body_turns_the_near_way_round(a: float, b: float, turn: float, speeds
 def test_from_one_posture_to_the_next_a_body_turns_the_near_way_round(facings: list[float], turns: list[float]) -> None:
     engine = engine_of("karate")
     a, *via, b = (turned(posture(engine, 130 + 3 * k), degrees) for k, degrees in enumerate(facings))
-    tween = engine.tween(a, b, via=via, without=["pace"])  # in a longer time the corpus turns the far way
+    tween = engine.tween(a, b, via=via, without=["pace"])  # in a longer time the path may turn the far way
     headings = np.degrees(np.unwrap(rot.heading(tween.motion.rotations[:, 0])))
     times = tween.motion.insertions[0].times[[0, *tween.passed, tween.moves]]
     np.testing.assert_allclose(np.diff(np.interp(times, tween.motion.times, headings)), turns, atol=3.0)
