@@ -19,7 +19,7 @@ from motionmind.body.support import centre_of_mass
 from motionmind.realise.balance import balance_rows
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, pose
+from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT
@@ -59,12 +59,14 @@ class Carried(NamedTuple):
         off: displacements of the feet from where the rotations have them [N, feet, 3], metres.
         holds: how much each foot holds its place [N, feet], from 0 to 1.
         heights: of the feet's lowest points that these lead to [N, feet], metres.
+        bound: how much the feet, and no flight, say how high it is [N], from 0 to 1.
     """
 
     root: Floats
     off: Floats
     holds: Floats
     heights: Floats
+    bound: Floats
 
 
 def carry(
@@ -141,8 +143,9 @@ def carry(
             places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
             stances, leg = bearing.stances[number], foot.length(skeleton)
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
-        posed = bend_legs(skeleton, own, feet, off, holds)
-    return Carried(start, off, holds, shape.low + start[:, 1:2] + off[..., 1])
+        posed = bend_legs(skeleton, own, feet, off, softness(holds))
+    bound = 1.0 - leg_freedom(flights, count, fps)
+    return Carried(start, off, holds, shape.low + start[:, 1:2] + off[..., 1], bound)
 
 
 def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:

@@ -10,7 +10,8 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach
+from motionmind.realise.knees import bend_of, distance_of, slow_down, smoothed
+from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
@@ -21,6 +22,9 @@ SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from slid
 RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
 LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
 KNEE = 8.0  # radians a second at which knees bend at most in a step, which is lifted less if it is quick
+QUICK = 1.2  # times as fast as all but a hundredth of the corpus's moments: as knees bend at most
+STEEP = 0.4, 0.7  # cosines of a leg's lean from which its foot is raised and lowered, not drawn along the leg
+GIVES = 0.15  # seconds over which the height of a body changes that gives way to a knee
 FAR = 0.15  # metres from its own track to which a foot must go to be lifted so far
 
 
@@ -50,9 +54,13 @@ class Foot(NamedTuple):
 
     def length(self, skeleton: Skeleton) -> float:
         """Return the length of thigh and shank together, metres."""
+        return sum(self.bones(skeleton))
+
+    def bones(self, skeleton: Skeleton) -> tuple[float, float]:
+        """Return the lengths of thigh and shank, metres."""
         _, knee, end = self.chain(skeleton)
         shank = skeleton.offsets[end] if end < len(skeleton) else skeleton.tips[end - len(skeleton)]
-        return float(np.linalg.norm(skeleton.offsets[knee]) + np.linalg.norm(shank))
+        return float(np.linalg.norm(skeleton.offsets[knee])), float(np.linalg.norm(shank))
 
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
@@ -250,7 +258,89 @@ def pose(skeleton: Skeleton, rotations: Floats) -> Posed:
     return Posed(rotations, turned, skeleton.positions_and_tips(rotations, still))
 
 
-def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, holds: Floats) -> Floats:
+def softness(holds: Floats) -> Floats:
+    """Return how near to their full length legs fall short [N, feet], a share of it, by how firmly they hold."""
+    return LOOSE + (SOFT - LOOSE) * holds
+
+
+def ease_knees(
+    skeleton: Skeleton,
+    posed: Posed,
+    feet: list[Foot],
+    off: Floats,
+    holds: Floats,
+    bound: Floats,
+    moving: tuple[bool, bool],
+    fastest: Floats,
+    fps: float,
+) -> tuple[Floats, Floats]:
+    """Return displacements of feet whose knees bend no faster than they can, and of the root [N, 3], metres.
+
+    Feet that swing come nearer to the hip or go farther from it; where they stand, the body does. Where no knee is too
+    fast the displacements are the given ones.
+
+    Args:
+        skeleton: the body.
+        posed: the movement, whose legs are to bend.
+        feet: those to place.
+        off: how far each is from where the rotations have it [N, feet, 3], metres.
+        holds: how much each holds its place [N, feet], from 0 to 1.
+        bound: how much the body's height may give way [N], from 0 to 1.
+        moving: whether the velocity is given in the first and in the last frame.
+        fastest: speeds of the joints [J], rad/s, that knees keep to if they do so in the movement itself.
+        fps: frames a second.
+    """
+    fixed = np.zeros(len(off), dtype=np.bool_)
+    fixed[[0, -1]] = True
+    fixed[[1, -2]] |= moving
+    aims, lengths, most, slow = np.zeros(off.shape), np.zeros(off.shape[:2]), np.zeros(len(feet)), True
+    for number, foot in enumerate(feet):
+        hip, knee, end = foot.chain(skeleton)
+        bones = foot.bones(skeleton)
+        leg = posed.places[:, end] - posed.places[:, hip]
+        now, aim = np.linalg.norm(leg, axis=-1), leg + off[:, number]
+        wanted = np.linalg.norm(aim, axis=-1)
+        far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
+        far[fixed] = now[fixed]
+        own, bends = bend_of(now, *bones), bend_of(far, *bones)
+        most[number] = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own)).max()))
+        eased = slow_down(bends, holds[:, number] == 1.0, fixed, most[number], fps)
+        slow &= eased is bends
+        aims[:, number] = aim * (far / np.maximum(wanted, 1e-9))[:, None]
+        lengths[:, number] = distance_of(eased, *bones)
+    if slow:
+        return off, np.zeros((len(off), 3))
+    bears = holds**4
+    share = bears / np.maximum(bears.sum(axis=1, keepdims=True), 1.0)
+    shift, out = np.zeros((len(off), 3)), np.empty(off.shape)
+    gives = np.sum(share * (aims - _lengthened(aims, lengths))[..., 1], axis=1)
+    shift[:, 1] = smoothed(gives, GIVES, fps) * bound
+    aims -= shift[:, None]
+    # What the body does not give, the feet do: upward, for the floor is in the way of the rest.
+    for number, foot in enumerate(feet):
+        bones = foot.bones(skeleton)
+        bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
+        lengths[:, number] = distance_of(slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps), *bones)
+    aims = _lengthened(aims, lengths)
+    for number, foot in enumerate(feet):
+        hip, _, end = foot.chain(skeleton)
+        out[:, number] = aims[:, number] - posed.places[:, end] + posed.places[:, hip]
+    return out, shift
+
+
+def _lengthened(legs: Floats, lengths: Floats) -> Floats:
+    """Return legs from hip to foot [N, feet, 3] as long as given [N, feet], metres: steep ones, with feet level."""
+    own = np.linalg.norm(legs, axis=-1)
+    out = legs * (lengths / np.maximum(own, 1e-9))[..., None]
+    level = np.minimum(own**2 - legs[..., 1] ** 2, lengths**2)
+    upright = legs.copy()
+    upright[..., 1] = -np.sqrt(lengths**2 - level)
+    s = np.clip((-legs[..., 1] / np.maximum(own, 1e-9) - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0, 1.0)[..., None]
+    out += s * s * (3.0 - 2.0 * s) * (upright - out)
+    return np.asarray(out * (lengths / np.maximum(np.linalg.norm(out, axis=-1), 1e-9))[..., None])
+
+
+def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, soft: Floats) -> Floats:
     """Return rotations [N, J, 4] whose legs bring the feet to their places; feet keep their orientations.
 
     Args:
@@ -258,10 +348,10 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, h
         posed: the movement, whose legs are to bend.
         feet: those to place.
         off: how far each is from where the rotations have it [N, feet, 3], metres.
-        holds: how much each holds its place [N, feet], from 0 to 1: legs that swing keep their knees loose.
+        soft: how near to its full length each falls short [N, feet], a share of it.
     """
     rotations, turned, places = posed
-    out, soft = rotations.copy(), LOOSE + (SOFT - LOOSE) * holds
+    out = rotations.copy()
     for number, foot in enumerate(feet):
         hip, knee, end = chain = foot.chain(skeleton)
         thigh, shank = reach(

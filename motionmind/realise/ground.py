@@ -24,7 +24,16 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.realise.balance import GRAVITY
 from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import Foot, bend_legs, fade_at_ends, find_free_feet, pose
+from motionmind.realise.feet import (
+    KNEE,
+    Foot,
+    bend_legs,
+    ease_knees,
+    fade_at_ends,
+    find_free_feet,
+    pose,
+    softness,
+)
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
@@ -73,6 +82,7 @@ def set_on_floor(
     low: Mapping[int, float],
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
+    fastest: Floats | None = None,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -90,6 +100,7 @@ def set_on_floor(
             with the first and the last.
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
+        fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
@@ -98,8 +109,10 @@ def set_on_floor(
     near = (ends[0] / size, ends[1] / size)
     slow = (None if rates[0] is None else rates[0] / size, None if rates[1] is None else rates[1] / size)
     gravity = GRAVITY / size
+    if fastest is None:
+        fastest = np.full(len(skeleton), KNEE)
     placed = _set_down(
-        small, rotations, times, stance.scaled(1.0 / size), loose, fixed, lows, near, slow, gravity, without
+        small, rotations, times, stance.scaled(1.0 / size), loose, fixed, lows, near, slow, fastest, gravity, without
     )
     root = size * placed[1]
     root[0], root[-1] = ends
@@ -116,6 +129,7 @@ def _set_down(
     low: Mapping[int, float],
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
+    fastest: Floats,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
@@ -164,7 +178,9 @@ def _set_down(
             fps,
             without,
         )
-        rotations[part], root[part] = _reach_floor(skeleton, rotations[part], carried, feet, loose, known.moving, fps)
+        rotations[part], root[part] = _reach_floor(
+            skeleton, rotations[part], carried, feet, loose, known.moving, fastest, fps
+        )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
         root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
@@ -177,26 +193,29 @@ def _reach_floor(
     feet: list[Foot],
     loose: Bools,
     moving: tuple[bool, bool],
+    fastest: Floats,
     fps: float,
 ) -> tuple[Floats, Floats]:
     """Return rotations whose legs are where they should be, within their limits, and the root.
 
-    A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height.
+    A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height. Knees
+    bend no faster than they can.
     """
     joints, fades = [joint for foot in feet for joint in foot.leg], fade_at_ends(len(rotations), moving, fps)
-    out, off = rotations.copy(), carried.off
+    out, root = rotations.copy(), carried.root
     if not joints:
-        return out, carried.root
-    posed = pose(skeleton, rotations)
-    for again in (True, False):
-        planted = bend_legs(skeleton, posed, feet, off, carried.holds)
-        out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
-        if again:
-            missing = carried.heights - foot_heights(skeleton, out, carried.root, feet)
-            if np.abs(missing).max() < NEAR:
-                break
-            off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
-    return out, carried.root
+        return out, root
+    posed, soft = pose(skeleton, rotations), softness(carried.holds)
+    planted = bend_legs(skeleton, posed, feet, carried.off, soft)
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
+    missing = carried.heights - foot_heights(skeleton, out, root, feet)
+    off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
+    eased, shift = ease_knees(skeleton, posed, feet, off, carried.holds, fades * carried.bound, moving, fastest, fps)
+    if eased is off and np.abs(missing).max() < NEAR:
+        return out, root
+    planted = bend_legs(skeleton, posed, feet, eased, soft if eased is off else np.zeros(soft.shape))
+    out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
+    return out, root + shift
 
 
 def _cover(need: Floats, fps: float) -> Floats:

@@ -51,6 +51,18 @@ def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
     return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)
 
 
+def stretched(now: Floats, wanted: Floats, length: Floats | float, soft: Floats | float) -> Floats:
+    """Return how far a leg's ends are from each other [N], metres, that is to be longer or shorter.
+
+    Args:
+        now: how far they are [N], metres.
+        wanted: how far they are to be [N], metres.
+        length: of the straight leg, metres.
+        soft: of the leg's length: this near to its full length it stretches less than it would have to [N].
+    """
+    return np.asarray(now + _soft_stretch(wanted - now, length - now, np.asarray(soft * length)))
+
+
 def reach(
     hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None, soft: Floats | float = SOFT
 ) -> tuple[Floats, Floats]:
@@ -74,7 +86,7 @@ def reach(
     across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
     least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
     now, wanted = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=-1), np.linalg.norm(target - leg[:, 0], axis=-1)
-    far = now + _soft_stretch(wanted - now, np.sqrt(least + product) - now, soft * np.sqrt(least + product))
+    far = stretched(now, wanted, np.sqrt(least + product), soft)
     bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
     bend = rot.from_axis_angle(axis, bends[1] - bends[0])
     turn = rot.between(thigh + rot.mul_vec(bend, shank), target - leg[:, 0])

@@ -151,6 +151,7 @@ def realise(
         _given_heights(postures, walk),
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
+        None if fastest is None else pace * fastest[: len(a.skeleton)],
         without,
     )
     rotations = keep_apart(rotations, root)

@@ -1,0 +1,76 @@
+"""Knees that bend no faster than they can: how far a foot is from its hip, smoothly in time.
+
+Near its full length a leg bends its knee by 28 degrees for 3 % of its length, so that a foot which moves smoothly asks
+of the knee what no knee does. Its speed is limited here. What gives way is the foot that swings, or the body above one
+that stands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+
+EASES = 0.05  # seconds over which a knee that is too fast changes its speed
+
+
+def bend_of(distances: Floats, thigh: float, shank: float) -> Floats:
+    """Return the bends [N] of a knee, radians from straight, by how far the leg's ends are from each other [N]."""
+    cosines = (distances**2 - thigh**2 - shank**2) / (2.0 * thigh * shank)
+    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
+
+
+def distance_of(bends: Floats, thigh: float, shank: float) -> Floats:
+    """Return how far the ends of a leg are from each other [N], by the bends of its knee [N], radians from straight."""
+    return np.asarray(np.sqrt(thigh**2 + shank**2 + 2.0 * thigh * shank * np.cos(bends)))
+
+
+def slow_down(bends: Floats, stands: Bools, fixed: Bools, fastest: float, fps: float) -> Floats:
+    """Return bends [N], radians, that change by at most `fastest` radians a second, near the given ones.
+
+    What is fixed is kept, and what stands changes least: it goes midway between the nearest curve above it and the
+    nearest below that are slow enough. A leg that swings bends more rather than less, so that its foot stays lifted.
+
+    Args:
+        bends: of a knee [N], radians.
+        stands: where its foot stands [N].
+        fixed: frames in which it must not change [N]; they are slow enough.
+        fastest: radians a second.
+        fps: frames a second.
+    """
+    most = fastest / fps
+    if np.abs(np.diff(bends)).max(initial=0.0) <= most:
+        return bends
+    planted, every = stands | fixed, np.ones(len(bends), dtype=np.bool_)
+    middle = 0.5 * (_below(bends, planted, most) + _above(bends, planted, most))
+    out = np.where(planted & ~fixed, _towards(middle, bends, fixed, most), bends)
+    out = np.where(planted, out, _towards(_above(out, every, most), out, planted, most))
+    return np.where(fixed, bends, smoothed(out, EASES, fps))
+
+
+def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
+    """Return means [N] of values around each, within so many seconds; the first and the last value stay."""
+    width = min(max(round(seconds * fps), 1), len(values) - 1)
+    weights = np.hanning(2 * width + 3)[1:-1]
+    # Mirrored through its ends, so that these stay.
+    around = np.pad(values, width, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(around, weights / weights.sum(), "valid"))
+
+
+def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Floats:
+    """Return a curve [N] near a wanted one that changes by at most `most` a frame from the values [N] `where`."""
+    lowest, highest = _above(values, where, most), _below(values, where, most)
+    return np.asarray(np.clip(wanted, np.minimum(lowest, highest), np.maximum(lowest, highest)))
+
+
+def _below(values: Floats, where: Bools, most: float) -> Floats:
+    """Return the highest curve [N] that changes by at most `most` a frame and is not above the values [N] `where`."""
+    slope = most * np.arange(len(values))
+    known = np.where(where, values, np.inf)
+    ahead = np.minimum.accumulate(known - slope) + slope
+    return np.asarray(np.minimum(ahead, np.minimum.accumulate((known + slope)[::-1])[::-1] - slope))
+
+
+def _above(values: Floats, where: Bools, most: float) -> Floats:
+    """Return the lowest curve [N] that changes by at most `most` a frame and is not below the values [N] `where`."""
+    return -_below(-values, where, most)
