@@ -45,7 +45,8 @@ def slow_down(bends: Floats, stands: Bools, fixed: Bools, fastest: float, fps: f
     middle = 0.5 * (_below(bends, planted, most) + _above(bends, planted, most))
     out = np.where(planted & ~fixed, _towards(middle, bends, fixed, most), bends)
     out = np.where(planted, out, _towards(_above(out, every, most), out, planted, most))
-    return np.where(fixed, bends, smoothed(out, EASES, fps))
+    # Valleys are smoothed, peaks stay: a foot that comes nearer to the floor than it was to would be in it.
+    return np.where(fixed, bends, np.maximum(smoothed(out, EASES, fps), out))
 
 
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
