@@ -19,13 +19,15 @@ from motionmind.body.support import centre_of_mass
 from motionmind.realise.balance import balance_rows
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, pose, softness
+from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, fade_at_ends, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
+from motionmind.realise.knees import smoothed
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT
 
 HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
 RIGID = 0.004  # metres that a part which is no foot is off the floor
+DETAIL = 0.1  # seconds within which the root smooths the fine detail that it carries
 REACH = 0.002  # metres by which a leg is too short
 LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
 PLACE = 0.08  # metres that a standing leg leans more than the movement has it
@@ -72,6 +74,7 @@ class Carried(NamedTuple):
 def carry(
     skeleton: Skeleton,
     rotations: Floats,
+    plain: Floats,
     root: Floats,
     floor: Floats,
     firm: Floats,
@@ -87,6 +90,7 @@ def carry(
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
+        plain: the same without fine detail.
         root: positions of the root as feet have it by themselves [N, 3], metres; the first and the last do not change.
         floor: height of the floor [N], metres.
         firm: how firmly each limb, and last the trunk, stands where it is low [N, limbs + 1], from 0 to 1.
@@ -98,8 +102,8 @@ def carry(
         without: corrections to leave out.
     """
     count = len(rotations)
-    shape = shape_of(skeleton, rotations, feet)
-    mass = _mass(skeleton, rotations)
+    shape = shape_of(skeleton, plain, feet)
+    mass = _mass(skeleton, plain)
     standing = floor - shape.lowest
     hovering = [known.aloft[end] > SURELY and root[end, 1] - standing[end] > HOVERS for end in (0, -1)]
     flights = []
@@ -118,8 +122,8 @@ def carry(
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
-    own = pose(skeleton, rotations)
-    start, off, posed = root, np.zeros((count, len(feet), 3)), rotations
+    own = pose(skeleton, plain)
+    start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     for _ in range(ROUNDS[0]):
         mass = _mass(skeleton, posed)
         steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
@@ -145,7 +149,27 @@ def carry(
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
         posed = bend_legs(skeleton, own, feet, off, softness(holds))
     bound = 1.0 - leg_freedom(flights, count, fps)
-    return Carried(start, off, holds, shape.low + start[:, 1:2] + off[..., 1], bound)
+    detailed = shape_of(skeleton, rotations, feet)
+    moved = [smoothed(axis, DETAIL, fps) for axis in _carried_detail(shape, detailed, bearing.loads).T]
+    start = start + np.stack(moved, axis=1) * fade_at_ends(count, (True, True), fps)[:, None]
+    return Carried(start, off, holds, detailed.low + start[:, 1:2] + off[..., 1], bound)
+
+
+def _carried_detail(plain: Shape, detailed: Shape, loads: Floats) -> Floats:
+    """Return how the root moves with fine detail [N, 3], metres, so that feet which bear hardly move.
+
+    If legs reached for their places from a smooth root, their knees would move for the detail of all other joints.
+
+    Args:
+        plain: the body without detail.
+        detailed: the body with it.
+        loads: how much each foot bears [N, feet], from 0 to 1.
+    """
+    share = loads / np.maximum(loads.sum(axis=1, keepdims=True), 1.0)
+    out = np.zeros((len(loads), 3))
+    out[:, [0, 2]] = np.einsum("nf,nfk->nk", share, plain.tracks - detailed.tracks)
+    out[:, 1] = np.sum(share * (plain.low - detailed.low), axis=1)
+    return out
 
 
 def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:

@@ -75,6 +75,7 @@ class Stance(NamedTuple):
 def set_on_floor(
     skeleton: Skeleton,
     rotations: Floats,
+    plain: Floats,
     times: Floats,
     stance: Stance,
     loose: Bools,
@@ -92,6 +93,7 @@ def set_on_floor(
     Args:
         skeleton: the body.
         rotations: local rotations [N, J, 4].
+        plain: the same without fine detail, by which feet find their places.
         times: of the frames [N], seconds.
         stance: how the corpus's bodies hold themselves and travel along it.
         loose: joints without limits [J].
@@ -111,8 +113,9 @@ def set_on_floor(
     gravity = GRAVITY / size
     if fastest is None:
         fastest = np.full(len(skeleton), KNEE)
+    stance = stance.scaled(1.0 / size)
     placed = _set_down(
-        small, rotations, times, stance.scaled(1.0 / size), loose, fixed, lows, near, slow, fastest, gravity, without
+        small, rotations, plain, times, stance, loose, fixed, lows, near, slow, fastest, gravity, without
     )
     root = size * placed[1]
     root[0], root[-1] = ends
@@ -122,6 +125,7 @@ def set_on_floor(
 def _set_down(
     skeleton: Skeleton,
     rotations: Floats,
+    plain: Floats,
     times: Floats,
     stance: Stance,
     loose: Bools,
@@ -168,6 +172,7 @@ def _set_down(
         carried = carry(
             skeleton,
             rotations[part],
+            plain[part],
             root[part],
             floor[part],
             firm[part],

@@ -117,8 +117,8 @@ def realise(
             longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
-    rotations = corpus.from_chains(walk.chains(corpus, clock.frames))
-    rotations, detailed = _add_detail(rotations, walk, clock, corpus, carriage)
+    detail, detailed = _detail(walk, clock, corpus, carriage)
+    rotations = rot.mul(corpus.from_chains(walk.chains(corpus, clock.frames)), rot.exp(detail))
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     # Once so that feet find places to stand at, and once for where they have been put.
     keep_apart = _keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
@@ -144,6 +144,7 @@ def realise(
     rotations, root = set_on_floor(
         a.skeleton,
         rotations,
+        rot.mul(rotations, rot.exp(-detail)) if len(detailed) else rotations,
         clock.frames,
         stance,
         carriage.loose,
@@ -234,25 +235,22 @@ def _bend_to_states(
     return walk._replace(poses=poses, headings=headings)
 
 
-def _add_detail(
-    rotations: Floats, walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage
-) -> tuple[Floats, Ints]:
-    """Return rotations [N, J, 4] with the corpus's fine detail, and the moves that it comes from.
+def _detail(walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage) -> tuple[Floats, Ints]:
+    """Return the corpus's fine detail of a walk, rotation vectors [N, J, 3], and the moves that it comes from.
 
     Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and the whole body
     less of it where it moves much slower than the moves that it comes from.
     """
-    between = corpus.detail.shape[1]
+    between, joints = corpus.detail.shape[1], walk.poses.shape[1]
     if not between:
-        return rotations, np.zeros(0, dtype=np.int64)
-    joints = walk.poses.shape[1]
+        return np.zeros((len(clock.frames), joints, 3)), np.zeros(0, dtype=np.int64)
     orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
     moves = likest_moves(corpus.moves, orientations, poses)
     share = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
     scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
     times, detail = subdivide_times(at, between), detail_of(corpus, moves)
     detail = detail * np.concatenate([scale, scale[-1:]])[..., None]
-    return rot.mul(rotations, rot.exp(natural_spline(times, detail, clock.frames))), moves
+    return natural_spline(times, detail, clock.frames), moves
 
 
 def _with_rates(
