@@ -128,7 +128,7 @@ def test_a_tween_becomes_any_picture_at_once_or_later(suffix: str, run: Run, tmp
         number = rb"-?(?:\d+\.?\d*|\.\d+)"
         assert re.sub(number, b"#", at_once) == re.sub(number, b"#", later)
         ours, theirs = (np.array(re.findall(number, text), dtype=np.float64) for text in (at_once, later))
-        np.testing.assert_allclose(ours, theirs, atol=2.0)  # of the fine units that paths are drawn in
+        np.testing.assert_allclose(ours, theirs, atol=5.0)  # of the fine units that paths are drawn in
     else:
         assert at_once == later
 

@@ -179,7 +179,7 @@ def test_a_given_number_of_moves_that_is_impossible_stays_an_error(ballet: Engin
 
 
 def test_who_is_hurried_is_told_of_it_by_part(ballet: Engine) -> None:
-    with pytest.warns(MotionMindWarning, match=r"faster than anything in the corpus: right_knee \d\.\d times"):
+    with pytest.warns(MotionMindWarning, match=r"faster than anything in the corpus: right_hip \d\.\d times"):
         tween = ballet.tween(*ENDS, duration=0.3)
     pace, way = ballet.pace, way_of(tween.motion)
     times = (way.parts / np.diff(tween.motion.times)[:, None]).max(axis=0) / pace.greatest
@@ -201,7 +201,7 @@ def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -
                 speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
                 fast.append(speeds[:, : len(motion.skeleton)] > engine.pace.fastest[: len(motion.skeleton)])
         shares.append(np.concatenate(fast).mean())
-    assert shares[0] < 0.01 < 0.3 * shares[1]
+    assert shares[0] < 0.01 < 0.5 * shares[1]
 
 
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:
@@ -217,7 +217,7 @@ def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> No
             still.append(plain.tempo.creeps)
             filled.append(tween.tempo.creeps)
     assert filled
-    assert np.mean(filled) < 0.8 * np.mean(still)
+    assert np.mean(filled) < 0.85 * np.mean(still)
 
 
 def test_a_detour_goes_on_from_its_beginning_and_comes_to_its_end_as_the_corpus_does(engine: Engine) -> None:
@@ -242,5 +242,5 @@ def test_the_report_and_the_summary_say_why_it_takes_so_long(run: Run) -> None:
     tempo = read_report("r.json").tempo
     assert tempo is not None
     assert tempo.usual_moves == 1
-    assert tempo.faster[0].part == "right_knee"
+    assert tempo.faster[0].part == "right_hip"
     assert tempo.usual > tempo.least > 0.0
