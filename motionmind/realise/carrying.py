@@ -27,7 +27,7 @@ from motionmind.realise.legs import SOFT
 
 HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
 RIGID = 0.004  # metres that a part which is no foot is off the floor
-DETAIL = 0.1  # seconds within which the root smooths the fine detail that it carries
+DETAIL = 0.2  # seconds within which the root smooths the fine detail that it carries; chosen on indian and cmu-05
 REACH = 0.002  # metres by which a leg is too short
 LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
 PLACE = 0.08  # metres that a standing leg leans more than the movement has it
@@ -149,10 +149,14 @@ def carry(
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
         posed = bend_legs(skeleton, own, feet, off, softness(holds))
     bound = 1.0 - leg_freedom(flights, count, fps)
-    detailed = shape_of(skeleton, rotations, feet)
+    # Knees do not make up for the detail of all other joints: the root moves with it, and feet are held at their height.
+    detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
+    heights = shape.low + start[:, 1:2] + off[..., 1]
     moved = [smoothed(axis, DETAIL, fps) for axis in _carried_detail(shape, detailed, bearing.loads).T]
     start = start + np.stack(moved, axis=1) * fade_at_ends(count, (True, True), fps)[:, None]
-    return Carried(start, off, holds, detailed.low + start[:, 1:2] + off[..., 1], bound)
+    reached = detailed.low + start[:, 1:2] + off[..., 1]
+    off[..., 1] += bearing.loads * (heights - reached)
+    return Carried(start, off, holds, reached + bearing.loads * (heights - reached), bound)
 
 
 def _carried_detail(plain: Shape, detailed: Shape, loads: Floats) -> Floats:
