@@ -149,7 +149,7 @@ def carry(
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
         posed = bend_legs(skeleton, own, feet, off, softness(holds))
     bound = 1.0 - leg_freedom(flights, count, fps)
-    # Knees do not make up for the detail of all other joints: the root moves with it, and feet are held at their height.
+    # Knees do not make up for the detail of all other joints: the root moves with it, and feet keep their height.
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     heights = shape.low + start[:, 1:2] + off[..., 1]
     moved = [smoothed(axis, DETAIL, fps) for axis in _carried_detail(shape, detailed, bearing.loads).T]

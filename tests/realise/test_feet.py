@@ -85,7 +85,7 @@ def grounded(
     rates = options.pop("rates", (None, None))
     ends = root[0], root[-1]
     times = np.arange(len(q)) / fps
-    return set_on_floor(skeleton, q, times, stance, loose, fixed, low, ends, rates, **options)
+    return set_on_floor(skeleton, q, q, times, stance, loose, fixed, low, ends, rates, **options)
 
 
 def posed(degrees: dict[str, tuple[float, float, float]], frames: int) -> Floats:
