@@ -32,7 +32,7 @@ from motionmind.realise.walks import (
 )
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
-THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on
+THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
 
 
 class MeanWalk(NamedTuple):
