@@ -192,10 +192,8 @@ class Anatomy:
         masses, centres = self._segments
         if skeleton is not None:
             centres = centres * (skeleton.height / self.skeleton.height)
-        places = body.positions(rotations, root)
-        return np.asarray(
-            np.einsum("j,...jk->...k", masses, places + rot.mul_vec(body.global_rotations(rotations), centres))
-        )
+        segments = body.positions_with(rotations, root, range(len(body)), centres)[..., len(body) :, :]
+        return np.asarray(np.einsum("j,...jk->...k", masses, segments))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
