@@ -92,7 +92,7 @@ def _unroll(vectors: Floats, centres: Ints) -> Floats:
 
     Each is then nearest to the vector of the neighbouring key towards the centre.
     """
-    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max(initial=0.0) < np.pi:
+    if rot.norm(np.diff(vectors, axis=0)).max(initial=0.0) < np.pi:
         return vectors  # all neighbours are that near already
     out = vectors.copy()
     for distance in range(2, len(out)):
