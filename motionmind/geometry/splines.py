@@ -58,6 +58,8 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     """
     if len(times) == 1:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
+    if np.isin(at, times).all():
+        return keys[np.searchsorted(times, at)]
     if len(times) > _LONG:
         return _by_pieces(rotation_spline, times, keys, at)
     piece = _pieces(times, at)
