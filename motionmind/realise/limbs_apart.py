@@ -102,7 +102,9 @@ def keep_limbs_apart(
     depths, directions = pair_depths(ends, capsules.radii, pairs)
     frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
     held = np.unique(np.concatenate([np.floor(given + 1e-6), np.ceil(given - 1e-6)])).astype(np.int64)
-    allowed = np.stack([np.interp(frames, held, depth[held]) for depth in depths.T], axis=1)
+    before = np.clip(np.searchsorted(held, frames, side="right") - 1, 0, len(held) - 2)
+    share = ((frames - held[before]) / np.diff(held)[before])[:, None]
+    allowed = (1.0 - share) * depths[held[before]] + share * depths[held[before + 1]]
     allowed = np.maximum(allowed, np.maximum(usual, TOUCHES))
     if not np.any(depths > allowed + LEAST):
         return rotations
@@ -123,7 +125,7 @@ def keep_limbs_apart(
         turns = np.zeros_like(steps)
         for limb in np.flatnonzero(needed.any(axis=0)):
             axis = placed.anchors[:, limb] - placed.pivots[:, limb]
-            axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+            axis /= np.maximum(rot.norm(axis), 1e-9)[:, None]
             own = steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
             turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
         _turn(placed, limbs, turns)
