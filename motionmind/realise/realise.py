@@ -153,6 +153,7 @@ def realise(
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         None if fastest is None else pace * fastest[: len(a.skeleton)],
+        np.inf if fastest is None else float(pace * fastest[-1] * a.skeleton.height),
         without,
     )
     rotations = keep_apart(rotations, root)
