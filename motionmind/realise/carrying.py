@@ -34,8 +34,8 @@ PLACE = 0.08  # metres that a standing leg leans more than the movement has it
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
-HURRY = 0.02  # metres a second by which the body travels faster than the corpus's bodies do
-NEARLY = 0.9  # share of their fastest travel from which it counts as such
+HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
+NEARLY = 0.9  # of that speed: from here on it is held to it
 ROUNDS = 2, 3  # of placing feet, and of the root in each
 
 

@@ -117,7 +117,20 @@ def set_on_floor(
         fastest = np.full(len(skeleton), KNEE)
     stance = stance.scaled(1.0 / size)
     placed = _set_down(
-        small, rotations, plain, times, stance, loose, fixed, lows, near, slow, fastest, travels / size, gravity, without
+        small,
+        rotations,
+        plain,
+        times,
+        stance,
+        loose,
+        fixed,
+        lows,
+        near,
+        slow,
+        fastest,
+        travels / size,
+        gravity,
+        without,
     )
     root = size * placed[1]
     root[0], root[-1] = ends
