@@ -37,8 +37,6 @@ from motionmind.realise.feet import (
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
-NEAR = 0.001  # metres off its height that a foot is let be
-
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
@@ -172,7 +170,7 @@ def _set_down(
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (stance.aloft, stance.leaps))
-    frames, rotations = fps * half_steps[given], rotations.copy()
+    frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()
     for number, (start, end) in enumerate(pairwise(frames)):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
@@ -201,7 +199,7 @@ def _set_down(
             without,
         )
         rotations[part], root[part] = _reach_floor(
-            skeleton, rotations[part], carried, feet, loose, known.moving, fastest, fps
+            skeleton, rotations[part], carried, feet, loose, fine, known.moving, fastest, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
         root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
@@ -214,6 +212,7 @@ def _reach_floor(
     carried: Carried,
     feet: list[Foot],
     loose: Bools,
+    fine: bool,
     moving: tuple[bool, bool],
     fastest: Floats,
     fps: float,
@@ -221,7 +220,7 @@ def _reach_floor(
     """Return rotations whose legs are where they should be, within their limits, and the root.
 
     A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height. Knees
-    bend no faster than they can.
+    bend no faster than they can, and with the movement's own fine detail.
     """
     joints, fades = [joint for foot in feet for joint in foot.leg], fade_at_ends(len(rotations), moving, fps)
     out, root = rotations.copy(), carried.root
@@ -232,10 +231,10 @@ def _reach_floor(
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     missing = carried.heights - foot_heights(skeleton, out, root, feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
-    eased, shift = ease_knees(skeleton, posed, feet, off, carried.holds, fades * carried.bound, moving, fastest, fps)
-    if eased is off and np.abs(missing).max() < NEAR:
-        return out, root
-    planted = bend_legs(skeleton, posed, feet, eased, soft if eased is off else np.zeros(soft.shape))
+    eased, shift = ease_knees(
+        skeleton, posed, feet, off, carried.holds, fades * carried.bound, fine, moving, fastest, fps
+    )
+    planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
 
