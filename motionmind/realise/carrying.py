@@ -34,6 +34,8 @@ PLACE = 0.08  # metres that a standing leg leans more than the movement has it
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
+HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
+NEARLY = 0.9  # of that speed: from here on it is held to it
 ROUNDS = 2, 3  # of placing feet, and of the root in each
 
 
@@ -81,6 +83,7 @@ def carry(
     feet: list[Foot],
     known: Ends,
     overhang: float,
+    travels: float,
     gravity: float,
     fps: float,
     without: Collection[Correction],
@@ -97,6 +100,7 @@ def carry(
         feet: those that may be placed.
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
+        travels: how fast the body travels at most, metres a second; infinite for any speed.
         gravity: metres a second squared.
         fps: frames a second.
         without: corrections to leave out.
@@ -131,7 +135,7 @@ def carry(
         steady += _standing_rows(shape, bearing, floor, leg_freedom(flights, count, fps))
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
-            rows = [*steady, _sunk_rows(shape, floor, start)]
+            rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
             rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
             if "balance" not in without and mass.any():
                 points = shape.places[..., [0, 2]] + start[:, None, [0, 2]]
@@ -211,6 +215,20 @@ def _prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
         rows.append(_axis_rows(axis, prior[:, axis], np.full(count, PRIOR**-2.0)))
         rows.append(difference_rows(axis, (-fps, fps, 0.0), fps * np.diff(prior[:-1, axis]), travel))
     return rows
+
+
+def _hurry_rows(root: Floats, travels: float, fps: float) -> Rows:
+    """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second."""
+    moved = fps * np.diff(root, axis=0) * np.array([1.0, 0.0, 1.0])
+    speed = np.linalg.norm(moved, axis=1)
+    along = moved / np.maximum(speed, 1e-9)[:, None]
+    # Rows look at three frames: each at its first two, and the last one at its last two.
+    first = np.minimum(np.arange(len(along)), len(root) - 3)
+    coefficients = np.zeros((len(along), 9))
+    coefficients[:, :6] = fps * np.concatenate([-along, along], axis=1)
+    coefficients[-1] = np.roll(coefficients[-1], 3)
+    weights = np.where(speed > NEARLY * travels, HURRY**-2.0, 0.0)
+    return Rows(first, coefficients, np.full(len(along), min(travels, 1e3)), weights)
 
 
 def _smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:

@@ -82,6 +82,7 @@ def set_on_floor(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats | None = None,
+    travels: float = np.inf,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -101,6 +102,7 @@ def set_on_floor(
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
         fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
+        travels: how fast the body travels at most, metres a second.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
@@ -113,7 +115,20 @@ def set_on_floor(
         fastest = np.full(len(skeleton), KNEE)
     stance = stance.scaled(1.0 / size)
     placed = _set_down(
-        small, rotations, plain, times, stance, loose, fixed, lows, near, slow, fastest, gravity, without
+        small,
+        rotations,
+        plain,
+        times,
+        stance,
+        loose,
+        fixed,
+        lows,
+        near,
+        slow,
+        fastest,
+        travels / size,
+        gravity,
+        without,
     )
     root = size * placed[1]
     root[0], root[-1] = ends
@@ -132,6 +147,7 @@ def _set_down(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats,
+    travels: float,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
@@ -177,6 +193,7 @@ def _set_down(
             feet,
             known,
             stance.overhang,
+            travels,
             gravity,
             fps,
             without,
