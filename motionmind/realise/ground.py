@@ -34,11 +34,11 @@ from motionmind.realise.feet import (
     pose,
     softness,
 )
+from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
-LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
 
 class Stance(NamedTuple):
@@ -82,6 +82,7 @@ def set_on_floor(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats | None = None,
+    travels: float = np.inf,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -101,6 +102,7 @@ def set_on_floor(
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
         fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
+        travels: how fast the body travels at most, metres a second.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
@@ -113,7 +115,20 @@ def set_on_floor(
         fastest = np.full(len(skeleton), KNEE)
     stance = stance.scaled(1.0 / size)
     placed = _set_down(
-        small, rotations, plain, times, stance, loose, fixed, lows, near, slow, fastest, gravity, without
+        small,
+        rotations,
+        plain,
+        times,
+        stance,
+        loose,
+        fixed,
+        lows,
+        near,
+        slow,
+        fastest,
+        travels / size,
+        gravity,
+        without,
     )
     root = size * placed[1]
     root[0], root[-1] = ends
@@ -132,6 +147,7 @@ def _set_down(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats,
+    travels: float,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
@@ -177,6 +193,7 @@ def _set_down(
             feet,
             known,
             stance.overhang,
+            travels,
             gravity,
             fps,
             without,
@@ -185,7 +202,7 @@ def _set_down(
             skeleton, rotations[part], carried, feet, loose, fine, known.moving, fastest, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
-        root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
+        root[part, 1] += cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
 
 
@@ -220,17 +237,6 @@ def _reach_floor(
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
-
-
-def _cover(need: Floats, fps: float) -> Floats:
-    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
-    if not need.any():
-        return need
-    width = max(1, round(0.5 * LIFTS * fps))
-    window = np.hanning(2 * width + 3)[1:-1]
-    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
-    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
