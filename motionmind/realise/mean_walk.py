@@ -34,6 +34,7 @@ from motionmind.realise.walks import (
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
+BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
 class MeanWalk(NamedTuple):
@@ -130,8 +131,9 @@ def _mean_between(
     larger = sorted({number for numbers in groups for number in numbers[:-1]})
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
-    with ThreadPoolExecutor(THREADS) as pool:
-        distances = [*pool.map(off, np.array_split(passed, min(THREADS, len(passed))))]
+    threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
+    with ThreadPoolExecutor(threads) as pool:
+        distances = [*pool.map(off, np.array_split(passed, threads))]
 
         def walk(number: int) -> tuple[Floats, float]:
             own = np.concatenate([of_parts[number] for of_parts in distances])
