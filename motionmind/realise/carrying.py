@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
@@ -155,23 +155,34 @@ def carry(
         posed = bend_legs(skeleton, own, feet, off, softness(holds))
     bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
-    start, off, heights = _with_detail(shape, detailed, bearing.loads, start, off, floor, fps)
+    falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
+    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
     return Carried(start, off, holds, heights, bound)
 
 
 def _with_detail(
-    plain: Shape, detailed: Shape, loads: Floats, root: Floats, off: Floats, floor: Floats, fps: float
+    plain: Shape,
+    detailed: Shape,
+    loads: Floats,
+    falls: Floats,
+    flying: Bools,
+    root: Floats,
+    off: Floats,
+    floor: Floats,
+    fps: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
     If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
-    the root moves with it. Feet that bear keep their height; one that would swing into the floor is lifted, and not the
-    body with it.
+    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height; one
+    that would swing into the floor is lifted, and not the body with it.
 
     Args:
         plain: the body without detail.
         detailed: the body with it.
         loads: how much each foot bears [N, feet], from 0 to 1.
+        falls: how far detail takes the root from the centre of mass [N, 3], metres.
+        flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
         off: displacements of feet without detail [N, feet, 3], metres.
         floor: height of the floor [N], metres.
@@ -182,7 +193,9 @@ def _with_detail(
     moves = np.zeros(root.shape)
     moves[:, [0, 2]] = np.einsum("nf,nfk->nk", share, plain.tracks - detailed.tracks)
     moves[:, 1] = np.sum(share * (plain.low - detailed.low), axis=1)
-    moved = root + np.stack([smoothed(axis, DETAIL, fps) for axis in moves.T], axis=1) * fades[:, None]
+    moves = np.stack([smoothed(axis, DETAIL, fps) for axis in moves.T], axis=1)
+    flies = cover(flying.astype(np.float64), fps)[:, None]
+    moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
     kept = reached + loads * (heights - reached)
     sunk = np.maximum(floor[:, None] - kept, 0.0)
