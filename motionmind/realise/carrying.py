@@ -316,9 +316,9 @@ def _reach_rows(
         aim[:, [0, 2]] += bearing.targets[:, number]
         aim[:, 1] += floor - shape.low[:, number]
         leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
-        straight = rot.norm(end - hip) / foot.length(skeleton)
-        longest = np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
-        longest *= foot.length(skeleton)
+        length = foot.length(skeleton)
+        straight = rot.norm(end - hip) / length
+        longest = length * np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
         leg = aim - root
         far = rot.norm(leg)
         along = leg / np.maximum(far, 1e-9)[:, None]

@@ -140,7 +140,8 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
                 spread += crosses[side, t + 1] - crosses[side, s]
             else:
                 spread = off - (x * x + y * y) / n
-                across = 0.5 * OUTSIDE * np.sum((track[t] - track[s]) * outward[(s + t) // 2])
+                moved_x, moved_y = track[t, 0] - track[s, 0], track[t, 1] - track[s, 1]
+                across = 0.5 * OUTSIDE * (moved_x * outward[(s + t) // 2, 0] + moved_y * outward[(s + t) // 2, 1])
                 spread += n * across * across
             cost = before + stand_sum[t + 1] - stand_sum[s] + max(spread, 0.0) / (STRAYS**2 * fps)
             if cost < best[0, t]:
@@ -155,9 +156,10 @@ def _part(  # noqa: PLR0915 - one table, filled in one go
             before = 0.0 if s == 0 else best[0, s - 1]
             if before == np.inf:
                 continue
-            off = track[min(t + 1, last)] - track[max(s - 1, 0)]
+            stood, stands = max(s - 1, 0), min(t + 1, last)
+            x, y = track[stands, 0] - track[stood, 0], track[stands, 1] - track[stood, 1]
             cost = before + swing_sum[t + 1] - swing_sum[s]
-            cost += (off[0] ** 2 + off[1] ** 2) / ((n + 1) / fps * QUICK**2)
+            cost += (x * x + y * y) / ((n + 1) / fps * QUICK**2)
             if steps:
                 cost += STEP_COST
             if cost < best[1, t]:
