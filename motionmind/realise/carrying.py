@@ -16,6 +16,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
+from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import balance_rows
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
@@ -309,12 +310,12 @@ def _reach_rows(
         aim = end - hip
         aim[:, [0, 2]] += bearing.targets[:, number]
         aim[:, 1] += floor - shape.low[:, number]
-        leans = np.linalg.norm(bearing.targets[:, number] - root[:, [0, 2]], axis=-1) / LEANS
-        straight = np.linalg.norm(end - hip, axis=-1) / foot.length(skeleton)
+        leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
+        straight = rot.norm(end - hip) / foot.length(skeleton)
         longest = np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
         longest *= foot.length(skeleton)
         leg = aim - root
-        far = np.linalg.norm(leg, axis=-1)
+        far = rot.norm(leg)
         along = leg / np.maximum(far, 1e-9)[:, None]
         short = (far > longest + 1e-6) & bearing.stands[:, number]
         target = np.sum(along * aim, axis=-1) - longest
@@ -324,4 +325,4 @@ def _reach_rows(
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
     """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    return position_rows(np.arange(len(targets)), np.tile(np.eye(3)[axis], (len(targets), 1)), targets, weights)
+    return position_rows(np.arange(len(targets)), np.eye(3)[axis], targets, weights)
