@@ -156,7 +156,7 @@ def carry(
     bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
-    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
+    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, fps)
     return Carried(start, off, holds, heights, bound)
 
 
@@ -168,14 +168,12 @@ def _with_detail(
     flying: Bools,
     root: Floats,
     off: Floats,
-    floor: Floats,
     fps: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
     If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
-    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height; one
-    that would swing into the floor is lifted, and not the body with it.
+    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height.
 
     Args:
         plain: the body without detail.
@@ -185,7 +183,6 @@ def _with_detail(
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
         off: displacements of feet without detail [N, feet, 3], metres.
-        floor: height of the floor [N], metres.
         fps: frames a second.
     """
     fades = fade_at_ends(len(loads), (True, True), fps)
@@ -198,8 +195,6 @@ def _with_detail(
     moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
     kept = reached + loads * (heights - reached)
-    sunk = np.maximum(floor[:, None] - kept, 0.0)
-    kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None] if kept.size else 0.0
     off = off.copy()
     off[..., 1] += kept - reached
     return moved, off, kept
