@@ -10,7 +10,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.knees import bend_of, distance_of, keep_detail, slow_down, smoothed
+from motionmind.realise.knees import bend_of, cover, distance_of, keep_detail, slow_down, smoothed
 from motionmind.realise.least_squares import bending_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
@@ -268,6 +268,7 @@ def ease_knees(
     off: Floats,
     holds: Floats,
     bound: Floats,
+    room: Floats,
     fine: bool,
     moving: tuple[bool, bool],
     fastest: Floats,
@@ -285,6 +286,7 @@ def ease_knees(
         off: how far each is from where the rotations have it [N, feet, 3], metres.
         holds: how much each holds its place [N, feet], from 0 to 1.
         bound: how much the body's height may give way [N], from 0 to 1.
+        room: how much lower than there each foot may be [N, feet], metres.
         fine: whether the movement has fine detail.
         moving: whether the velocity is given in the first and in the last frame.
         fastest: speeds of the joints [J], rad/s, that knees keep to if they do so in the movement itself.
@@ -322,7 +324,11 @@ def ease_knees(
         if fine:
             bends = keep_detail(bends, own[:, number], fixed, *bones, fps)
         lengths[:, number] = distance_of(bends, *bones)
-    return _lengthened(aims, lengths) - legs, shift
+    out = _lengthened(aims, lengths) - legs
+    sunk = np.maximum(off[..., 1] - room - out[..., 1] - shift[:, 1:2], 0.0)
+    for number in range(len(feet)):
+        out[:, number, 1] += cover(sunk[:, number], fps) * fade_at_ends(len(out), moving, fps)
+    return out, shift
 
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:

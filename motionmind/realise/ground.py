@@ -34,11 +34,12 @@ from motionmind.realise.feet import (
     pose,
     softness,
 )
+from motionmind.realise.flight import SURELY
+from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
-LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
 
 class Stance(NamedTuple):
@@ -153,7 +154,8 @@ def _set_down(
 ) -> tuple[Floats, Floats]:
     """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
     half_steps, given = stance.half_steps, 2 * np.array(list(low))
-    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]))
+    hovering = stance.aloft[[0, -1]] > SURELY
+    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]), hovering)
     at_half_steps = stance.clearance + under
     evenly = np.interp(half_steps, half_steps[given], list(low.values()))
     at_half_steps = evenly + stance.trust * (at_half_steps - evenly)
@@ -199,10 +201,10 @@ def _set_down(
             without,
         )
         rotations[part], root[part] = _reach_floor(
-            skeleton, rotations[part], carried, feet, loose, fine, known.moving, fastest, fps
+            skeleton, rotations[part], carried, floor[part], feet, loose, fine, known.moving, fastest, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
-        root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
+        root[part, 1] += cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
 
 
@@ -210,6 +212,7 @@ def _reach_floor(
     skeleton: Skeleton,
     rotations: Floats,
     carried: Carried,
+    floor: Floats,
     feet: list[Foot],
     loose: Bools,
     fine: bool,
@@ -231,23 +234,13 @@ def _reach_floor(
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     missing = carried.heights - foot_heights(skeleton, out, root, feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
+    room = carried.heights - floor[:, None] + SINKS
     eased, shift = ease_knees(
-        skeleton, posed, feet, off, carried.holds, fades * carried.bound, fine, moving, fastest, fps
+        skeleton, posed, feet, off, carried.holds, fades * carried.bound, room, fine, moving, fastest, fps
     )
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
-
-
-def _cover(need: Floats, fps: float) -> Floats:
-    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
-    if not need.any():
-        return need
-    width = max(1, round(0.5 * LIFTS * fps))
-    window = np.hanning(2 * width + 3)[1:-1]
-    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
-    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
@@ -262,13 +255,15 @@ def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats 
     return np.asarray(root + departure(times, first, last))
 
 
-def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats) -> Floats:
+def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:
     """Return the floor's height at the half steps [2 T + 1], metres: 0, or as the `ends`' lowest points [2] show.
 
     A recording's own zero is often off: where an end is below 0 so is its floor, and where it is higher than bodies
-    that stand so are in the corpus, its floor is higher.
+    that stand so are in the corpus, its floor is higher. An end in the air, `hovering` [2], shows nothing of its floor,
+    which is then the other's.
     """
     above = np.maximum(np.minimum(ends, 0.0), ends - clearance[[0, -1]])
+    above = np.where(hovering, np.minimum(ends, 0.0 if hovering.all() else above[::-1]), above)
     return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
 
 

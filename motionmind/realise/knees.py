@@ -16,6 +16,7 @@ from motionmind.realise.least_squares import bending_diagonals
 SHIFTS = 0.008  # metres that a foot may be off so that its knee keeps the fine detail of a movement
 STIRS = 2.0, 0.3  # rad/s^2 by which its acceleration may differ from its own, and share of that; chosen on cmu-05
 AROUND = 0.2  # seconds in which its own is seen
+LIFTS = 0.3  # seconds before and after a part would be too low, in which it is lifted
 EASES = 0.05  # seconds over which a knee that is too fast changes its speed
 
 
@@ -90,6 +91,17 @@ def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
     # Mirrored through its ends, so that these stay.
     around = np.pad(values, width, mode="reflect", reflect_type="odd")
     return np.asarray(np.convolve(around, weights / weights.sum(), "valid"))
+
+
+def cover(need: Floats, fps: float) -> Floats:
+    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
+    if not need.any():
+        return need
+    width = max(1, round(0.5 * LIFTS * fps))
+    window = np.hanning(2 * width + 3)[1:-1]
+    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
+    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Floats:
