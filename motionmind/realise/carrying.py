@@ -37,6 +37,7 @@ TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
 HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
 NEARLY = 0.9  # of that speed: from here on it is held to it
+TIPTOE = 0.12  # metres above the floor: a body that is no higher at both ends, above one spot, stands there on one foot
 ROUNDS = 2, 3  # of placing feet, and of the root in each
 
 
@@ -110,9 +111,10 @@ def carry(
     shape = shape_of(skeleton, plain, feet)
     mass = _mass(skeleton, plain)
     standing = floor - shape.lowest
-    hovering = [known.aloft[end] > SURELY and root[end, 1] - standing[end] > HOVERS for end in (0, -1)]
+    above = root[[0, -1], 1] - standing[[0, -1]]
+    staying = find_staying(shape, root[:, [0, 2]]) if above.max() < TIPTOE else None
+    hovering = [staying is None and known.aloft[end] > SURELY and above[end] > HOVERS for end in (0, -1)]
     flights = []
-    staying = None if any(hovering) else find_staying(shape, root[:, [0, 2]])
     if "flight" not in without and staying is None:
         masses = root[[0, -1], 1] + mass[[0, -1], 1]
         up = standing + mass[:, 1]

@@ -22,7 +22,8 @@ BENDS = 0.25  # seconds in which a departure of a swinging foot from the movemen
 SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
 RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
 LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
-KNEE = 8.0  # radians a second at which knees bend at most in a step, which is lifted less if it is quick
+KNEE = 8.0  # radians a second at which knees bend at most, where nothing is known of the corpus's
+FLICKS = 11.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
 QUICK = 1.2  # times as fast as all but a hundredth of the corpus's moments: as knees bend at most
 STEEP = 0.4, 0.7  # cosines of a leg's lean from which its foot is raised and lowered, not drawn along the leg
 GIVES = 0.15  # seconds over which the height of a body changes that gives way to a knee
@@ -186,7 +187,7 @@ def _lift(frames: int, far: float, leg: float, fps: float) -> Floats:
         leg: length of the leg, metres.
         fps: frames a second.
     """
-    bend = min(KNEE * RISES * frames / (1.5 * fps), np.pi)
+    bend = min(FLICKS * RISES * frames / (1.5 * fps), np.pi)
     s = np.linspace(0.0, 1.0, frames + 1)
     s = np.minimum(np.minimum(s, 1.0 - s) / RISES, 1.0)
     highest = min(leg * (1.0 - np.cos(0.5 * bend)), LIFT) * min(far / FAR, 1.0)

@@ -135,6 +135,15 @@ def test_the_body_is_not_lifted_onto_the_toes_of_a_leg_that_works() -> None:
     assert lowest_height(skeleton, found, went).min() > -0.005
 
 
+def test_quick_steps_leave_the_floor_before_they_go_far() -> None:
+    """Feet that travel 2 m in 2.6 s and are not lifted by the movement hardly skate."""
+    frames = 79
+    q = posed({"left_knee": (15.0, 0.0, 0.0), "right_knee": (15.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, 2.0], frames), np.zeros(frames))
+    assert skating(human23(), q, root) > 0.9
+    assert skating(human23(), *grounded(q, root)) < 0.25
+
+
 def test_a_leg_that_must_not_change_does_not() -> None:
     q, root = sway()
     fixed = TIGHT.copy()
@@ -169,6 +178,18 @@ def steps_of(found: Floats, went: Floats) -> list[Bools]:
     ends = human23().positions_and_tips(found, went)[:, [[4, 27], [8, 31]]][..., [0, 2]]
     moved = np.linalg.norm(np.diff(ends, axis=0), axis=-1).min(axis=-1)
     return list((moved > 0.005).T)
+
+
+def test_a_foot_that_is_given_a_little_above_the_floor_on_one_spot_stands_there() -> None:
+    """Where a recording's floor is off, walks take who stands on one foot for a body in the air."""
+    frames = 46
+    q = on_one_leg(frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.full(frames, 0.08))
+    found, went = grounded(q, root, aloft=np.ones(17), leap=0.08)
+    heights = lowest_height(human23(), found, went)
+    assert heights[10:-10].max() < 0.01  # between the ends it does not hop
+    places = human23().positions(found, went)[:, human23().index("right_ankle")]
+    assert np.linalg.norm(places[:, [0, 2]] - places[0, [0, 2]], axis=1).max() < 0.001
 
 
 def test_the_farther_a_body_has_to_go_the_more_steps_it_takes_one_foot_after_the_other() -> None:
@@ -405,7 +426,10 @@ def test_it_is_the_same_wherever_the_body_faces() -> None:
 def test_it_is_much_the_same_at_any_frame_rate() -> None:
     found, went = grounded(*sway(travel=0.0))
     fine, there = grounded(*sway(travel=0.0, fps=120.0), fps=120.0)
-    assert np.degrees(rot.angle(fine[::4], found)).max() < 10.0
+    # A knee that a step bends begins up to a frame later.
+    apart = np.degrees(rot.angle(fine[::4], found))
+    assert apart.max() < 14.0
+    assert np.percentile(apart[:, LEGS], 95.0) < 5.0
     np.testing.assert_allclose(there[::4], went, atol=0.03)
 
 
