@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import stat
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from motionmind.errors import FormatError, MotionMindError
 
 FilePath = str | os.PathLike[str]
+
+TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
+_MINUTE, _DAY = 60.0, 86400.0  # seconds
+_HELD_OPEN = (0.01, 0.03, 0.1, 0.3, 0.5)  # seconds to wait for another program that holds a file open
 
 
 def read_bytes(path: FilePath) -> bytes:
@@ -39,13 +46,23 @@ def write_atomically(path: FilePath, data: bytes) -> None:
         target = Path(os.path.realpath(path))
         if mode is not None and stat.S_ISDIR(mode):
             raise IsADirectoryError(0, "it is a folder")
-        _write_beside_and_move(target, data, mode)
+        replace_file(target, data, mode)
     except (OSError, ValueError) as error:
         raise MotionMindError(f"{os.fspath(path)}: cannot be written: {_reason(error)}") from error
 
 
-def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
-    temporary = target.with_name(f".motionmind-{os.urandom(8).hex()}.tmp")
+def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
+    """Write a file beside `target`, flush it, move it there and flush the folder; OSError if that fails.
+
+    What processes that were killed left in the folder is removed.
+
+    Args:
+        target: where; a regular file there is replaced.
+        data: the file's bytes.
+        mode: its permissions; None for those of any new file.
+    """
+    _remove_leftovers(target.parent)
+    temporary = target.with_name(f".motionmind-{os.getpid()}-{os.urandom(8).hex()}.tmp")
     try:
         # Not tempfile: it makes files private to their owner, whatever the umask.
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -55,11 +72,74 @@ def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
             os.fsync(file.fileno())
         if mode is not None:
             temporary.chmod(stat.S_IMODE(mode))
-        temporary.replace(target)
+        _move(temporary, target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
+    sync_folder(target.parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those that it lies in, if it is not there, and flush them to disk."""
+    if not folder.is_dir():
+        make_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        sync_folder(folder.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush to disk which files a folder holds, where the system can."""
+    if os.name == "nt":  # it opens no folders, and logs their changes in order
+        return
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # a folder that one may write to and not look into
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that flushes no folders
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move a file over another, at once; wait a second at most while a program holds that open, as Windows lets it."""
+    for pause in (*_HELD_OPEN, None):
+        try:
+            source.replace(target)
+            return
+        except PermissionError:
+            if pause is None:
+                raise
+            time.sleep(pause)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of processes that ended before they were done with them."""
+    with suppress(OSError):
+        for entry in os.scandir(folder):
+            if parts := TEMPORARY.fullmatch(entry.name):
+                with suppress(OSError):
+                    age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+                    # A process may run on another machine that shares the folder, or have the number of one that died.
+                    if age > _DAY or (age > _MINUTE and parts[1] and not _runs(int(parts[1]))):
+                        Path(entry.path).unlink()
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process of this number runs on this machine; True where that cannot be asked."""
+    if os.name == "nt":  # where asking would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _reason(error: OSError | ValueError) -> str:

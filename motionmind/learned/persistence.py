@@ -111,13 +111,13 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
         FormatError: it cannot be read.
     """
     folder = store.locate(name, home)
-    manifest = store.read_manifest(folder)
+    manifest, arrays = store.load(folder)
     if manifest["format"] == store.BUILT:
-        return _open(folder, manifest)
+        return _open(folder, manifest, arrays)
     source = parse_manifest(manifest, SourceManifest, folder / store.MANIFEST)
     built = store.cache() / f"{folder.name}-{store.fingerprint(_learned_files(folder, source))}"
     try:
-        return _open(built)
+        return _open(built, *store.load(built))
     except MotionMindError:  # it is not there yet, or is damaged
         learned = learn(*_read_source(folder, source))
     with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
@@ -125,9 +125,8 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     return learned
 
 
-def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
-    """Open a built corpus; `found` is its manifest, if that has been read."""
-    saved, stored = store.load(folder, found)
+def _open(folder: Path, saved: dict[str, Any], stored: Mapping[str, NDArray[Any]]) -> Learned:
+    """Return what was learned, of a folder's manifest and arrays; FormatError if something lacks or does not fit."""
     arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
     path = folder / store.MANIFEST
     manifest = parse_manifest(saved, BuiltManifest, path)
