@@ -28,7 +28,7 @@ def arrays(seed: int) -> dict[str, NDArray[Any]]:
 
 def seed_of(folder: Path) -> int:
     """The seed of the corpus in a folder; fails if it is a mixture."""
-    _, found = store.load(folder)
+    _, found, *_ = store.load(folder)
     assert found.keys() == arrays(0).keys()
     (seed,) = {int(value) for array in found.values() for value in array.ravel()}
     return seed

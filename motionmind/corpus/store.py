@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -23,6 +24,8 @@ from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: (1,), BUILT: (1, 2)}  # that can be read; the last is written
 MANIFEST = "manifest.json"
+CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
+_COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_typing.py", "errors.py", "files.py", "jit.py"),
@@ -155,14 +158,37 @@ def _place_of(folder: Path, manifest: Mapping[str, Any]) -> Path:
     return folder / str(number)
 
 
-def load(folder: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+class Stored(NamedTuple):
+    """What a corpus's folder holds.
+
+    Attributes:
+        manifest: its manifest.
+        arrays: a built corpus's arrays by name, memory-mapped.
+        place: the folder of the arrays.
+        identity: changes when any of the files does; "" while they are so new that it might not.
+    """
+
+    manifest: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+    place: Path
+    identity: str
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether these very files were found valid before."""
+        with suppress(OSError):
+            return bool(self.identity) and (self.place / versions.CHECKED).read_text("utf-8") == self.identity
+        return False
+
+    def remember_checked(self) -> None:
+        """Note beside the arrays that they were found valid, where that can be written."""
+        with suppress(OSError):
+            if self.identity:
+                replace_file(self.place / versions.CHECKED, self.identity.encode())
+
+
+def load(folder: Path) -> Stored:
     """Load a corpus's folder, of one version even while others replace it.
-
-    Args:
-        folder: the corpus's folder.
-
-    Returns:
-        The manifest, and a built corpus's arrays by name, memory-mapped.
 
     Raises:
         FormatError: the manifest or an array is missing, damaged, or not the one that was saved.
@@ -172,23 +198,25 @@ def load(folder: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         data = _read(path)
         manifest = _parse(path, data)
         if manifest["format"] != BUILT:
-            return manifest, {}
+            return Stored(manifest, {}, folder, "")
         place = _place_of(folder, manifest)
         with versions.hold(place) as there:
             # Only a version that is current while it is held is complete, and stays so.
             if _read(path) == data:
                 if not there:
                     raise FormatError(f"there is no folder {place.name} beside it; build the corpus again", path=path)
-                return manifest, _open_arrays(place, path, manifest.get("arrays"))
+                shapes = manifest.get("arrays")
+                if not isinstance(shapes, dict):
+                    raise FormatError("does not say which arrays there are; build the corpus again", path=path)
+                identity = _identity(data, [_array_file(place, name) for name in shapes])
+                return Stored(manifest, _open_arrays(place, shapes), place, identity)
 
 
-def _open_arrays(place: Path, path: Path, shapes: object) -> dict[str, NDArray[Any]]:
-    """Open the arrays in a folder; the manifest at `path` states the type and shape of each, as [type, *shape]."""
-    if not isinstance(shapes, dict):
-        raise FormatError("does not say which arrays there are; build the corpus again", path=path)
+def _open_arrays(place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Open the arrays in a folder that the manifest states the type and shape of by name, as [type, *shape]."""
     arrays = {}
     for name, shape in shapes.items():
-        file = place / f"{name}.npy"
+        file = _array_file(place, name)
         try:
             # A plain view: still mapped, but without the subclass, which slows every slice.
             arrays[name] = np.asarray(np.lib.format.open_memmap(file, mode="r"))
@@ -197,6 +225,24 @@ def _open_arrays(place: Path, path: Path, shapes: object) -> dict[str, NDArray[A
         if [arrays[name].dtype.str, *arrays[name].shape] != shape:
             raise FormatError("is not the array that was saved; build the corpus again", path=file)
     return arrays
+
+
+def _array_file(place: Path, name: str) -> Path:
+    return place / f"{name}.npy"
+
+
+def _identity(manifest: bytes, files: Iterable[Path]) -> str:
+    """Return a name of a manifest and files as they are; "" if a file lacks, or could change and keep its times."""
+    digest = hashlib.sha256(manifest)
+    newest = 0.0
+    for file in [*files, CHECKED_BY]:
+        try:
+            found = file.stat()
+        except (OSError, ValueError):
+            return ""
+        newest = max(newest, found.st_mtime, found.st_ctime)
+        digest.update(repr((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)).encode())
+    return digest.hexdigest() if time.time() - newest > _COARSEST_CLOCK else ""
 
 
 def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:

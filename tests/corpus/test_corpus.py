@@ -325,7 +325,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_what_is_saved_is_loaded_exactly(tmp_path: Path) -> None:
     store.save(tmp_path / "deep" / "arms", MANIFEST, arrays())
-    manifest, found = store.load(tmp_path / "deep" / "arms")
+    manifest, found, *_ = store.load(tmp_path / "deep" / "arms")
     assert {key: manifest[key] for key in MANIFEST} == MANIFEST
     assert found.keys() == arrays().keys()
     for name, array in arrays().items():
@@ -343,7 +343,7 @@ def test_the_same_things_are_saved_as_the_same_bytes(tmp_path: Path) -> None:
 def test_an_older_one_is_replaced_whole(tmp_path: Path) -> None:
     store.save(tmp_path / "arms", MANIFEST, arrays() | {"more": np.zeros(3)})
     store.save(tmp_path / "arms", MANIFEST, arrays(1))
-    np.testing.assert_array_equal(store.load(tmp_path / "arms")[1]["rotations"], arrays(1)["rotations"])
+    np.testing.assert_array_equal(store.load(tmp_path / "arms").arrays["rotations"], arrays(1)["rotations"])
     assert not list(tmp_path.rglob("more.npy"))
     assert [path.name for path in tmp_path.iterdir()] == ["arms"]
 
@@ -384,7 +384,7 @@ def test_a_corpus_that_is_damaged_is_a_format_error(
                 data[rng.randrange(min(140, len(data)))] = rng.randrange(256)
             file.write_bytes(data[: rng.choice([len(data), rng.randrange(len(data))])])
         with contextlib.suppress(FormatError):
-            _, found = store.load(folder)
+            _, found, *_ = store.load(folder)
             for name, array in arrays().items():
                 assert found.get(name, array).shape == array.shape
 

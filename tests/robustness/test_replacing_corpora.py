@@ -289,7 +289,7 @@ def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
 
 def test_arrays_that_were_loaded_outlive_their_version(mine: Path) -> None:
     store.save(mine, MANIFEST, arrays(1))
-    _, found = store.load(mine)
+    _, found, *_ = store.load(mine)
     store.save(mine, MANIFEST, arrays(2))
     assert not (mine / "1").exists()
     assert all((array == 1).all() for array in found.values())
