@@ -19,6 +19,16 @@ _MINUTE, _DAY = 60.0, 86400.0  # seconds
 _HELD_OPEN = (0.01, 0.03, 0.1, 0.3, 0.5)  # seconds to wait for another program that holds a file open
 
 
+def name_of(path: FilePath) -> str:
+    """Return a file's name without its suffix, as text (`as_text`)."""
+    return as_text(Path(path).stem)
+
+
+def as_text(name: str) -> str:
+    """Return a file's name as text that can be written: its bytes that are no UTF-8 become escapes."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
 def read_bytes(path: FilePath) -> bytes:
     """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read."""
     try:

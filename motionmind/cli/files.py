@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
+from motionmind.files import as_text
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def clip_names(files: Sequence[Path]) -> dict[Path, str]:
     schemes = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
     uses = [Counter(names.values()) for names in schemes]
     unique = ([names[f] for names, used in zip(schemes, uses, strict=True) if used[names[f]] == 1] for f in files)
-    return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
+    return {file: as_text(next(iter(names), file.as_posix())) for file, names in zip(files, unique, strict=True)}
 
 
 def numbered(path: Path, number: int, count: int | None) -> Path:

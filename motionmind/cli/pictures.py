@@ -14,7 +14,7 @@ from motionmind.cli.files import all_or_none, check_outputs
 from motionmind.cli.options import HOME, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import is_collection, read_movement, read_movements, select_frames
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE
+from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE, Whole
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
@@ -26,7 +26,7 @@ FIRST = option(
     "--from",
     "start",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative.",
@@ -35,7 +35,7 @@ LAST = option(
     "--to",
     "end",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",
@@ -165,7 +165,7 @@ def sheet(
 @option(
     "--size",
     section=Section.DRAW,
-    type=click.IntRange(120, 2160),
+    type=Whole(120, 2160),
     metavar="PIXELS",
     help="Make a film or a posture this high  [default: 480]",
 )

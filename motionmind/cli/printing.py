@@ -62,6 +62,11 @@ def note(message: str) -> None:
     click.echo(f"{clear}note: {message}", err=True)
 
 
+def shorten_words(message: str) -> str:
+    """Leave out the middle of words that fill lines: no file has such a name, nor anything such a number."""
+    return re.sub(r"\S{300,}", lambda word: f"{word[0][:60]}...{word[0][-20:]}", message)
+
+
 def count(number: int, noun: str) -> str:
     """Format a number of things: "1 move", "2 moves"."""
     return f"{number} {noun}{'s' * (number != 1)}"

@@ -18,7 +18,7 @@ from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, opti
 from motionmind.cli.postures import read_end
 from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
-from motionmind.cli.types import COUNT, FILE
+from motionmind.cli.types import FILE, Whole
 from motionmind.cli.words import parse_frames, parse_posture
 from motionmind.errors import NoPathError
 from motionmind.render import PICTURES
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
     from motionmind.tween.result import Tween
 
+MOST_ALTERNATIVES = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 
 
@@ -44,7 +45,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 @option(
     "--alternatives",
     section=Section.SEARCH,
-    type=COUNT,
+    type=Whole(1, MOST_ALTERNATIVES),
     metavar="K",
     help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
 )

@@ -22,7 +22,7 @@ from motionmind.cli.printing import (
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
 from motionmind.cli.sources import is_collection, read_movement, select_frames, split_clip
 from motionmind.cli.tweens import INTERRUPTED
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point
+from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point, Whole
 from motionmind.cli.words import parse_parameters
 from motionmind.render import PICTURES
 
@@ -67,7 +67,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     "--from",
     "begin",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative.",
@@ -76,7 +76,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     "--to",
     "end",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",

@@ -1,0 +1,59 @@
+"""Standard output and standard error, neither of which may be in the way of the work."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
+
+
+class _Forgiving:
+    """A stream that drops what it cannot write: nobody reads a closed terminal, and a full disk ends no search."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write text, or do without."""
+        try:
+            return self._stream.write(text)
+        except (OSError, ValueError):  # ValueError: it was closed
+            self._silence()
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush, or do without."""
+        try:
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._silence()
+
+    def _silence(self) -> None:
+        """Let what is buffered go nowhere, or Python would fail with it when it ends."""
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def forgiving() -> Iterator[None]:
+    """Let writing to standard error never fail, and names that are no UTF-8 be printed with their bytes escaped."""
+    if sys.stderr is None:  # closed; a file of ours would take its number, and get what libraries print
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - it stays open
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    given = sys.stderr
+    sys.stderr = _Forgiving(given)
+    try:
+        yield
+    finally:
+        sys.stderr.flush()
+        sys.stderr = given
