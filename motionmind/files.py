@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import stat
 import time
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
+from typing import NamedTuple
 
 from motionmind.errors import FormatError, MotionMindError
 
@@ -42,7 +46,7 @@ def write_atomically(path: FilePath, data: bytes) -> None:
 
     The bytes go to a temporary file in the same folder, are flushed to disk, and are moved into place. Links are
     followed, and the permissions of a replaced file are kept. Anything but a regular file (a pipe, `/dev/stdout`) is
-    written to directly.
+    written to directly. In the context of `all_or_none` the move waits for its end.
 
     Raises:
         MotionMindError: writing failed; the temporary file is removed.
@@ -56,9 +60,70 @@ def write_atomically(path: FilePath, data: bytes) -> None:
         target = Path(os.path.realpath(path))
         if mode is not None and stat.S_ISDIR(mode):
             raise IsADirectoryError(0, "it is a folder")
-        replace_file(target, data, mode)
+        if (held_back := _held_back.get()) is None:
+            replace_file(target, data, mode)
+        else:
+            held_back.append(Written(given, target, _write_beside(target, data, mode), not given.exists()))
     except (OSError, ValueError) as error:
         raise MotionMindError(f"{os.fspath(path)}: cannot be written: {_reason(error)}") from error
+
+
+class Written(NamedTuple):
+    """A file that was written beside its place.
+
+    Attributes:
+        path: its path as it was given.
+        target: its place, links followed.
+        temporary: where it is.
+        is_new: whether there is no file in its place.
+    """
+
+    path: Path
+    target: Path
+    temporary: Path
+    is_new: bool
+
+
+_held_back: ContextVar[list[Written] | None] = ContextVar("held_back", default=None)
+
+
+@contextmanager
+def all_or_none() -> Iterator[list[Written]]:
+    """Hold back the files that are written atomically in the context, and move them into place together at its end.
+
+    If an error or Ctrl-C ends it, those that were in place stay as they were, and there are no new ones.
+
+    Yields:
+        The files so far.
+
+    Raises:
+        MotionMindError: a file cannot be moved into place.
+    """
+    held_back: list[Written] = []
+    moved: list[Written] = []
+    token = _held_back.set(held_back)
+    try:
+        yield held_back
+        for one in held_back:
+            try:
+                _move(one.temporary, one.target)
+            except OSError as error:
+                raise MotionMindError(f"{one.path}: cannot be written: {_reason(error)}") from error
+            moved.append(one)
+        for folder in {one.target.parent for one in moved}:
+            sync_folder(folder)
+    except BaseException:
+        for one in held_back:
+            with suppress(OSError):
+                (one.target if one.is_new and one in moved else one.temporary).unlink(missing_ok=True)
+        raise
+    finally:
+        _held_back.reset(token)
+
+
+def sha256_of(written: Sequence[Written], path: Path | None) -> str | None:
+    """Return the hash of the file written to `path`; None if there is none: what goes to a pipe is not held back."""
+    return next((hashlib.sha256(one.temporary.read_bytes()).hexdigest() for one in written if one.path == path), None)
 
 
 def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
@@ -71,6 +136,18 @@ def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
         data: the file's bytes.
         mode: its permissions; None for those of any new file.
     """
+    temporary = _write_beside(target, data, mode)
+    try:
+        _move(temporary, target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(target.parent)
+
+
+def _write_beside(target: Path, data: bytes, mode: int | None) -> Path:
+    """Write and flush a temporary file in the folder of `target`, and return its path; leave nothing if that fails."""
     _remove_leftovers(target.parent)
     temporary = target.with_name(f".motionmind-{os.getpid()}-{os.urandom(8).hex()}.tmp")
     try:
@@ -82,12 +159,11 @@ def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
             os.fsync(file.fileno())
         if mode is not None:
             temporary.chmod(stat.S_IMODE(mode))
-        _move(temporary, target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    sync_folder(target.parent)
+    return temporary
 
 
 def make_folder(folder: Path) -> None:

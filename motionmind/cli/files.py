@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -120,15 +119,3 @@ def _resolve(path: Path) -> Path:
         reason = (error.strerror if isinstance(error, OSError) else None) or "it leads nowhere"
         raise MotionMindError(f"{path}: cannot be used: {reason[0].lower()}{reason[1:]}") from error
     return found
-
-
-@contextmanager
-def all_or_none(files: Sequence[Path]) -> Iterator[None]:
-    """Remove the new ones among files that are written one after another if one cannot be written."""
-    new = [file for file in files if not file.exists()]
-    try:
-        yield
-    except MotionMindError:
-        for file in new:
-            file.unlink(missing_ok=True)
-        raise

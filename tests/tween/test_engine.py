@@ -254,6 +254,7 @@ REPORT = [
     "degrees",
     "likelihood",
     "costs",
+    "motion_sha256",
 ]
 
 
