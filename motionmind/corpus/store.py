@@ -159,7 +159,7 @@ def _place_of(folder: Path, manifest: Mapping[str, Any]) -> Path:
 
 
 class Stored(NamedTuple):
-    """What a corpus's folder holds.
+    """The content of a corpus's folder.
 
     Attributes:
         manifest: its manifest.
