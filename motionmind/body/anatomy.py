@@ -13,15 +13,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats, Indices, Ints
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
 SIDES = ("left", "right")
+_Z = np.array([0.0, 0.0, 1.0])
 
 
 class Angle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -144,13 +146,11 @@ class Anatomy:
                 as their left partners'; joints that are not given are at 0.
         """
         count = len(next(iter(degrees.values())))
-        out = np.tile(rot.IDENTITY, (count, len(self.skeleton), 1))
-        for index, name in enumerate(self.skeleton.names):
-            joint, anatomy = self.anatomy(name)
-            vector = degrees.get(name)
-            turned = to_rotation(anatomy, np.zeros((count, 3)) if vector is None else vector)
-            out[:, index] = rot.mirror(turned) if name.startswith("right_") and self.paired(joint) else turned
-        for index, frame in self._measured_elsewhere():
+        vectors = np.zeros((count, len(self.skeleton), 3))
+        for name, given in degrees.items():
+            vectors[:, self.skeleton.index(name)] = given
+        out = to_rotations(self._conventions, vectors)
+        for index, frame in self._measured_elsewhere:
             out[:, index] = rot.inv_mul(self._between(out, frame, index), out[:, index])
         return out
 
@@ -163,17 +163,24 @@ class Anatomy:
             rotations: local rotations [..., J, 4].
             joints: those whose angles are wanted; the others' are 0. None for all.
         """
-        wanted, elsewhere = range(len(self.skeleton)) if joints is None else joints, dict(self._measured_elsewhere())
+        wanted = np.arange(len(self.skeleton)) if joints is None else np.array(joints, dtype=np.intp)
+        turned = rotations[..., wanted, :]
+        for index, frame in self._measured_elsewhere:
+            for place in np.flatnonzero(wanted == index):
+                turned[..., place, :] = rot.mul(self._between(rotations, frame, index), turned[..., place, :])
         out = np.zeros((*rotations.shape[:-1], 3))
-        for index in wanted:
-            name, q = self.skeleton.names[index], rotations[..., index, :]
-            if index in elsewhere:
-                q = rot.mul(self._between(rotations, elsewhere[index], index), q)
-            joint, anatomy = self.anatomy(name)
-            out[..., index, :] = to_degrees(
-                anatomy, rot.mirror(q) if name.startswith("right_") and self.paired(joint) else q
-            )
+        out[..., wanted, :] = to_degrees(self._conventions.of(wanted), turned)
         return out
+
+    @cached_property
+    def limits(self) -> tuple[Floats, Floats]:
+        """The least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite without a limit."""
+        least = np.full((len(self.skeleton), 3), -np.inf)
+        most = -least
+        for index, name in enumerate(self.skeleton.names):
+            for angle in self.anatomy(name)[1].angles.values():
+                least[index, angle.axis], most[index, angle.axis] = sorted(angle.sign * end for end in angle.range)
+        return least, most
 
     @property
     def has_masses(self) -> bool:
@@ -192,10 +199,8 @@ class Anatomy:
         masses, centres = self._segments
         if skeleton is not None:
             centres = centres * (skeleton.height / self.skeleton.height)
-        places = body.positions(rotations, root)
-        return np.asarray(
-            np.einsum("j,...jk->...k", masses, places + rot.mul_vec(body.global_rotations(rotations), centres))
-        )
+        segments = body.positions_with(rotations, root, range(len(body)), centres)[..., len(body) :, :]
+        return np.asarray(np.einsum("j,...jk->...k", masses, segments))
 
     @cached_property
     def _segments(self) -> tuple[Floats, Floats]:
@@ -209,11 +214,23 @@ class Anatomy:
                 centres[index, 0] *= -1.0
         return masses / max(masses.sum(), 1e-12), centres
 
+    @cached_property
     def _measured_elsewhere(self) -> list[tuple[int, int]]:
-        """Return (joint, frame) for the joints whose angles are measured in another frame than their parent's."""
+        """(joint, frame) for the joints whose angles are measured in another frame than their parent's."""
         names = self.skeleton.names
         against = [(index, self.anatomy(name)[1].against) for index, name in enumerate(names)]
         return [(index, names.index(frame)) for index, frame in against if frame]
+
+    @cached_property
+    def _conventions(self) -> Conventions:
+        joints = [self.anatomy(name) for name in self.skeleton.names]
+        right = [name.startswith("right_") for name in self.skeleton.names]
+        return Conventions(
+            np.array(["xyz".index(joint.long) for _, joint in joints]),
+            np.array([joint.outer for _, joint in joints]),
+            np.array([joint.rest for _, joint in joints]),
+            np.array([side and self.paired(name) for side, (name, _) in zip(right, joints, strict=True)]),
+        )
 
     def _between(self, rotations: Floats, frame: int, joint: int) -> Floats:
         """Return the orientation [..., 4] of the parent of `joint` in `frame`, one of its ancestors."""
@@ -225,23 +242,47 @@ class Anatomy:
         return out
 
 
-def to_rotation(joint: Joint, degrees: Floats) -> Floats:
-    """Return the left joint's rotation [..., 4] in its frame of reference, from degrees [..., 3] about x, y and z."""
-    vector, axis = np.radians(degrees), "xyz".index(joint.long)
-    swing = vector.copy()
-    swing[..., axis] = 0.0
-    twist = rot.from_axis_angle(np.eye(3)[axis], vector[..., axis])
-    turned = rot.mul(twist, rot.exp(swing)) if joint.outer else rot.mul(rot.exp(swing), twist)
-    return rot.mul(turned, rot.from_axis_angle([0.0, 0.0, 1.0], np.radians(joint.rest))) if joint.rest else turned
+class Conventions(NamedTuple):
+    """The conventions by which joints have angles (see `Joint`).
+
+    Attributes:
+        long: axis of each joint's twist, 0, 1 or 2 [J].
+        outer: whether the twist is applied after the swing [J].
+        rest: degrees about z from the rest pose to that of angles 0 [J].
+        mirrored: whether the joint is a right one, and has the angles of its mirror image [J].
+    """
+
+    long: Ints
+    outer: Bools
+    rest: Floats
+    mirrored: Bools
+
+    def of(self, joints: Indices) -> Conventions:
+        """Return those of some joints."""
+        return Conventions(self.long[joints], self.outer[joints], self.rest[joints], self.mirrored[joints])
 
 
-def to_degrees(joint: Joint, turned: Floats) -> Floats:
-    """Return degrees [..., 3] about x, y and z of the left joint's rotation [..., 4]: the inverse of `to_rotation`."""
-    axis = "xyz".index(joint.long)
-    if joint.rest:
-        turned = rot.mul(turned, rot.from_axis_angle([0.0, 0.0, 1.0], -np.radians(joint.rest)))
-    angle = np.angle(np.exp(2j * np.arctan2(turned[..., axis], turned[..., 3])))
-    twist = rot.from_axis_angle(np.eye(3)[axis], angle)
-    vector = rot.log(rot.inv_mul(twist, turned) if joint.outer else rot.mul_inv(turned, twist))
-    vector[..., axis] = angle
+def to_rotations(conventions: Conventions, degrees: Floats) -> Floats:
+    """Return joints' rotations [..., J, 4] in their frames of reference, from degrees [..., J, 3] about x, y and z."""
+    long, outer, rest, mirrored = conventions
+    vector, every = np.radians(degrees), np.arange(len(long))
+    twist = rot.from_axis_angle(np.eye(3)[long], vector[..., every, long])
+    vector[..., every, long] = 0.0
+    swing = rot.exp(vector)
+    turned = np.where(outer[:, None], rot.mul(twist, swing), rot.mul(swing, twist))
+    rests = rest != 0.0
+    turned[..., rests, :] = rot.mul(turned[..., rests, :], rot.from_axis_angle(_Z, np.radians(rest[rests])))
+    return np.where(mirrored[:, None], rot.mirror(turned), turned)
+
+
+def to_degrees(conventions: Conventions, turned: Floats) -> Floats:
+    """Return degrees [..., J, 3] about x, y and z of joints' rotations [..., J, 4]: the inverse of `to_rotations`."""
+    long, outer, rest, mirrored = conventions
+    turned, every = np.where(mirrored[:, None], rot.mirror(turned), turned), np.arange(len(long))
+    rests = rest != 0.0
+    turned[..., rests, :] = rot.mul(turned[..., rests, :], rot.from_axis_angle(_Z, -np.radians(rest[rests])))
+    angle = np.angle(np.exp(2j * np.arctan2(turned[..., every, long], turned[..., 3])))
+    twist = rot.from_axis_angle(np.eye(3)[long], angle)
+    vector = rot.log(np.where(outer[:, None], rot.inv_mul(twist, turned), rot.mul_inv(turned, twist)))
+    vector[..., every, long] = angle
     return np.degrees(vector)

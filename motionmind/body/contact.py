@@ -19,7 +19,6 @@ from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
 
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
@@ -100,17 +99,14 @@ def contact_points(
 def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
     """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
     [P] that each point belongs to."""
-    places = skeleton.positions_and_tips(rotations, root)
-    joints = np.tile(np.arange(len(skeleton)), 2)
-    if anatomy is None or anatomy.leg is None:
-        return places, joints
-    heel = np.array(anatomy.leg.heel)
-    if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
-        heel = heel * skeleton.height / anatomy.skeleton.height
-    ankles = np.array([anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
-    turned = skeleton.global_rotations(rotations)[..., ankles, :]
-    heels = places[..., ankles, :] + rot.mul_vec(turned, np.stack([heel, heel * np.array([-1.0, 1.0, 1.0])]))
-    return np.concatenate([places, heels], axis=-2), np.concatenate([joints, ankles])
+    joints, points = np.tile(np.arange(len(skeleton)), 2), skeleton.tips
+    if anatomy is not None and anatomy.leg is not None:
+        heel = np.array(anatomy.leg.heel)
+        if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
+            heel = heel * skeleton.height / anatomy.skeleton.height
+        joints = np.append(joints, [anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
+        points = np.concatenate([points, [heel, heel * np.array([-1.0, 1.0, 1.0])]])
+    return skeleton.positions_with(rotations, root, joints[len(skeleton) :], points), joints
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------
@@ -144,7 +140,7 @@ def find_feet(skeleton: Skeleton) -> list[int]:
 
     A foot is a leaf of the tree whose end is, at rest, within a tenth of the body's height of the lowest point.
     """
-    at_rest = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))[:, 1]
+    at_rest = skeleton.rest[:, 1]
     ends = np.minimum(at_rest[: len(skeleton)], at_rest[len(skeleton) :])
     low = ends.min() + _NEAR * np.ptp(at_rest)
     return [joint for joint in range(len(skeleton)) if not skeleton.children(joint) and ends[joint] <= low]

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.anatomy import Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.skeleton import Skeleton
 
@@ -34,7 +33,7 @@ def within_limits(
     if anatomy is None:
         return rotations
     degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given]), joints), [len(rotations)])
-    least, most = _limits(anatomy)
+    least, most = anatomy.limits
     clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
     beyond = np.any(clipped != degrees, axis=-1) & ~loose
     if joints is not None:
@@ -57,17 +56,6 @@ def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
     if anatomy is None:
         return np.zeros(len(skeleton), dtype=np.bool_)
     degrees = anatomy.degrees(rotations)
-    least, most = _limits(anatomy)
+    least, most = anatomy.limits
     beyond = np.any((degrees < least - BEYOND) | (degrees > most + BEYOND), axis=-1)
     return np.asarray(beyond.mean(axis=0) > RARE)
-
-
-def _limits(anatomy: Anatomy) -> tuple[Floats, Floats]:
-    """Return the least and greatest angles of all joints [J, 3] about x, y and z, degrees; infinite without a limit."""
-    least = np.full((len(anatomy.skeleton), 3), -np.inf)
-    most = -least
-    for index, name in enumerate(anatomy.skeleton.names):
-        for angle in anatomy.anatomy(name)[1].angles.values():
-            ends = sorted(angle.sign * end for end in angle.range)
-            least[index, angle.axis], most[index, angle.axis] = ends
-    return least, most

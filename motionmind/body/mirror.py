@@ -90,7 +90,7 @@ def find_sides(skeleton: Skeleton) -> Sides:
     partners = _pair(skeleton)
     paired = partners != np.arange(len(skeleton))
     offsets = skeleton.offsets
-    at_rest = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+    at_rest = skeleton.rest[: len(skeleton)]
     reach = float(np.linalg.norm(at_rest, axis=-1).max())
     # Distance of each joint from its partner's image, for each axis [3, J].
     off = np.stack([np.linalg.norm(offsets * _reflection(axis) - offsets[partners], axis=-1) for axis in range(3)])

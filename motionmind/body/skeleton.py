@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -90,7 +91,14 @@ class Skeleton:
 
     def children(self, joint: int) -> list[int]:
         """Return the indices of the joints whose parent is `joint`."""
-        return [child for child, parent in enumerate(self.parents) if parent == joint]
+        return [*self._children[joint]]
+
+    @cached_property
+    def _children(self) -> list[list[int]]:
+        out: list[list[int]] = [[] for _ in self.parents]
+        for child, parent in enumerate(self.parents[1:], start=1):
+            out[parent].append(child)
+        return out
 
     def difference(self, other: Skeleton) -> str | None:
         """Describe how the tree of `other` differs from this one, in words; None if names and parents are the same.
@@ -115,17 +123,26 @@ class Skeleton:
         return dict(zip(self.names, above, strict=True))
 
     @cached_property
+    def rest(self) -> Floats:
+        """Positions of all joints, then of all tips, at rest [2 J, 3], metres: identity rotations, the root at 0."""
+        places = np.zeros((len(self), 3))
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            places[joint] = places[parent] + self.offsets[joint]
+        out = np.concatenate([places, places + self.tips])
+        out.setflags(write=False)
+        return out
+
+    @cached_property
     def height(self) -> float:
         """Vertical extent in metres of the body at rest (identity rotations), tips included."""
-        positions = self.positions(np.tile(rot.IDENTITY, (len(self), 1)), np.zeros(3))
-        heights = np.concatenate([positions[:, 1], (positions + self.tips)[:, 1]])
-        return float(np.ptp(heights))
+        return float(np.ptp(self.rest[:, 1]))
 
     def global_rotations(self, rotations: Floats) -> Floats:
         """Return the orientation of each joint's frame in the world [..., J, 4], from local rotations [..., J, 4]."""
-        out = np.array(rotations, dtype=np.float64)
-        for joints, parents in self._generations:
-            out[..., joints, :] = rot.mul(out[..., parents, :], out[..., joints, :])
+        from motionmind.body.kinematics import turn_with_parents  # numba is slow to import
+
+        out = np.array(rotations, dtype=np.float64, order="C")
+        turn_with_parents(out.reshape(-1, len(self), 4), np.array(self.parents))
         return out
 
     def local_rotations(self, turned: Floats) -> Floats:
@@ -141,32 +158,34 @@ class Skeleton:
             rotations: local rotations [..., J, 4].
             root: positions of the root [..., 3], metres.
         """
-        return self._positions(self.global_rotations(rotations), root)
+        return self.positions_with(rotations, root, [], np.zeros((0, 3)))
 
     def positions_and_tips(self, rotations: Floats, root: Floats) -> Floats:
         """Return the positions [..., 2 J, 3], metres, of all joints, then of all tips.
 
         A joint without a tip has its own position for one; arguments as for `positions`.
         """
-        turned = self.global_rotations(rotations)
-        positions = self._positions(turned, root)
-        return np.concatenate([positions, positions + rot.mul_vec(turned, self.tips)], axis=-2)
+        return self.positions_with(rotations, root, range(len(self)), self.tips)
 
-    def _positions(self, turned: Floats, root: Floats) -> Floats:
-        out = np.empty((*turned.shape[:-1], 3))
+    def positions_with(
+        self, rotations: Floats, root: Floats, joints: Sequence[int] | Indices, points: Floats
+    ) -> Floats:
+        """Return the positions [..., J + P, 3], metres, of all joints, then of points of their segments.
+
+        Args:
+            rotations: local rotations [..., J, 4].
+            root: positions of the root [..., 3], metres.
+            joints: those in whose frames the points are [P].
+            points: their places in these frames [P, 3], metres.
+        """
+        from motionmind.body.kinematics import place_points  # numba is slow to import
+
+        turned, count = self.global_rotations(rotations), len(self) + len(joints)
+        out = np.empty((*turned.shape[:-2], count, 3))
         out[..., 0, :] = root
-        for joints, parents in self._generations:
-            out[..., joints, :] = out[..., parents, :] + rot.mul_vec(turned[..., parents, :], self.offsets[joints])
+        frames, offsets = np.array([*self.parents, *joints]), np.concatenate([self.offsets, points])
+        place_points(out.reshape(-1, count, 3), turned.reshape(-1, len(self), 4), frames, offsets)
         return out
-
-    @cached_property
-    def _generations(self) -> list[tuple[Indices, Indices]]:
-        """Joints by their depth in the tree, and their parents: the root's children first."""
-        depth = [0] * len(self)
-        for joint, parent in enumerate(self.parents):
-            depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-        steps = [np.flatnonzero(np.array(depth) == far) for far in range(1, max(depth) + 1)]
-        return [(joints, np.array(self.parents, dtype=np.intp)[joints]) for joints in steps]
 
 
 def _some(names: list[str]) -> str:

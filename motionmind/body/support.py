@@ -21,7 +21,6 @@ from motionmind.body.contact import contact_points, limb_heights
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -148,8 +147,7 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 
 
 def _extent(skeleton: Skeleton) -> float:
-    at_rest = np.tile(rot.IDENTITY, (len(skeleton), 1))
-    return float(np.ptp(skeleton.positions_and_tips(at_rest, np.zeros(3)), axis=0).max())
+    return float(np.ptp(skeleton.rest, axis=0).max())
 
 
 def _speeds(places: Floats, fps: float) -> Floats:

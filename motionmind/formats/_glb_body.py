@@ -15,7 +15,6 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.mirror import MIDDLE, sides_of
 from motionmind.body.palette import FRONT_COLOUR, SIDE_COLOURS, Colour
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
 
 FRONT = "front"
 
@@ -93,7 +92,7 @@ def bones_of(skeleton: Skeleton, root: Floats) -> Bones:
     If none has one, return a single bone pointing up.
     """
     count, parents = len(skeleton), skeleton.parents
-    both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (count, 1)), root)
+    both = skeleton.rest + root
     rest, tips = both[:count], both[count:]
     span = float(np.ptp(both, axis=0).max()) or 1.0
     sides = sides_of(skeleton)

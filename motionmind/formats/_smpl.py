@@ -98,7 +98,7 @@ def smpl_bodies() -> dict[str, Skeleton]:
 def _body(name: str, rows: _Rows) -> Skeleton:
     """Build a skeleton of the tree `rows`, with each joint at its place in human44."""
     model = human44()
-    places = model.positions(np.tile(rot.IDENTITY, (len(model), 1)), np.zeros(3))
+    places = model.rest[: len(model)]
     joints, parents = [joint for joint, _ in rows], [parent for _, parent in rows]
     stands = [model.index(_PLACE_OF.get(joint, "atlantal" if parent == "head" else joint)) for joint, parent in rows]
     rest = places[stands] + [_DISPLACEMENTS.get(joint, (0.0, 0.0, 0.0)) for joint in joints]

@@ -155,9 +155,8 @@ def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
 
 def _at_rest(skeleton: Skeleton) -> Floats:
     """Return the joints' places at rest [J, 3], metres: the root above the origin, the body's lowest point at 0."""
-    both = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
-    both[:, 1] -= both[:, 1].min()
-    return both[: len(skeleton)]
+    lowest = skeleton.rest[:, 1].min()
+    return np.asarray(skeleton.rest[: len(skeleton)] - np.array([0.0, lowest, 0.0]))
 
 
 def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:

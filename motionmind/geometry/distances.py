@@ -14,6 +14,12 @@ def squared_distance(a: Floats, b: Floats) -> float:
     """
     total = 0.0
     for j in range(len(a)):
-        cosine = a[j, 0] * b[j, 0] + a[j, 1] * b[j, 1] + a[j, 2] * b[j, 2] + a[j, 3] * b[j, 3]
-        total += 4.0 * max(1.0 - cosine * cosine, 0.0)
+        total += squared_turn(a[j], b[j])
     return total
+
+
+@jit
+def squared_turn(a: Floats, b: Floats) -> float:
+    """Return 4 sin^2(angle / 2) between two rotations [4]: for a small angle its square, radians squared."""
+    cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    return float(4.0 * max(1.0 - cosine * cosine, 0.0))

@@ -58,16 +58,24 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     """
     if len(times) == 1:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
+    if np.isin(at, times).all():
+        return keys[np.searchsorted(times, at)]
     if len(times) > _LONG:
         return _by_pieces(rotation_spline, times, keys, at)
+    from motionmind.geometry.charts import vectors_around  # numba is slow to import
+
     piece = _pieces(times, at)
     centres = np.union1d(piece, piece + 1)
-    vectors = _unroll(rot.log(rot.inv_mul(keys[centres][None], keys[:, None])), centres)
-    bends = _bends(times, vectors)
+    vectors = vectors_around(np.array(keys, dtype=np.float64).reshape(len(keys), -1, 4), centres)
+    # In each chart only the centre and its neighbours count: values and bends [C, 3, ..., 3].
+    charts, near = np.arange(len(centres))[:, None], np.clip(centres[:, None] + [-1, 0, 1], 0, len(keys) - 1)
+    shape = (len(centres), 3, *keys.shape[1:-1], 3)
+    values = vectors[charts, near].reshape(shape)
+    bends = (_bends(times, np.eye(len(keys)))[near] @ vectors.reshape(len(centres), len(keys), -1)).reshape(shape)
 
     def around(key: Ints) -> Floats:
-        chart = np.searchsorted(centres, key)
-        ends = vectors[piece, chart], vectors[piece + 1, chart], bends[piece, chart], bends[piece + 1, chart]
+        chart, left = np.searchsorted(centres, key), piece - key + 1
+        ends = values[chart, left], values[chart, left + 1], bends[chart, left], bends[chart, left + 1]
         return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, *ends)))
 
     s = ((at - times[piece]) / np.diff(times)[piece]).reshape(-1, *(1,) * (keys.ndim - 2))
@@ -82,29 +90,6 @@ def _by_pieces(spline: Callable[[Floats, Floats, Floats], Floats], times: Floats
         near = slice(max(number * _PIECE - _MARGIN, 0), (number + 1) * _PIECE + _MARGIN + 1)
         here = piece == number
         out[here] = spline(times[near], knots[near], at[here])
-    return out
-
-
-def _unroll(vectors: Floats, centres: Ints) -> Floats:
-    """Add whole turns to rotation vectors [K, C, ..., 3], radians, to each key from the keys that are `centres` [C].
-
-    Each is then nearest to the vector of the neighbouring key towards the centre.
-    """
-    if np.linalg.norm(np.diff(vectors, axis=0), axis=-1).max(initial=0.0) < np.pi:
-        return vectors  # all neighbours are that near already
-    out = vectors.copy()
-    for distance in range(2, len(out)):
-        for side in (1, -1):
-            key, centre = centres + side * distance, np.arange(len(centres))
-            inside = (key >= 0) & (key < len(out))
-            key, centre = key[inside], centre[inside]
-            toward, own = out[key - side, centre], out[key, centre]
-            angle = np.linalg.norm(own, axis=-1, keepdims=True)
-            # A zero vector may be a whole turn about any axis: take its neighbour's, if that is not zero too.
-            along = np.where(angle > 1e-9, own, toward)
-            axis = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
-            turns = np.round((np.sum(axis * toward, axis=-1, keepdims=True) - angle) / (2.0 * np.pi))
-            out[key, centre] += 2.0 * np.pi * turns * axis
     return out
 
 

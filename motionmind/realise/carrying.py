@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
@@ -21,7 +21,7 @@ from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_stayin
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, fade_at_ends, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
-from motionmind.realise.knees import smoothed
+from motionmind.realise.knees import cover, smoothed
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT
 
@@ -34,6 +34,8 @@ PLACE = 0.08  # metres that a standing leg leans more than the movement has it
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
+HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
+NEARLY = 0.9  # of that speed: from here on it is held to it
 ROUNDS = 2, 3  # of placing feet, and of the root in each
 
 
@@ -81,6 +83,7 @@ def carry(
     feet: list[Foot],
     known: Ends,
     overhang: float,
+    travels: float,
     gravity: float,
     fps: float,
     without: Collection[Correction],
@@ -97,6 +100,7 @@ def carry(
         feet: those that may be placed.
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
+        travels: how fast the body travels at most, metres a second; infinite for any speed.
         gravity: metres a second squared.
         fps: frames a second.
         without: corrections to leave out.
@@ -131,7 +135,7 @@ def carry(
         steady += _standing_rows(shape, bearing, floor, leg_freedom(flights, count, fps))
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
-            rows = [*steady, _sunk_rows(shape, floor, start)]
+            rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
             rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
             if "balance" not in without and mass.any():
                 points = shape.places[..., [0, 2]] + start[:, None, [0, 2]]
@@ -149,31 +153,55 @@ def carry(
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
         posed = bend_legs(skeleton, own, feet, off, softness(holds))
     bound = 1.0 - leg_freedom(flights, count, fps)
-    # Knees do not make up for the detail of all other joints: the root moves with it, and feet keep their height.
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
-    heights = shape.low + start[:, 1:2] + off[..., 1]
-    moved = [smoothed(axis, DETAIL, fps) for axis in _carried_detail(shape, detailed, bearing.loads).T]
-    start = start + np.stack(moved, axis=1) * fade_at_ends(count, (True, True), fps)[:, None]
-    reached = detailed.low + start[:, 1:2] + off[..., 1]
-    off[..., 1] += bearing.loads * (heights - reached)
-    return Carried(start, off, holds, reached + bearing.loads * (heights - reached), bound)
+    falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
+    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
+    return Carried(start, off, holds, heights, bound)
 
 
-def _carried_detail(plain: Shape, detailed: Shape, loads: Floats) -> Floats:
-    """Return how the root moves with fine detail [N, 3], metres, so that feet which bear hardly move.
+def _with_detail(
+    plain: Shape,
+    detailed: Shape,
+    loads: Floats,
+    falls: Floats,
+    flying: Bools,
+    root: Floats,
+    off: Floats,
+    floor: Floats,
+    fps: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
-    If legs reached for their places from a smooth root, their knees would move for the detail of all other joints.
+    If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
+    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height; one
+    that would swing into the floor is lifted, and not the body with it.
 
     Args:
         plain: the body without detail.
         detailed: the body with it.
         loads: how much each foot bears [N, feet], from 0 to 1.
+        falls: how far detail takes the root from the centre of mass [N, 3], metres.
+        flying: where nothing bears the body [N].
+        root: positions of the root without detail [N, 3], metres.
+        off: displacements of feet without detail [N, feet, 3], metres.
+        floor: height of the floor [N], metres.
+        fps: frames a second.
     """
+    fades = fade_at_ends(len(loads), (True, True), fps)
     share = loads / np.maximum(loads.sum(axis=1, keepdims=True), 1.0)
-    out = np.zeros((len(loads), 3))
-    out[:, [0, 2]] = np.einsum("nf,nfk->nk", share, plain.tracks - detailed.tracks)
-    out[:, 1] = np.sum(share * (plain.low - detailed.low), axis=1)
-    return out
+    moves = np.zeros(root.shape)
+    moves[:, [0, 2]] = np.einsum("nf,nfk->nk", share, plain.tracks - detailed.tracks)
+    moves[:, 1] = np.sum(share * (plain.low - detailed.low), axis=1)
+    moves = np.stack([smoothed(axis, DETAIL, fps) for axis in moves.T], axis=1)
+    flies = cover(flying.astype(np.float64), fps)[:, None]
+    moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
+    heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
+    kept = reached + loads * (heights - reached)
+    sunk = np.maximum(floor[:, None] - kept, 0.0)
+    kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None] if kept.size else 0.0
+    off = off.copy()
+    off[..., 1] += kept - reached
+    return moved, off, kept
 
 
 def foot_heights(skeleton: Skeleton, rotations: Floats, root: Floats, feet: list[Foot]) -> Floats:
@@ -200,6 +228,20 @@ def _prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
         rows.append(_axis_rows(axis, prior[:, axis], np.full(count, PRIOR**-2.0)))
         rows.append(difference_rows(axis, (-fps, fps, 0.0), fps * np.diff(prior[:-1, axis]), travel))
     return rows
+
+
+def _hurry_rows(root: Floats, travels: float, fps: float) -> Rows:
+    """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second."""
+    moved = fps * np.diff(root, axis=0) * np.array([1.0, 0.0, 1.0])
+    speed = np.linalg.norm(moved, axis=1)
+    along = moved / np.maximum(speed, 1e-9)[:, None]
+    # Rows look at three frames: each at its first two, and the last one at its last two.
+    first = np.minimum(np.arange(len(along)), len(root) - 3)
+    coefficients = np.zeros((len(along), 9))
+    coefficients[:, :6] = fps * np.concatenate([-along, along], axis=1)
+    coefficients[-1] = np.roll(coefficients[-1], 3)
+    weights = np.where(speed > NEARLY * travels, HURRY**-2.0, 0.0)
+    return Rows(first, coefficients, np.full(len(along), min(travels, 1e3)), weights)
 
 
 def _smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:

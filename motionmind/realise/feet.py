@@ -10,7 +10,8 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.knees import bend_of, distance_of, slow_down, smoothed
+from motionmind.realise.knees import bend_of, cover, distance_of, keep_detail, slow_down, smoothed
+from motionmind.realise.least_squares import bending_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
@@ -220,13 +221,9 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
 
     count = len(wanted)
     firm, bend, still = 1e6 * stands**2, (BENDS * fps) ** 4, slides * (SLIDES * fps) ** 2
-    diagonals = np.zeros((3, count))
-    diagonals[0] = firm + 1.0 - stands
-    for k, share in enumerate((1.0, 4.0, 1.0)):
-        diagonals[0, k : count - 2 + k] += bend * share
+    diagonals = bending_diagonals(np.full(count - 2, bend))
+    diagonals[0] += firm + 1.0 - stands
     diagonals[0, [1, -2]] += bend
-    diagonals[1, : count - 1] = bend * np.concatenate([[-2.0], np.full(count - 3, -4.0), [-2.0]])
-    diagonals[2, : count - 2] = bend
     right = firm[:, None] * wanted
     for k, sign in ((0, 1.0), (1, -1.0)):
         diagonals[0, k : count - 1 + k] += still
@@ -270,14 +267,16 @@ def ease_knees(
     off: Floats,
     holds: Floats,
     bound: Floats,
+    room: Floats,
+    fine: bool,
     moving: tuple[bool, bool],
     fastest: Floats,
     fps: float,
 ) -> tuple[Floats, Floats]:
-    """Return displacements of feet whose knees bend no faster than they can, and of the root [N, 3], metres.
+    """Return displacements of feet whose knees bend as knees do, and of the root [N, 3], metres.
 
-    Feet that swing come nearer to the hip or go farther from it; where they stand, the body does. Where no knee is too
-    fast the displacements are the given ones.
+    They bend no faster than they can, and keep the movement's fine detail. Feet that swing come nearer to the hip or
+    go farther from it; where they stand, the body does.
 
     Args:
         skeleton: the body.
@@ -286,6 +285,8 @@ def ease_knees(
         off: how far each is from where the rotations have it [N, feet, 3], metres.
         holds: how much each holds its place [N, feet], from 0 to 1.
         bound: how much the body's height may give way [N], from 0 to 1.
+        room: how much lower than there each foot may be [N, feet], metres.
+        fine: whether the movement has fine detail.
         moving: whether the velocity is given in the first and in the last frame.
         fastest: speeds of the joints [J], rad/s, that knees keep to if they do so in the movement itself.
         fps: frames a second.
@@ -293,26 +294,24 @@ def ease_knees(
     fixed = np.zeros(len(off), dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= moving
-    aims, lengths, most, slow = np.zeros(off.shape), np.zeros(off.shape[:2]), np.zeros(len(feet)), True
+    legs, aims, own = np.empty(off.shape), np.empty(off.shape), np.empty(off.shape[:2])
+    lengths, most = np.empty(off.shape[:2]), np.empty(len(feet))
     for number, foot in enumerate(feet):
         hip, knee, end = foot.chain(skeleton)
         bones = foot.bones(skeleton)
-        leg = posed.places[:, end] - posed.places[:, hip]
-        now, aim = np.linalg.norm(leg, axis=-1), leg + off[:, number]
+        legs[:, number] = posed.places[:, end] - posed.places[:, hip]
+        now, aim = np.linalg.norm(legs[:, number], axis=-1), legs[:, number] + off[:, number]
         wanted = np.linalg.norm(aim, axis=-1)
         far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
         far[fixed] = now[fixed]
-        own, bends = bend_of(now, *bones), bend_of(far, *bones)
-        most[number] = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own)).max()))
-        eased = slow_down(bends, holds[:, number] == 1.0, fixed, most[number], fps)
-        slow &= eased is bends
+        own[:, number] = bend_of(now, *bones)
+        most[number] = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own[:, number])).max()))
+        eased = slow_down(bend_of(far, *bones), holds[:, number] == 1.0, fixed, most[number], fps)
         aims[:, number] = aim * (far / np.maximum(wanted, 1e-9))[:, None]
         lengths[:, number] = distance_of(eased, *bones)
-    if slow:
-        return off, np.zeros((len(off), 3))
     bears = holds**4
     share = bears / np.maximum(bears.sum(axis=1, keepdims=True), 1.0)
-    shift, out = np.zeros((len(off), 3)), np.empty(off.shape)
+    shift = np.zeros((len(off), 3))
     gives = np.sum(share * (aims - _lengthened(aims, lengths))[..., 1], axis=1)
     shift[:, 1] = smoothed(gives, GIVES, fps) * bound
     aims -= shift[:, None]
@@ -320,11 +319,14 @@ def ease_knees(
     for number, foot in enumerate(feet):
         bones = foot.bones(skeleton)
         bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
-        lengths[:, number] = distance_of(slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps), *bones)
-    aims = _lengthened(aims, lengths)
-    for number, foot in enumerate(feet):
-        hip, _, end = foot.chain(skeleton)
-        out[:, number] = aims[:, number] - posed.places[:, end] + posed.places[:, hip]
+        bends = slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps)
+        if fine:
+            bends = keep_detail(bends, own[:, number], fixed, *bones, fps)
+        lengths[:, number] = distance_of(bends, *bones)
+    out = _lengthened(aims, lengths) - legs
+    sunk = np.maximum(off[..., 1] - room - out[..., 1] - shift[:, 1:2], 0.0)
+    for number in range(len(feet)):
+        out[:, number, 1] += cover(sunk[:, number], fps) * fade_at_ends(len(out), moving, fps)
     return out, shift
 
 

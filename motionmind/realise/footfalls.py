@@ -16,7 +16,7 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 
 LIFTED = 0.02, 0.08  # metres above the lowest limb: from here on a foot hardly stands, from there on not at all
-HIGH = 8.0  # a second: cost of standing with a foot that the movement lifts
+HIGH = 8.0  # a second: cost of standing with a foot that the movement lifts so high, and in proportion if higher
 MOVING = 3.0  # a second: cost of standing with a foot that the corpus moves there
 FIRM = 1.0  # a second: cost of swinging a foot that stands firmly
 STRAYS = 0.08  # metres off its track at which a standing foot costs 1 a second
@@ -56,7 +56,7 @@ def standing_costs(above: Floats, firm: Floats) -> tuple[Floats, Floats]:
         firm: how firmly the corpus's feet stand there [N], from 0 to 1.
     """
     low, high = LIFTED
-    stand = HIGH * np.clip((above - low) / (high - low), 0.0, 1.0) + MOVING * (1.0 - firm) ** 2
+    stand = HIGH * np.maximum((above - low) / (high - low), 0.0) + MOVING * (1.0 - firm) ** 2
     swing = FIRM * firm * np.clip(1.0 - above / high, 0.0, 1.0)
     return stand, swing
 

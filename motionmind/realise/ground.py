@@ -34,13 +34,12 @@ from motionmind.realise.feet import (
     pose,
     softness,
 )
+from motionmind.realise.flight import SURELY
+from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
-NEAR = 0.001  # metres off its height that a foot is let be
-
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
-LIFTS = 0.3  # seconds before and after a part would be lower, in which the body is lifted
 
 
 class Stance(NamedTuple):
@@ -84,6 +83,7 @@ def set_on_floor(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats | None = None,
+    travels: float = np.inf,
     without: Collection[Correction] = (),
 ) -> tuple[Floats, Floats]:
     """Return a movement that its feet carry: local rotations [N, J, 4] and positions of the root [N, 3], metres.
@@ -103,6 +103,7 @@ def set_on_floor(
         ends: the first and the last position of the root [3], metres.
         rates: its first and its last velocity [3], metres a second; None where unknown.
         fastest: speeds of the joints in the corpus [J], rad/s; None where there is no telling.
+        travels: how fast the body travels at most, metres a second.
         without: corrections to leave out.
     """
     size = size_of(skeleton)
@@ -115,7 +116,20 @@ def set_on_floor(
         fastest = np.full(len(skeleton), KNEE)
     stance = stance.scaled(1.0 / size)
     placed = _set_down(
-        small, rotations, plain, times, stance, loose, fixed, lows, near, slow, fastest, gravity, without
+        small,
+        rotations,
+        plain,
+        times,
+        stance,
+        loose,
+        fixed,
+        lows,
+        near,
+        slow,
+        fastest,
+        travels / size,
+        gravity,
+        without,
     )
     root = size * placed[1]
     root[0], root[-1] = ends
@@ -134,12 +148,14 @@ def _set_down(
     ends: tuple[Floats, Floats],
     rates: tuple[Floats | None, Floats | None],
     fastest: Floats,
+    travels: float,
     gravity: float,
     without: Collection[Correction],
 ) -> tuple[Floats, Floats]:
     """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
     half_steps, given = stance.half_steps, 2 * np.array(list(low))
-    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]))
+    hovering = stance.aloft[[0, -1]] > SURELY
+    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]), hovering)
     at_half_steps = stance.clearance + under
     evenly = np.interp(half_steps, half_steps[given], list(low.values()))
     at_half_steps = evenly + stance.trust * (at_half_steps - evenly)
@@ -156,7 +172,7 @@ def _set_down(
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (stance.aloft, stance.leaps))
-    frames, rotations = fps * half_steps[given], rotations.copy()
+    frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()
     for number, (start, end) in enumerate(pairwise(frames)):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
         part = slice(int(np.ceil(start - 1e-6)), int(end + 1e-6) + 1)
@@ -179,15 +195,16 @@ def _set_down(
             feet,
             known,
             stance.overhang,
+            travels,
             gravity,
             fps,
             without,
         )
         rotations[part], root[part] = _reach_floor(
-            skeleton, rotations[part], carried, feet, loose, known.moving, fastest, fps
+            skeleton, rotations[part], carried, floor[part], feet, loose, fine, known.moving, fastest, fps
         )
         sunk = np.maximum(floor[part] - lowest_height(skeleton, rotations[part], root[part]) - SINKS, 0.0)
-        root[part, 1] += _cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
+        root[part, 1] += cover(sunk, fps) * fade_at_ends(len(sunk), (True, True), fps)
     return rotations, root
 
 
@@ -195,8 +212,10 @@ def _reach_floor(
     skeleton: Skeleton,
     rotations: Floats,
     carried: Carried,
+    floor: Floats,
     feet: list[Foot],
     loose: Bools,
+    fine: bool,
     moving: tuple[bool, bool],
     fastest: Floats,
     fps: float,
@@ -204,7 +223,7 @@ def _reach_floor(
     """Return rotations whose legs are where they should be, within their limits, and the root.
 
     A foot that the limits of its joints turn is lifted or lowered by as much as that takes it off its height. Knees
-    bend no faster than they can.
+    bend no faster than they can, and with the movement's own fine detail.
     """
     joints, fades = [joint for foot in feet for joint in foot.leg], fade_at_ends(len(rotations), moving, fps)
     out, root = rotations.copy(), carried.root
@@ -215,23 +234,13 @@ def _reach_floor(
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     missing = carried.heights - foot_heights(skeleton, out, root, feet)
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
-    eased, shift = ease_knees(skeleton, posed, feet, off, carried.holds, fades * carried.bound, moving, fastest, fps)
-    if eased is off and np.abs(missing).max() < NEAR:
-        return out, root
-    planted = bend_legs(skeleton, posed, feet, eased, soft if eased is off else np.zeros(soft.shape))
+    room = carried.heights - floor[:, None] + SINKS
+    eased, shift = ease_knees(
+        skeleton, posed, feet, off, carried.holds, fades * carried.bound, room, fine, moving, fastest, fps
+    )
+    planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
-
-
-def _cover(need: Floats, fps: float) -> Floats:
-    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
-    if not need.any():
-        return need
-    width = max(1, round(0.5 * LIFTS * fps))
-    window = np.hanning(2 * width + 3)[1:-1]
-    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
-    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:
@@ -246,13 +255,15 @@ def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats 
     return np.asarray(root + departure(times, first, last))
 
 
-def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats) -> Floats:
+def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:
     """Return the floor's height at the half steps [2 T + 1], metres: 0, or as the `ends`' lowest points [2] show.
 
     A recording's own zero is often off: where an end is below 0 so is its floor, and where it is higher than bodies
-    that stand so are in the corpus, its floor is higher.
+    that stand so are in the corpus, its floor is higher. An end in the air, `hovering` [2], shows nothing of its floor,
+    which is then the other's.
     """
     above = np.maximum(np.minimum(ends, 0.0), ends - clearance[[0, -1]])
+    above = np.where(hovering, np.minimum(ends, 0.0 if hovering.all() else above[::-1]), above)
     return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
 
 

@@ -1,8 +1,9 @@
 """Knees that bend no faster than they can: how far a foot is from its hip, smoothly in time.
 
 Near its full length a leg bends its knee by 28 degrees for 3 % of its length, so that a foot which moves smoothly asks
-of the knee what no knee does. Its speed is limited here. What gives way is the foot that swings, or the body above one
-that stands.
+of the knee what no knee does. Its speed is limited here, and what it does beside the movement's own fine detail is
+smooth. What gives way is the foot that swings, or the body above one that stands, and by millimetres the place of a
+foot: that a leg which is all but straight kept it exactly would be seen in its knee.
 """
 
 from __future__ import annotations
@@ -10,7 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.realise.least_squares import bending_diagonals
 
+SHIFTS = 0.008  # metres that a foot may be off so that its knee keeps the fine detail of a movement
+STIRS = 2.0, 0.3  # rad/s^2 by which its acceleration may differ from its own, and share of that; chosen on cmu-05
+AROUND = 0.2  # seconds in which its own is seen
+LIFTS = 0.3  # seconds before and after a part would be too low, in which it is lifted
 EASES = 0.05  # seconds over which a knee that is too fast changes its speed
 
 
@@ -49,6 +55,35 @@ def slow_down(bends: Floats, stands: Bools, fixed: Bools, fastest: float, fps: f
     return np.where(fixed, bends, np.maximum(smoothed(out, EASES, fps), out))
 
 
+def keep_detail(bends: Floats, own: Floats, fixed: Bools, thigh: float, shank: float, fps: float) -> Floats:
+    """Return bends [N] of a knee, radians, near the given ones, with the fine detail of its own [N].
+
+    The departure d from its own minimises sum_t (l (d - wanted) / SHIFTS)^2 + (d'' / a)^2, with l how far a leg's end
+    goes for its knee's bend, metres a radian, and a what its acceleration may differ by: STIRS.
+
+    Args:
+        bends: wanted [N], radians.
+        own: those that the movement has [N].
+        fixed: frames in which bends must not change [N].
+        thigh: length of the bone above, metres.
+        shank: length of the bone below.
+        fps: frames a second.
+    """
+    from scipy.linalg import solveh_banded
+
+    widest = np.clip(np.maximum(bends, own), 0.0, 0.5 * np.pi)
+    lever = thigh * shank * np.sin(widest) / distance_of(bends, thigh, shank)
+    quick = fps**2 * np.abs(np.diff(own, 2))
+    if len(quick) > 1:
+        quick = np.sqrt(smoothed(quick**2, AROUND, fps).clip(0.0))
+    diagonals = bending_diagonals((fps**2 / (STIRS[0] + STIRS[1] * quick)) ** 2)
+    # A leg that is straight has no lever: how it bends is then told by the frames around.
+    firm = np.where(fixed, 1e12, (lever / SHIFTS) ** 2 + 1e-3)
+    diagonals[0] += firm
+    departure = solveh_banded(diagonals, firm * (bends - own), lower=True)
+    return np.where(fixed, bends, np.clip(own + departure, 0.0, np.pi))
+
+
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
     """Return means [N] of values around each, within so many seconds; the first and the last value stay."""
     width = min(max(round(seconds * fps), 1), len(values) - 1)
@@ -56,6 +91,17 @@ def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
     # Mirrored through its ends, so that these stay.
     around = np.pad(values, width, mode="reflect", reflect_type="odd")
     return np.asarray(np.convolve(around, weights / weights.sum(), "valid"))
+
+
+def cover(need: Floats, fps: float) -> Floats:
+    """Return a smooth curve [N] that is nowhere less than `need` [N], and 0 more than LIFTS seconds from any."""
+    if not need.any():
+        return need
+    width = max(1, round(0.5 * LIFTS * fps))
+    window = np.hanning(2 * width + 3)[1:-1]
+    # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
+    return np.convolve(around, window / window.sum(), "valid")
 
 
 def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Floats:

@@ -74,6 +74,18 @@ def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
     return np.asarray(start + change)
 
 
+def bending_diagonals(weights: Floats) -> Floats:
+    """Return the lower diagonals [3, N] of sum_t weights[t] (x[t] - 2 x[t + 1] + x[t + 2])^2, weights [N - 2]."""
+    out = np.zeros((3, len(weights) + 2))
+    out[0, :-2] += weights
+    out[0, 1:-1] += 4.0 * weights
+    out[0, 2:] += weights
+    out[1, :-2] -= 2.0 * weights
+    out[1, 1:-1] -= 2.0 * weights
+    out[2, :-2] = weights
+    return out
+
+
 @jit
 def _normal_equations(
     first: Ints, coefficients: Floats, targets: Floats, weights: Floats, start: Floats

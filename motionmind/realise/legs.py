@@ -85,7 +85,7 @@ def reach(
     along = np.sum(thigh * axis, axis=-1), np.sum(shank * axis, axis=-1)
     across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
     least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
-    now, wanted = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=-1), np.linalg.norm(target - leg[:, 0], axis=-1)
+    now, wanted = rot.norm(leg[:, 2] - leg[:, 0]), rot.norm(target - leg[:, 0])
     far = stretched(now, wanted, np.sqrt(least + product), soft)
     bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
     bend = rot.from_axis_angle(axis, bends[1] - bends[0])
@@ -99,7 +99,7 @@ def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> F
     In frames where the leg is all but straight the axis is the usual one, as seen from the hip [N, 4]: if that is not
     given, that of other frames.
     """
-    normal = np.cross(thigh, shank)
+    normal = rot.cross(thigh, shank)
     if usual is None:
         usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
     if np.linalg.norm(usual) < 1e-9:
@@ -107,9 +107,9 @@ def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> F
         bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
         across = np.eye(3)[np.argmin(np.abs(bone))]
         usual = across - bone * (across @ bone) / (bone @ bone)
-    size = np.linalg.norm(thigh, axis=-1) * np.linalg.norm(shank, axis=-1)
+    size = rot.norm(thigh) * rot.norm(shank)
     normal += (HINGE * size)[:, None] * rot.mul_vec(hip, usual / np.linalg.norm(usual))
-    return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+    return np.asarray(normal / rot.norm(normal)[..., None])
 
 
 def _soft_stretch(wanted: Floats, room: Floats, soft: Floats) -> Floats:

@@ -14,6 +14,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.marginals import posterior_marginals
@@ -114,14 +115,25 @@ def _mean_between(
     minimal = minimal_movement(orientations, times, leaving, arriving)
     poses, trusted = np.empty_like(minimal), np.empty(joints)
 
-    def walk(number: int) -> tuple[Floats, float]:
-        return _part_marginals(number, parts[number], carriage, rates, ends, times, path)
-
     groups = _joints_by_parts(parts, joints)
+    members = np.empty((joints, len(SIZES)), dtype=np.int64)
+    for numbers, here in groups.items():
+        members[here] = numbers
+    passed = [*orientations, *(() if path is None else path)]
+
+    def off(posture: Floats) -> Floats:
+        return squared_distances(carriage.orientations, members, len(parts), posture)
+
     larger = sorted({number for numbers in groups for number in numbers[:-1]})
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     with ThreadPoolExecutor(THREADS) as pool:
+        distances = [*pool.map(off, passed)]
+
+        def walk(number: int) -> tuple[Floats, float]:
+            own = np.stack([of_parts[number] for of_parts in distances])
+            return _part_marginals(number, parts[number], carriage, rates, ends, times, own)
+
         known = dict(zip(larger, pool.map(walk, larger), strict=True))
 
         def move(number: int) -> None:
@@ -157,22 +169,19 @@ def _part_marginals(
     rates: Rates | None,
     ends: tuple[Stop, Stop],
     times: Floats,
-    path: Floats | None,
+    off: Floats,
 ) -> tuple[Floats, float]:
     """Return the posterior marginals [S + 1, N] of walks of one part of the body, and how far to trust them.
 
-    Arguments are those of `_mean_between`.
+    Arguments are those of `_mean_between`, but for how far `off` the moments are from the two ends, and then from the
+    postures of the path, if there is one: squared distances of the part [K, N], radians^2.
     """
-    shown = carriage.orientations
     near = np.ones((len(times), len(carriage.weights)))
-    if path is not None:
-        followed = (squared_distances(shown, part, pose) for pose in path[:, part])
-        near[2:-2:2] = [likelihood(off / FOLLOWS_WITHIN**2) for off in followed]
-    nearest = np.empty(2)
+    if len(off) > len(ends):
+        near[2:-2:2] = likelihood(off[len(ends) :] / FOLLOWS_WITHIN**2)
+    nearest = np.sqrt(off[: len(ends)].min(axis=1))
     for k, stop in enumerate(ends):
-        off = squared_distances(shown, part, stop.chains[part])
-        nearest[k] = np.sqrt(off.min())
-        near[-k] = likelihood(off / variance_at_ends(off), *_rate_terms(part, rates, stop))
+        near[-k] = likelihood(off[k] / variance_at_ends(off[k]), *_rate_terms(part, rates, stop))
     clusters = np.ascontiguousarray(carriage.clusters[:, number])
     marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, carriage.weights, near)
     return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0])))
@@ -186,7 +195,7 @@ def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
     body's heights that its root travels. A body in one posture of a cycle has a way to go if it moves there, or has to
     get elsewhere.
     """
-    turn = float(squared_distances(ends[0].chains[None], part, ends[1].chains[part])[0])
+    turn = squared_distance(ends[0].chains[part], ends[1].chains[part]) / len(part)
     rates = [stop.rates.joints[part] for stop in ends if stop.rates is not None]
     speed = float(np.mean([np.sum(rate**2, axis=-1).mean() for rate in rates])) if rates else 0.0
     travel = float(np.sum((ends[1].place - ends[0].place) ** 2))

@@ -25,7 +25,7 @@ from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import keep_pace
+from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
 
@@ -153,6 +153,7 @@ def realise(
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         None if fastest is None else pace * fastest[: len(a.skeleton)],
+        np.inf if fastest is None else float(HEADROOM * pace * fastest[-1] * a.skeleton.height),
         without,
     )
     rotations = keep_apart(rotations, root)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Ints
+from motionmind.geometry.distances import squared_turn
 from motionmind.jit import jit
 
 # How near a walk's ends are to the given postures, radians a joint, standard deviation: the least and the greatest, and
@@ -35,22 +36,23 @@ ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some
 
 
 @jit
-def squared_distances(orientations: Floats, part: Ints, posture: Floats) -> Floats:
-    """Return the squared distance of a part of the body from a posture, mean over its joints [N], radians^2.
+def squared_distances(orientations: Floats, members: Ints, parts: int, posture: Floats) -> Floats:
+    """Return the squared distances of parts of the body from a posture, means over their joints [P, N], radians^2.
 
     Args:
-        orientations: of all chains in the corpus's moments [N, L, 4].
-        part: the part's m joints.
-        posture: orientations of these that distances are measured from [m, 4].
+        orientations: of all chains in the corpus's N moments, the joints' first [N, L, 4].
+        members: the parts that each joint is in [J, 3].
+        parts: how many parts there are.
+        posture: orientations of the joints that distances are measured from [J, 4].
     """
-    out = np.empty(len(orientations))
+    out, sizes = np.zeros((parts, len(orientations))), np.bincount(members.ravel(), minlength=parts)
     for i in range(len(orientations)):
-        total = 0.0
-        for k in range(len(part)):
-            here, there = orientations[i, part[k]], posture[k]
-            cosine = here[0] * there[0] + here[1] * there[1] + here[2] * there[2] + here[3] * there[3]
-            total += 4.0 * max(1.0 - cosine * cosine, 0.0)  # sin^2 of half the angle: its square where it is small
-        out[i] = total / len(part)
+        for joint in range(len(members)):
+            squared = squared_turn(orientations[i, joint], posture[joint])
+            for part in members[joint]:
+                out[part, i] += squared
+        for part in range(parts):
+            out[part, i] /= sizes[part]
     return out
 
 
@@ -77,10 +79,10 @@ def variance_at_ends(squared_distances: Floats) -> float:
 
 
 def likelihood(*terms: Floats) -> Floats:
-    """Return exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [N].
+    """Return exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [..., N].
 
     Args:
-        terms: squared distances in units of a variance [N] each.
+        terms: squared distances in units of a variance [..., N] each.
     """
     exponent = 0.5 * np.sum(terms, axis=0)
-    return np.asarray(np.exp(exponent.min() - exponent))
+    return np.asarray(np.exp(exponent.min(axis=-1, keepdims=True) - exponent))

@@ -160,8 +160,7 @@ def joint_frames(skeleton: Skeleton) -> tuple[Frame, ...]:
 
 def extent(skeleton: Skeleton) -> float:
     """Return the greatest side of the skeleton's bounding box at rest, metres; 1 if all joints coincide."""
-    rest = skeleton.positions_and_tips(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
-    return float(np.ptp(rest, axis=0).max()) or 1.0
+    return float(np.ptp(skeleton.rest, axis=0).max()) or 1.0
 
 
 def place_of(point: Floats) -> Place:

@@ -15,7 +15,6 @@ from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.human import human23
 from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
 from motionmind.render.body_solids import Ball, BodyShape, Cone, Frame, Place, extent, joint_frames, place_of
 from motionmind.render.palette import FACE, HAIR, MARK
 
@@ -42,7 +41,7 @@ class PersonShape:
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
         self.size = (skeleton.height or extent(skeleton)) / human23().height
-        self.rest = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+        self.rest = skeleton.rest[: len(skeleton)]
         self.frames = list(joint_frames(skeleton))
         self.drawn: set[int] = set()
         self.thumbs = any("thumb" in name.lower() for name in skeleton.names)

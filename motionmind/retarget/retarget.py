@@ -233,7 +233,7 @@ def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
                 f"{low!r} maps to {body.names[parent]} and {high!r} to {body.names[joint]}, but {low!r} hangs "
                 f"from {high!r}"
             )
-    zero = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+    zero = skeleton.rest[: len(skeleton)]
     return _Sources(skeleton, stands, turns, zero)
 
 
@@ -382,7 +382,7 @@ def _vertical(fit: _Fit, movement: Motion | Posture) -> str:
 
 def _lies(skeleton: Skeleton) -> bool:
     """Return whether the zero pose of human23's or human44's joints stands along z, as Blender writes it."""
-    zero = skeleton.positions(np.tile(rot.IDENTITY, (len(skeleton), 1)), np.zeros(3))
+    zero = skeleton.rest[: len(skeleton)]
     names = plain_names(skeleton.names)
     up = _unit(zero[names.index("atlantal")] - zero[names.index("pelvis")])
     return bool(up[2] >= _STANDS)

@@ -45,11 +45,22 @@ def test_forward_kinematics_is_a_product_of_matrices(skeleton: Skeleton) -> None
     positions = skeleton.positions(rotations, root)
     both = skeleton.positions_and_tips(rotations, root)
     turned = rot.to_matrix(skeleton.global_rotations(rotations))
+    points = rng.normal(size=(3, 3))
     for place in np.ndindex(2, 3):
         joints, tips, frames = by_matrices(skeleton, rotations[place], root[place])
         np.testing.assert_allclose(positions[place], joints, atol=1e-13)
         np.testing.assert_allclose(both[place], np.concatenate([joints, tips]), atol=1e-13)
         np.testing.assert_allclose(turned[place], frames, atol=1e-13)
+        fixed = skeleton.positions_with(rotations[place], root[place], [5, 2, 5], points)[len(skeleton) :]
+        np.testing.assert_allclose(
+            fixed, joints[[5, 2, 5]] + (frames[[5, 2, 5]] @ points[..., None])[..., 0], atol=1e-13
+        )
+
+
+@pytest.mark.parametrize("skeleton", [BODY, some_tree(3)], ids=["human23", "tree"])
+def test_a_body_without_rotations_is_at_rest(skeleton: Skeleton) -> None:
+    still = np.tile(rot.IDENTITY, (len(skeleton), 1))
+    np.testing.assert_array_equal(skeleton.rest, skeleton.positions_and_tips(still, np.zeros(3)))
 
 
 @pytest.mark.parametrize("skeleton", [BODY, some_tree(2)], ids=["human23", "tree"])

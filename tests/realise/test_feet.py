@@ -226,6 +226,18 @@ def test_the_height_is_smooth() -> None:
     assert smooth < 0.7 * rough
 
 
+def test_a_body_that_steps_travels_hardly_faster_than_it_may() -> None:
+    """Between two steps it would hurry from one foot to the other; the distance takes 0.83 m/s."""
+    q, root = sway(seconds=3.0, travel=2.5)
+    speeds = [
+        30.0 * np.linalg.norm(np.diff(grounded(q, root, travels=most)[1][:, [0, 2]], axis=0), axis=1).max()
+        for most in (np.inf, 1.2, 1.0)
+    ]
+    assert speeds[0] > 1.35
+    assert speeds[1] < 1.3
+    assert speeds[2] < 1.15
+
+
 def test_the_weight_comes_over_the_standing_foot() -> None:
     """A body whose trunk leans far aside on one leg; at both ends it stands upright."""
     frames = 91
@@ -512,6 +524,10 @@ def test_a_foot_that_is_lifted_swings_and_one_that_stands_firmly_stands() -> Non
     above, firm = np.array([0.0, 0.0, 0.3]), np.array([1.0, 0.1, 1.0])
     stand, swing = standing_costs(above, firm)
     np.testing.assert_array_equal(stand < swing, [True, False, False])
+    # A leg in the air has farther to come down, the higher it is.
+    higher = standing_costs(np.array([0.1, 0.3, 0.9]), np.ones(3))[0]
+    assert 2.5 * higher[0] < higher[1]
+    assert 2.5 * higher[1] < higher[2]
     track = np.zeros((30, 2))
     high = np.where((np.arange(30) > 9) & (np.arange(30) < 21), 0.2, 0.0)
     others, none = np.ones(30, dtype=np.bool_), np.zeros(30, dtype=np.bool_)
