@@ -16,10 +16,10 @@ from motionmind.cli.looks import explain, graph
 from motionmind.cli.measures import measure
 from motionmind.cli.options import group, show_help_without_command
 from motionmind.cli.pictures import render, sheet
-from motionmind.cli.printing import Notes, shorten_words, show_warning
+from motionmind.cli.printing import Notes, show_warning
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
-from motionmind.cli.streams import forgiving
+from motionmind.cli.streams import forgiving, printable
 from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
@@ -87,5 +87,5 @@ def _run(arguments: Sequence[str] | None) -> int:
         message = "a name or a text is no UTF-8, and cannot stand in a file"
     except MemoryError:
         message = "not enough memory for this"
-    click.echo(f"error: {shorten_words(message)}", err=True)
+    click.echo(f"error: {printable(message)}", err=True)
     return code

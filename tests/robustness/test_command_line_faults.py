@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -16,6 +19,7 @@ from command_line import Run
 import motionmind
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
 from motionmind.cli.application import app
 from motionmind.cli.types import Moves, Number, Numbers, Point, Size, Span, Whole
 from motionmind.formats import read_motion, write_motion
@@ -118,6 +122,40 @@ def test_words_that_are_no_utf_8_are_an_error_in_a_line(tmp_path: Path) -> None:
         code, errors = call(tmp_path, *command)
         assert (code, errors.count(b"\n")) == (2, 1)
     assert not list(tmp_path.glob("home/corpora/*/manifest.json"))
+
+
+# --- foreign text -----------------------------------------------------------------------------------------------------
+
+FOREIGN = "\x1b]0;owned\x07 \u202egnp.\x9b31m \x08\x7f"
+UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) -> None:
+    write_motion(tmp_path / "clip.json", replace(motion(), name=FOREIGN))
+    joints = tuple(f"{FOREIGN}{number}" for number in range(len(BODY)))
+    body = Skeleton("strange", joints, BODY.parents, BODY.offsets, BODY.tips)
+    write_motion(tmp_path / "strange.json", replace(motion(), skeleton=body))
+    about = ["--title", FOREIGN, "--author", FOREIGN, "--source", FOREIGN, "--licence", FOREIGN]
+    calls: list[tuple[int, tuple[object, ...]]] = [
+        (0, ("corpus", "build", "mine", "clip.json", *about)),
+        (0, ("corpus", "list")),
+        (0, ("corpus", "info", "mine")),
+        (0, ("corpus", "check", "mine")),
+        (0, ("corpus", "build", "strange", "strange.json")),
+        (0, ("corpus", "check", "strange")),
+        (2, ("corpus", "build", "both", "strange.json", "clip.json")),
+        (2, ("tween", f"{FOREIGN}.json", "clip.json", "--corpus", "mine")),
+        (2, ("tween", "clip.json@0", "clip.json@9", "--corpus", FOREIGN)),
+        (2, ("tween", "strange.json@0", "strange.json@9", "--corpus", "mine")),
+        (2, (FOREIGN,)),
+    ]
+    for code, words in calls:
+        ran = run(*words)
+        assert ran.code == code, ran.err
+        assert UNSAFE.findall(ran.out + ran.err) == []
+    info = run("corpus", "info", "mine", "--json")
+    assert (info.json["title"], UNSAFE.findall(info.out)) == (FOREIGN, [])  # whole, escaped as JSON does
+    assert json.loads((tmp_path / "home/corpora/mine/manifest.json").read_bytes())["title"] == FOREIGN
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
