@@ -158,6 +158,16 @@ def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) ->
     assert json.loads((tmp_path / "home/corpora/mine/manifest.json").read_bytes())["title"] == FOREIGN
 
 
+@pytest.mark.parametrize("name", ["secret", "secret.txt", "secret.score.txt", ".netrc"])
+def test_an_include_of_what_is_no_score_shows_nothing_of_it(tmp_path: Path, run: Run, name: str) -> None:
+    (tmp_path / name).write_text("password hunter2\n")
+    for file in (name, tmp_path / name):
+        (tmp_path / "a.score").write_text(f"title A\nbody human23\ninclude {file}\n")
+        ran = run("compose", "a.score", "-o", "out.json")
+        assert (ran.code, "hunter2" in ran.err) == (2, False)
+        assert ran.err.startswith("error: a.score:3: ")
+
+
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 NUMBERS = (Moves, Number, Numbers, Point, Size, Span, Whole, click.types.IntParamType, click.types.FloatParamType)
