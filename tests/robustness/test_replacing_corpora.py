@@ -13,10 +13,10 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import pytest
 import saved_corpora
+from faults import failing_at
 from saved_corpora import MANIFEST, arrays, as_in_0_1, names, seed_of
 
 from motionmind import files
@@ -137,18 +137,6 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
                     break
             shutil.rmtree(mine)
             before(mine)
-
-
-def failing_at(number: int, call: Callable[..., Any], error: BaseException) -> Callable[..., Any]:
-    """A call that raises an error the n-th time, and works before and after."""
-    calls = count(1)
-
-    def instead(*arguments: Any, **named: Any) -> Any:
-        if next(calls) == number:
-            raise error
-        return call(*arguments, **named)
-
-    return instead
 
 
 # --- leftovers --------------------------------------------------------------------------------------------------------
