@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
+import re
 import stat
-from contextlib import suppress
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
+from typing import NamedTuple
 
 from motionmind.errors import FormatError, MotionMindError
 
 FilePath = str | os.PathLike[str]
+
+TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
+_MINUTE, _DAY = 60.0, 86400.0  # seconds
+_HELD_OPEN = (0.01, 0.03, 0.1, 0.3, 0.5)  # seconds to wait for another program that holds a file open
+
+
+def name_of(path: FilePath) -> str:
+    """Return a file's name without its suffix, as text (`as_text`)."""
+    return as_text(Path(path).stem)
+
+
+def as_text(name: str) -> str:
+    """Return a file's name as text that can be written: its bytes that are no UTF-8 become escapes."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def read_bytes(path: FilePath) -> bytes:
@@ -25,7 +46,7 @@ def write_atomically(path: FilePath, data: bytes) -> None:
 
     The bytes go to a temporary file in the same folder, are flushed to disk, and are moved into place. Links are
     followed, and the permissions of a replaced file are kept. Anything but a regular file (a pipe, `/dev/stdout`) is
-    written to directly.
+    written to directly. In the context of `all_or_none` the move waits for its end.
 
     Raises:
         MotionMindError: writing failed; the temporary file is removed.
@@ -39,13 +60,96 @@ def write_atomically(path: FilePath, data: bytes) -> None:
         target = Path(os.path.realpath(path))
         if mode is not None and stat.S_ISDIR(mode):
             raise IsADirectoryError(0, "it is a folder")
-        _write_beside_and_move(target, data, mode)
+        if (held_back := _held_back.get()) is None:
+            replace_file(target, data, mode)
+        else:
+            held_back.append(Written(given, target, _write_beside(target, data, mode), not given.exists()))
     except (OSError, ValueError) as error:
         raise MotionMindError(f"{os.fspath(path)}: cannot be written: {_reason(error)}") from error
 
 
-def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
-    temporary = target.with_name(f".motionmind-{os.urandom(8).hex()}.tmp")
+class Written(NamedTuple):
+    """A file that was written beside its place.
+
+    Attributes:
+        path: its path as it was given.
+        target: its place, links followed.
+        temporary: where it is.
+        is_new: whether there is no file in its place.
+    """
+
+    path: Path
+    target: Path
+    temporary: Path
+    is_new: bool
+
+
+_held_back: ContextVar[list[Written] | None] = ContextVar("held_back", default=None)
+
+
+@contextmanager
+def all_or_none() -> Iterator[list[Written]]:
+    """Hold back the files that are written atomically in the context, and move them into place together at its end.
+
+    If an error or Ctrl-C ends it, those that were in place stay as they were, and there are no new ones.
+
+    Yields:
+        The files so far.
+
+    Raises:
+        MotionMindError: a file cannot be moved into place.
+    """
+    held_back: list[Written] = []
+    moved: list[Written] = []
+    token = _held_back.set(held_back)
+    try:
+        yield held_back
+        for one in held_back:
+            try:
+                _move(one.temporary, one.target)
+            except OSError as error:
+                raise MotionMindError(f"{one.path}: cannot be written: {_reason(error)}") from error
+            moved.append(one)
+        for folder in {one.target.parent for one in moved}:
+            sync_folder(folder)
+    except BaseException:
+        for one in held_back:
+            with suppress(OSError):
+                (one.target if one.is_new and one in moved else one.temporary).unlink(missing_ok=True)
+        raise
+    finally:
+        _held_back.reset(token)
+
+
+def sha256_of(written: Sequence[Written], path: Path | None) -> str | None:
+    """Return the hash of the file written to `path`; None if there is none: what goes to a pipe is not held back."""
+    return next((hashlib.sha256(one.temporary.read_bytes()).hexdigest() for one in written if one.path == path), None)
+
+
+def replace_file(target: Path, data: bytes, mode: int | None = None) -> None:
+    """Write a file beside `target`, flush it, move it there and flush the folder; OSError if that fails.
+
+    What processes that were killed left in the folder is removed.
+
+    Args:
+        target: where; a regular file there is replaced.
+        data: the file's bytes.
+        mode: its permissions; None for those of any new file.
+    """
+    temporary = _write_beside(target, data, mode)
+    try:
+        _move(temporary, target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(target.parent)
+
+
+def _write_beside(target: Path, data: bytes, mode: int | None) -> Path:
+    """Write and flush a temporary file in the folder of `target`, and return its path; leave nothing if that fails."""
+    _remove_leftovers(target.parent)
+    temporary = target.with_name(f".motionmind-{os.getpid()}-{os.urandom(8).hex()}.tmp")
     try:
         # Not tempfile: it makes files private to their owner, whatever the umask.
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -55,11 +159,73 @@ def _write_beside_and_move(target: Path, data: bytes, mode: int | None) -> None:
             os.fsync(file.fileno())
         if mode is not None:
             temporary.chmod(stat.S_IMODE(mode))
-        temporary.replace(target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
+    return temporary
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those that it lies in, if it is not there, and flush them to disk."""
+    if not folder.is_dir():
+        make_folder(folder.parent)
+        folder.mkdir(exist_ok=True)
+        sync_folder(folder.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush to disk which files a folder holds, where the system can."""
+    if os.name == "nt":  # it opens no folders, and logs their changes in order
+        return
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # a folder that one may write to and not look into
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that flushes no folders
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move a file over another, at once; wait a second at most while a program holds that open, as Windows lets it."""
+    for pause in (*_HELD_OPEN, None):
+        try:
+            source.replace(target)
+            return
+        except PermissionError:
+            if pause is None:
+                raise
+            time.sleep(pause)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of processes that ended before they were done with them."""
+    with suppress(OSError):
+        for entry in os.scandir(folder):
+            if parts := TEMPORARY.fullmatch(entry.name):
+                with suppress(OSError):
+                    age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+                    # A process may run on another machine that shares the folder, or have the number of one that died.
+                    if age > _DAY or (age > _MINUTE and parts[1] and not _runs(int(parts[1]))):
+                        Path(entry.path).unlink()
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process of this number runs on this machine; True where that cannot be asked."""
+    if os.name == "nt":  # where asking would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _reason(error: OSError | ValueError) -> str:

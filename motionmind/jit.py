@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import pickle
+import re
+import stat
+import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
+from numba.core import ccallback, compiler, serialize, sigutils
 from numba.extending import register_jitable
 
+from motionmind.files import make_folder, replace_file
+
 _F = TypeVar("_F", bound=Callable[..., object])
-config: Any = numba.config
+_HASH = 32  # bytes of a hash
+# Of numba's core, which is not typed.
+_normalise: Any = sigutils.normalize_signature
+_CFunc: Any = ccallback.CFunc
+_Result: Any = compiler.CompileResult
+_dumps: Any = serialize.dumps
 
 
 def jit(function: _F) -> _F:
@@ -23,12 +37,9 @@ def jit(function: _F) -> _F:
 
     It may call other compiled functions of its own folder and of `geometry`, and runs beside other threads.
     """
-    theirs = config.CACHE_DIR  # numba reads it when a function is decorated; other packages' functions stay put
-    config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent)
-    try:
-        return cast(_F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
-    finally:
-        config.CACHE_DIR = theirs
+    compiled: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    compiled._cache = _Kept(function)
+    return cast(_F, compiled)
 
 
 def either(function: _F) -> _F:
@@ -51,42 +62,112 @@ def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> A
     Raises:
         numba.core.errors.NumbaError: it cannot be compiled.
     """
-    theirs = config.CACHE_DIR
-    config.CACHE_DIR = _folder(Path(function.__code__.co_filename).parent) if keep else theirs
-    try:
-        return numba.cfunc(signature, cache=keep, error_model="numpy")(function)
-    finally:
-        config.CACHE_DIR = theirs
+    compiled = _CFunc(function, _normalise(signature), locals={}, options={"error_model": "numpy"})
+    if keep:
+        compiled._cache = _Kept(function)
+    compiled.compile()
+    return compiled
 
 
 def is_compiled(package: str) -> bool:
     """Return whether compiled code of a subpackage such as "search" is on disk; the search takes half a minute."""
-    source = Path(__file__).parent / package
-    return next(Path(_folder(source)).glob(f"{source.name}_*/*.nbi"), None) is not None
+    folder = _folder(Path(__file__).parent / package)
+    return folder is not None and next(folder.glob("*.nbc"), None) is not None
+
+
+class _Kept:
+    """The compiled code of one function on disk, in place of numba's cache: a file for each signature, with its hash.
+
+    numba keeps an index and numbered files. It trusts whatever it finds there, lets two processes write different code
+    under one number, fails where the disk is full, and writes into the package where its folder cannot be made. Here
+    every fault means that the function is compiled again.
+    """
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        self._function = function
+
+    @property
+    def cache_path(self) -> Path | None:
+        """The folder; None if there is none that can be written."""
+        return _folder(Path(self._function.__code__.co_filename).parent)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the code for a signature; None if it is not there, or damaged."""
+        context.refresh()
+        file = self._file(signature, context.codegen())
+        if file is None:
+            return None
+        try:
+            data = file.read_bytes()
+        except OSError:
+            return None
+        try:
+            if hashlib.sha256(data[_HASH:]).digest() != data[:_HASH]:
+                raise ValueError("not what was written")
+            return _Result._rebuild(context, *pickle.loads(data[_HASH:]))
+        except Exception:  # whatever unpickling and linking raise
+            _say(f"compiled code in {file.parents[1]} was damaged; it is compiled again")
+            with suppress(OSError):
+                file.unlink(missing_ok=True)
+            return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Write the code for a signature, where that can be done."""
+        file = self._file(signature, compiled.codegen)
+        if file is None or compiled.lifted or compiled.library.has_dynamic_globals:
+            return
+        data = _dumps(compiled._reduce())
+        try:
+            replace_file(file, hashlib.sha256(data).digest() + data)
+        except OSError as error:
+            _say(f"compiled code cannot be kept in {file.parents[1]} ({error.strerror}); each run compiles it again")
+
+    def _file(self, signature: Any, codegen: Any) -> Path | None:
+        code, folder = self._function.__code__, self.cache_path
+        if folder is None:
+            return None
+        values = _dumps(tuple(cell.cell_contents for cell in self._function.__closure__ or ()))
+        key = (numba.__version__, sys.version_info, str(signature), codegen.magic_tuple(), values)
+        name = re.sub(r"[^\w.]", "", f"{Path(code.co_filename).stem}.{code.co_qualname}")
+        return folder / f"{name}-{code.co_firstlineno}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
 
 @cache
-def _folder(source: Path) -> str:
+def _say(message: str) -> None:
+    """Log a warning, once."""
+    logging.getLogger("motionmind").warning(message)
+
+
+@cache
+def _folder(source: Path) -> Path | None:
     """Return the folder of compiled code, named after the state of all sources in `source` and in `geometry`.
 
-    numba's own cache looks only at the file that a function is in: after a change to another file that the function
-    calls into, it would go on using the old code. The folder is in the user's cache directory or, if that cannot be
-    written, in the system's temporary one, where nobody else may write to it.
+    A function's own file does not tell whether another that it calls into has changed. The folder is in
+    $NUMBA_CACHE_DIR, else in the user's cache directory or, if that cannot be written, in the system's temporary one,
+    where nobody else may write to it; None if there is none of them.
     """
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return given
     here = Path(__file__)
     files = [here, *sorted(here.parent.glob("geometry/*.py")), *sorted(source.glob("*.py"))]
     state = hashlib.sha256(repr([(str(file), file.stat().st_mtime_ns) for file in files]).encode()).hexdigest()[:16]
-    own = Path(platformdirs.user_cache_dir("motionmind", appauthor=False))
-    nearest = next(folder for folder in (own, *own.parents) if folder.exists())
-    return str((own if os.access(nearest, os.W_OK) else _temporary()) / "compiled" / state)
+    own = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("motionmind", appauthor=False)
+    for temporary in (False, True):
+        with suppress(OSError, ValueError):
+            place = _temporary() if temporary else Path(own)
+            folder = place / "compiled" / f"{source.name}-{state}"
+            make_folder(folder)
+            if os.access(folder, os.W_OK):
+                return folder
+    _say(f"compiled code can be kept neither in {own} nor among temporary files; each run compiles it again")
+    return None
 
 
 @cache
 def _temporary() -> Path:
+    """Return a folder among the system's temporary files in which nobody else may write; OSError if there is none."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"motionmind-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    owned = folder.stat().st_uid in (user, 0) and not folder.is_symlink()
-    return folder if owned else Path(tempfile.mkdtemp(prefix="motionmind-"))
+    found = folder.lstat()
+    if stat.S_ISDIR(found.st_mode) and found.st_uid in (user, 0) and not found.st_mode & 0o022:
+        return folder
+    return Path(tempfile.mkdtemp(prefix="motionmind-"))

@@ -12,7 +12,7 @@ import pytest
 from motionmind import jit as door
 
 
-def state(folder: Path) -> str:
+def state(folder: Path) -> Path | None:
     """Where code of a folder is kept, as a new process would find it."""
     return door._folder.__wrapped__(folder)
 

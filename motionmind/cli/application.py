@@ -19,6 +19,7 @@ from motionmind.cli.pictures import render, sheet
 from motionmind.cli.printing import Notes, show_warning
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
+from motionmind.cli.streams import forgiving, printable
 from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
@@ -58,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     log.addHandler(notes)
     log.setLevel(logging.INFO)
     try:
-        with warnings.catch_warnings():
+        with forgiving(), warnings.catch_warnings():
             warnings.simplefilter("always", MotionMindWarning)
             warnings.showwarning = show_warning
             sys.exit(_run(arguments))
@@ -82,7 +83,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         message = str(error)
     except OSError as error:  # of standard output: those who write files catch theirs
         message = f"cannot write: {error.strerror or error}"
+    except UnicodeError:
+        message = "a name or a text is no UTF-8, and cannot stand in a file"
     except MemoryError:
         message = "not enough memory for this"
-    click.echo(f"error: {message}", err=True)
+    click.echo(f"error: {printable(message)}", err=True)
     return code

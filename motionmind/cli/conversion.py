@@ -10,7 +10,7 @@ import click
 from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read, read_mapping, write
 from motionmind.cli.options import OUTPUTS, Section, command, option, reading
 from motionmind.cli.printing import count
-from motionmind.cli.types import FILE, RATE
+from motionmind.cli.types import FILE, RATE, Whole
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @option(
     "--frame",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     required=True,
     help="Take frame N, counted from 0, or from the end if negative.",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
+from motionmind.files import as_text
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def clip_names(files: Sequence[Path]) -> dict[Path, str]:
     schemes = [{f: f.stem for f in files}, {f: f.name for f in files}, {f: f.with_suffix("").as_posix() for f in files}]
     uses = [Counter(names.values()) for names in schemes]
     unique = ([names[f] for names, used in zip(schemes, uses, strict=True) if used[names[f]] == 1] for f in files)
-    return {file: next(iter(names), file.as_posix()) for file, names in zip(files, unique, strict=True)}
+    return {file: as_text(next(iter(names), file.as_posix())) for file, names in zip(files, unique, strict=True)}
 
 
 def numbered(path: Path, number: int, count: int | None) -> Path:
@@ -119,15 +119,3 @@ def _resolve(path: Path) -> Path:
         reason = (error.strerror if isinstance(error, OSError) else None) or "it leads nowhere"
         raise MotionMindError(f"{path}: cannot be used: {reason[0].lower()}{reason[1:]}") from error
     return found
-
-
-@contextmanager
-def all_or_none(files: Sequence[Path]) -> Iterator[None]:
-    """Remove the new ones among files that are written one after another if one cannot be written."""
-    new = [file for file in files if not file.exists()]
-    try:
-        yield
-    except MotionMindError:
-        for file in new:
-            file.unlink(missing_ok=True)
-        raise

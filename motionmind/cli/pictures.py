@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import all_or_none, check_outputs
+from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import is_collection, read_movement, read_movements, select_frames
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE
+from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE, Whole
 from motionmind.errors import MotionMindError
+from motionmind.files import all_or_none
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ FIRST = option(
     "--from",
     "start",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative.",
@@ -35,7 +36,7 @@ LAST = option(
     "--to",
     "end",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",
@@ -123,7 +124,7 @@ def sheet(
     for motion, drawn in zip(motions, frames, strict=True):
         check_frames(motion, drawn)
     paths = _make_files(folder, motions, source) if folder else [output]
-    with all_or_none(paths):
+    with all_or_none():
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
             picture = contact_sheet(motion, drawn, columns=columns, side=side)
             write_atomically(path, png(picture))
@@ -165,7 +166,7 @@ def sheet(
 @option(
     "--size",
     section=Section.DRAW,
-    type=click.IntRange(120, 2160),
+    type=Whole(120, 2160),
     metavar="PIXELS",
     help="Make a film or a posture this high  [default: 480]",
 )

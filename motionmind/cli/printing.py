@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from motionmind.cli.streams import printable
 from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def announce_compilation() -> None:
 def note(message: str) -> None:
     """Print a note to standard error, in place of a progress bar if one stands there."""
     clear = "\r\x1b[2K" if sys.stderr.isatty() else ""
-    click.echo(f"{clear}note: {message}", err=True)
+    click.echo(f"{clear}note: {printable(message)}", err=True)
 
 
 def count(number: int, noun: str) -> str:

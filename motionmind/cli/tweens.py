@@ -13,21 +13,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, numbered, write
+from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
 from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, option
 from motionmind.cli.postures import read_end
 from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
-from motionmind.cli.types import COUNT, FILE
+from motionmind.cli.types import FILE, Whole
 from motionmind.cli.words import parse_frames, parse_posture
 from motionmind.errors import NoPathError
+from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Posture
     from motionmind.tween.engine import Engine
+    from motionmind.tween.report import TweenReport
     from motionmind.tween.result import Tween
 
+MOST_ALTERNATIVES = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 
 
@@ -44,7 +47,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 @option(
     "--alternatives",
     section=Section.SEARCH,
-    type=COUNT,
+    type=Whole(1, MOST_ALTERNATIVES),
     metavar="K",
     help="Find K tweens of as many moves that differ; write out-1.json, out-2.json, ...",
 )
@@ -95,6 +98,7 @@ def tween(
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
     from motionmind.tween.engine import Engine
+    from motionmind.tween.report import plain
 
     named = parse_posture(a), parse_posture(b)
     around = tuple(parse_frames(word) if word else None for word in (before, after))
@@ -107,10 +111,10 @@ def tween(
     announce_compilation()
     with _diagnosing(outputs), Interruption() as interruption:
         results = _find_tweens(engine, (start, end), request, outputs.count, interruption)
-    files = outputs.write(results)
+    files, reports = outputs.write(results)
     if outputs.is_report_printed:
-        reports = [result.report() for result in results]
-        click.echo(json.dumps(reports[0] if alternatives is None else reports))
+        printed = list(map(plain, reports))
+        click.echo(json.dumps(printed[0] if alternatives is None else printed))
     elif alternatives is None:
         print_tween(results[0], files)
     else:
@@ -175,23 +179,26 @@ class _Outputs:
             sources,
         )
 
-    def write(self, results: Sequence[Tween]) -> list[Path]:
-        """Write all that was asked for, or nothing if one file fails; return the files."""
+    def write(self, results: Sequence[Tween]) -> tuple[list[Path], list[TweenReport]]:
+        """Write all that was asked for, or nothing if one file fails; return the files, and the reports if asked."""
         from motionmind.formats import write_atomically
         from motionmind.tween.report import encode_report
         from motionmind.tween.result import report_of
 
         files = [path for number in range(1, len(results) + 1) for path in self._files_of(number) if path]
-        with all_or_none(files):
+        reports = []
+        with all_or_none() as written:
             for number, result in enumerate(results, start=1):
                 motion, report, problem = self._files_of(number)
                 if motion:
                     write(motion, result.motion)
                 if problem:
                     write_atomically(problem, result.problem().encode())
+                if self.report:
+                    reports.append(report_of(result, sha256_of(written, motion)))
                 if report:
-                    write_atomically(report, encode_report(report_of(result)))
-        return files
+                    write_atomically(report, encode_report(reports[-1]))
+        return files, reports
 
     def write_diagnosis(self, error: NoPathError) -> None:
         """Write, or print, why there is no path in place of the first report, if there was to be one."""

@@ -19,8 +19,24 @@ class Number(click.FloatRange):
         """Return the number; fail with a usage error if it is none."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
+            is_named = str(value).strip("+- ").isalpha()  # as "inf"
+            self.fail(f"{value} is {'not a finite number' if is_named else 'too large'}.", param, ctx)
         return number
+
+
+class Whole(click.IntRange):
+    """A whole number, in a range if one is given."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number; fail with a usage error if it is none."""
+        if _has_too_many_digits(str(value).strip("+- ")):
+            self.fail(f"{value} is too large.", param, ctx)
+        return int(super().convert(value, param, ctx))
+
+
+def _has_too_many_digits(word: str) -> bool:
+    """Return whether a word is a number beyond all that are counted; Python itself refuses those of 4301 digits."""
+    return len(word) > 18 and word.isdecimal()
 
 
 class Moves(click.ParamType["int | tuple[int, int]"]):
@@ -31,6 +47,8 @@ class Moves(click.ParamType["int | tuple[int, int]"]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | tuple[int, int]:
         """Return the number, or the least and the greatest."""
         words = str(value).split("..")
+        if any(map(_has_too_many_digits, words)):
+            self.fail(f"{value} is too large.", param, ctx)
         if len(words) > 2 or not all(word.isdecimal() and int(word) > 0 for word in words):
             self.fail(f"{value!r} is neither a number of moves such as 8 nor a range such as 6..10.", param, ctx)
         least, most = int(words[0]), int(words[-1])
@@ -63,6 +81,8 @@ class Span(click.ParamType["tuple[int, int]"]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
         """Return the first and the last."""
         words = str(value).split("..")
+        if any(map(_has_too_many_digits, words)):
+            self.fail(f"{value} is too large.", param, ctx)
         if len(words) > 2 or not all(word.isdecimal() for word in words):
             self.fail(f"{value!r} is neither a posture's number such as 10 nor a range such as 10..14.", param, ctx)
         return int(words[0]), int(words[-1])
@@ -78,6 +98,8 @@ class Numbers(click.ParamType["tuple[int, ...] | str"]):
         words = str(value).split(",")
         if words == ["all"]:
             return "all"
+        if any(map(_has_too_many_digits, words)):
+            self.fail(f"{value} is too large.", param, ctx)
         if not all(word.isdecimal() for word in words):
             self.fail(f"{value!r} is neither a number such as 2, nor a list such as 1,3, nor all.", param, ctx)
         return tuple(map(int, words))
@@ -94,15 +116,18 @@ class Size(click.ParamType[int]):
         parts = re.fullmatch(r"(\d+(?:\.\d+)?) ?([KMG]B)?", str(value).strip(), re.IGNORECASE | re.ASCII)
         if not parts:
             self.fail(f"{value!r} is not a size such as 200MB.", param, ctx)
-        return round(float(parts[1]) * self.units[(parts[2] or "").upper()])
+        size = float(parts[1]) * self.units[(parts[2] or "").upper()]
+        if math.isinf(size):
+            self.fail(f"{value} is too large.", param, ctx)
+        return round(size)
 
 
 FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
 FILE_OR_FOLDER = click.Path(readable=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
-COUNT = click.IntRange(min=1)
-NATURAL = click.IntRange(min=0)
-NATS = Number(min=0)
+COUNT = Whole(min=1)
+NATURAL = Whole(min=0)
+NATS = Number(min=0, max=1e6)  # as `motionmind.tween.request.MOST_NATS`
 POSITIVE = Number(min=0, min_open=True)
 RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.motion.FASTEST`

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, all_or_none, check_outputs, write
+from motionmind.cli.files import MOVEMENT, check_outputs, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, reading
 from motionmind.cli.printing import (
     Interruption,
@@ -22,8 +22,9 @@ from motionmind.cli.printing import (
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
 from motionmind.cli.sources import is_collection, read_movement, select_frames, split_clip
 from motionmind.cli.tweens import INTERRUPTED
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point
+from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point, Whole
 from motionmind.cli.words import parse_parameters
+from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     "--from",
     "begin",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative.",
@@ -76,7 +77,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     "--to",
     "end",
     section=Section.PART,
-    type=int,
+    type=Whole(),
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",
@@ -309,14 +310,15 @@ def _write(files: Sequence[Path], variation: Variation, fps: float) -> None:
 
     output, *reports = files
     suffix = output.suffix.lower()
-    with all_or_none(files):
+    with all_or_none() as written:
         if suffix == ".json":
             write_variation(output, variation)
         else:
             motion = variation.motion()
             write(output, motion.resample(fps) if suffix in _EVEN else motion)
         for report in reports:
-            write_atomically(report, f"{json.dumps(variation.report())}\n".encode())
+            told = variation.report() | {"motion_sha256": sha256_of(written, output)}
+            write_atomically(report, f"{json.dumps(told)}\n".encode())
 
 
 def _print_advice(variation: Variation, engine: Engine | None) -> None:

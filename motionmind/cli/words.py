@@ -150,7 +150,7 @@ def parse_avoided(words: Sequence[str]) -> list[tuple[str, int | str]]:
         joint, _, state = word.partition("=")
         if not state:
             raise MotionMindError(f"--avoid {word}: give JOINT=STATE, such as left_hip=7")
-        avoided.append((joint, int(state) if state.isdecimal() else state))
+        avoided.append((joint, int(state) if re.fullmatch(r"\d{1,9}", state, re.ASCII) else state))
     return avoided
 
 

@@ -5,25 +5,27 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import secrets
-import shutil
+import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
+from motionmind.corpus import versions
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError
-from motionmind.files import read_bytes
+from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
 
-FORMAT, VERSION = "motionmind-corpus", 1
-BUILT = "motionmind-built-corpus"
+FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2)}  # that can be read; the last is written
 MANIFEST = "manifest.json"
+CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
+_COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_typing.py", "errors.py", "files.py", "jit.py"),
@@ -47,7 +49,8 @@ def list_corpora(folder: str | os.PathLike[str] | None = None) -> dict[str, Path
     found = {}
     for place in (bundled("corpora"), home(folder) / "corpora"):
         if place.is_dir():
-            found.update({entry.name: entry for entry in sorted(place.iterdir()) if (entry / MANIFEST).is_file()})
+            entries = [entry for entry in sorted(place.iterdir()) if not entry.name.startswith(".")]
+            found.update({entry.name: entry for entry in entries if (entry / MANIFEST).is_file()})
     return dict(sorted(found.items()))
 
 
@@ -73,96 +76,173 @@ def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
 
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest of a corpus's folder; FormatError if it is invalid or of an unknown version."""
-    path = folder / MANIFEST
+    return _parse(folder / MANIFEST, _read(folder / MANIFEST))
+
+
+def _read(path: Path) -> bytes:
     try:
-        manifest = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
-    except (OSError, ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
+        return path.read_bytes()
+    except OSError as error:
         raise FormatError(f"cannot be read as a corpus's manifest: {error}", path=path) from error
-    if manifest.get("format") not in (FORMAT, BUILT) or manifest.get("version") != VERSION:
-        raise FormatError(
-            f"is {manifest.get('format')!r} version {manifest.get('version')!r}; "
-            f"{FORMAT!r} and {BUILT!r} version {VERSION} can be read",
-            path=path,
-        )
+
+
+def _parse(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        manifest = msgspec.json.decode(data, type=dict[str, Any])
+    except (ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
+        raise FormatError(f"cannot be read as a corpus's manifest: {error}", path=path) from error
+    form, version = manifest.get("format"), manifest.get("version")
+    known = VERSIONS.get(form, ()) if isinstance(form, str) else ()
+    if version not in known:
+        readable = f"version {known[-1]}" if known else f"{FORMAT!r} and {BUILT!r}"
+        raise FormatError(f"is {form!r} version {version!r}; {readable} can be read", path=path)
     return manifest
 
 
 def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a corpus's folder: its manifest, and one .npy file per array.
 
-    An existing corpus is replaced once the new one is complete.
+    An existing corpus is replaced at once when the new one is complete and on disk (`motionmind.corpus.versions`).
 
     Args:
         folder: the corpus's folder.
-        manifest: plain values for JSON; format, version and the arrays' shapes are added.
+        manifest: plain values for JSON; format, version, folder and the arrays' shapes are added.
         arrays: by name.
 
     Raises:
         CorpusError: the folder cannot be written, or holds files that are not a corpus's.
     """
-    aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
     try:
-        for entry in folder.iterdir() if folder.exists() else ():
-            if entry.suffix != ".npy" and entry.name != MANIFEST:
-                raise CorpusError(
-                    f"{folder}: holds {entry.name}, which is no part of a built corpus; it is not replaced"
-                )
-        aside.mkdir(parents=True)
-        for name, array in arrays.items():
-            np.save(aside / f"{name}.npy", np.ascontiguousarray(array), allow_pickle=False)
-        shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
-        head = {"format": BUILT, "version": VERSION, **manifest, "arrays": shapes}
-        (aside / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(head), indent=1) + b"\n")
-        _swap(aside, folder)
+        versions.recover(folder)
+        if stranger := versions.find_stranger(folder, MANIFEST):
+            name = stranger.relative_to(folder)
+            raise CorpusError(f"{folder}: holds {name}, which is no part of a built corpus; it is not replaced")
+        make_folder(folder)
+        try:
+            _write(folder, manifest, arrays)
+        finally:
+            with suppress(FormatError):  # the manifest is damaged, and stays so until a save succeeds
+                versions.remove_others(folder, lambda: _current(folder))
+        versions.remove_leftovers(folder)
     except OSError as error:
         raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
 
 
-def _swap(new: Path, folder: Path) -> None:
-    """Replace a folder by a new one; restore the old one if that fails."""
-    if not folder.exists():
-        new.rename(folder)
-        return
-    old = new.with_name(f"{new.name}-old")
-    folder.rename(old)
-    try:
-        new.rename(folder)
-    except BaseException:
-        old.rename(folder)
-        raise
-    shutil.rmtree(old, ignore_errors=True)
+def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write a new version and make it the current one; all that it consists of is on disk before that."""
+    with versions.new_version(folder) as version:
+        for name, array in arrays.items():
+            with (version / f"{name}.npy").open("xb") as file:
+                np.save(file, np.ascontiguousarray(array), allow_pickle=False)
+                file.flush()
+                os.fsync(file.fileno())
+        sync_folder(version)
+        sync_folder(folder)
+        shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
+        head = {"format": BUILT, "version": VERSIONS[BUILT][-1], "folder": int(version.name), **manifest}
+        data = msgspec.json.encode(head | {"arrays": shapes})
+        replace_file(folder / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
 
 
-def load(folder: Path, manifest: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Load a corpus's folder.
+def _current(folder: Path) -> Path | None:
+    """Return the folder of the arrays of a built corpus; None if it has no manifest yet."""
+    return _place_of(folder, read_manifest(folder)) if (folder / MANIFEST).exists() else None
 
-    Args:
-        folder: the corpus's folder.
-        manifest: its manifest if it has been read; None reads it.
 
-    Returns:
-        The manifest, and the arrays by name, memory-mapped.
+def _place_of(folder: Path, manifest: Mapping[str, Any]) -> Path:
+    """Return the folder of a built corpus's arrays; those of 0.1 lie beside the manifest."""
+    if manifest["version"] == 1:
+        return folder
+    if not isinstance(number := manifest.get("folder"), int):
+        raise FormatError("there is no key `folder` with a number; build the corpus again", path=folder / MANIFEST)
+    return folder / str(number)
+
+
+class Stored(NamedTuple):
+    """The content of a corpus's folder.
+
+    Attributes:
+        manifest: its manifest.
+        arrays: a built corpus's arrays by name, memory-mapped.
+        place: the folder of the arrays.
+        identity: changes when any of the files does; "" while they are so new that it might not.
+    """
+
+    manifest: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+    place: Path
+    identity: str
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether these very files were found valid before."""
+        with suppress(OSError):
+            return bool(self.identity) and (self.place / versions.CHECKED).read_text("utf-8") == self.identity
+        return False
+
+    def remember_checked(self) -> None:
+        """Note beside the arrays that they were found valid, where that can be written."""
+        with suppress(OSError):
+            if self.identity:
+                replace_file(self.place / versions.CHECKED, self.identity.encode())
+
+
+def load(folder: Path) -> Stored:
+    """Load a corpus's folder, of one version even while others replace it.
 
     Raises:
         FormatError: the manifest or an array is missing, damaged, or not the one that was saved.
     """
-    manifest = read_manifest(folder) if manifest is None else manifest
-    shapes = manifest.get("arrays")
-    if not isinstance(shapes, dict):
-        raise FormatError("does not say which arrays there are; build the corpus again", path=folder / MANIFEST)
+    path = folder / MANIFEST
+    while True:
+        data = _read(path)
+        manifest = _parse(path, data)
+        if manifest["format"] != BUILT:
+            return Stored(manifest, {}, folder, "")
+        place = _place_of(folder, manifest)
+        with versions.hold(place) as there:
+            # Only a version that is current while it is held is complete, and stays so.
+            if _read(path) == data:
+                if not there:
+                    raise FormatError(f"there is no folder {place.name} beside it; build the corpus again", path=path)
+                shapes = manifest.get("arrays")
+                if not isinstance(shapes, dict):
+                    raise FormatError("does not say which arrays there are; build the corpus again", path=path)
+                identity = _identity(data, [_array_file(place, name) for name in shapes])
+                return Stored(manifest, _open_arrays(place, shapes), place, identity)
+
+
+def _open_arrays(place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Open the arrays in a folder that the manifest states the type and shape of by name, as [type, *shape]."""
     arrays = {}
     for name, shape in shapes.items():
-        path = folder / f"{name}.npy"
+        file = _array_file(place, name)
         try:
             # A plain view: still mapped, but without the subclass, which slows every slice.
-            arrays[name] = np.asarray(np.lib.format.open_memmap(path, mode="r"))
+            arrays[name] = np.asarray(np.lib.format.open_memmap(file, mode="r"))
         except Exception as error:  # the header is Python; parsing a damaged one can raise anything
-            raise FormatError(f"cannot be read as an array: {error}; build the corpus again", path=path) from error
+            raise FormatError(f"cannot be read as an array: {error}; build the corpus again", path=file) from error
         if [arrays[name].dtype.str, *arrays[name].shape] != shape:
-            raise FormatError("is not the array that was saved; build the corpus again", path=path)
-    return manifest, arrays
+            raise FormatError("is not the array that was saved; build the corpus again", path=file)
+    return arrays
+
+
+def _array_file(place: Path, name: str) -> Path:
+    return place / f"{name}.npy"
+
+
+def _identity(manifest: bytes, files: Iterable[Path]) -> str:
+    """Return a name of a manifest and files as they are; "" if a file lacks, or could change and keep its times."""
+    digest = hashlib.sha256(manifest)
+    newest = 0.0
+    for file in [*files, CHECKED_BY]:
+        try:
+            found = file.stat()
+        except (OSError, ValueError):
+            return ""
+        newest = max(newest, found.st_mtime, found.st_ctime)
+        digest.update(repr((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)).encode())
+    return digest.hexdigest() if time.time() - newest > _COARSEST_CLOCK else ""
 
 
 def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
-from motionmind.files import FilePath
+from motionmind.files import FilePath, name_of
 from motionmind.formats.text import MOST_JOINTS, read_lines, to_number, to_numbers
 from motionmind.geometry import rotations as rot
 
@@ -68,9 +67,7 @@ class Acclaim:
         ends = np.array([bone.length * bone.direction for bone in self.bones.values()]) * self.scale
         offsets = np.array([ends[parent] if parent >= 0 else np.zeros(3) for parent in parents])
         leaf = [joint not in parents for joint in range(len(parents))]
-        return Skeleton(
-            Path(self.path).stem, tuple(self.bones), tuple(parents), offsets, ends * np.array(leaf)[:, None]
-        )
+        return Skeleton(name_of(self.path), tuple(self.bones), tuple(parents), offsets, ends * np.array(leaf)[:, None])
 
 
 def fixed_axes(order: str, angles: Floats) -> Floats:

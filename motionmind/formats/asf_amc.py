@@ -24,7 +24,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
-from motionmind.files import FilePath
+from motionmind.files import FilePath, name_of
 from motionmind.formats._asf import Acclaim, fixed_axes, read_asf
 from motionmind.formats.text import read_lines, to_numbers
 from motionmind.geometry import rotations as rot
@@ -62,7 +62,7 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
         message = f"{path}: changes of the length or place of {enumerated(ignored)} are left out"
         warnings.warn(message, MotionMindWarning, stacklevel=2)
     times = (numbers - numbers[0]) / fps
-    return Motion(acclaim.skeleton(), rotations, root * acclaim.scale, times, name=Path(path).stem)
+    return Motion(acclaim.skeleton(), rotations, root * acclaim.scale, times, name=name_of(path))
 
 
 def _assemble(acclaim: Acclaim, values: Floats, degrees: bool) -> tuple[Floats, Floats, list[str]]:

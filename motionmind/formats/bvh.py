@@ -12,7 +12,6 @@ import logging
 import re
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.rates import FASTEST
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
-from motionmind.files import FilePath, write_atomically
+from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats._bvh_hierarchy import BvhJoint, is_comment, read_hierarchy
 from motionmind.formats._bvh_rig import NormalisedRig, Placed, normalise
 from motionmind.formats._clock import even_step
@@ -101,7 +100,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
         raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
     values = _read_frames(lines, first, channels, declared, path)
-    body = normalise(_assemble(joints, values, Path(path).stem))
+    body = normalise(_assemble(joints, values, name_of(path)))
     if declared != len(values):
         body.notes.append(
             f"the header says {declared} frames, the file holds {len(values)}; all {len(values)} are read"

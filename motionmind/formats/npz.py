@@ -31,7 +31,7 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FASTEST
 from motionmind.errors import FormatError, MotionMindError
-from motionmind.files import FilePath, read_bytes, write_atomically
+from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
 from motionmind.formats._smpl import smpl_bodies, to_smpl
 from motionmind.formats.text import LARGEST
@@ -80,7 +80,7 @@ def read_npz(path: FilePath, *, fps: float | None = None) -> Motion:
     rotations = rot.exp(poses.reshape(len(poses), -1, 3))
     rotations[:, 0] = rot.mul(_UPRIGHT, rotations[:, 0])
     times = np.arange(len(poses), dtype=np.float64) / rate
-    return Motion(skeleton, rot.normalise(rotations), rot.mul_vec(_UPRIGHT, trans), times, name=Path(path).stem)
+    return Motion(skeleton, rot.normalise(rotations), rot.mul_vec(_UPRIGHT, trans), times, name=name_of(path))
 
 
 def write_npz(path: FilePath, motion: Motion) -> None:

@@ -20,7 +20,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -30,7 +29,7 @@ from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
-from motionmind.files import FilePath, write_atomically
+from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats.text import read_lines, to_numbers
 from motionmind.geometry import rotations as rot
 
@@ -79,7 +78,7 @@ def read_papers(path: FilePath, *, skeleton: Skeleton | None = None, rate: float
     rotations = _rotations(postures, body, path)
     root = np.zeros((len(postures), 3))
     root[:, 1] = -body.positions_and_tips(rotations, root)[..., 1].min(axis=-1)
-    return Motion(body, rotations, root, np.arange(len(postures), dtype=np.float64) / rate, name=Path(path).stem)
+    return Motion(body, rotations, root, np.arange(len(postures), dtype=np.float64) / rate, name=name_of(path))
 
 
 def write_papers(path: FilePath, motion: Motion, *, form: Form = "braces") -> None:

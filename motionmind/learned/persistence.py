@@ -33,6 +33,7 @@ from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.learning import Learned, learn
 from motionmind.learned.pace import Pace, learn_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
+from motionmind.learned.validity import FORMS, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
@@ -47,10 +48,6 @@ _PARTS = {
     "pace": Pace,
     "plausibility": Plausibility,
 }
-_ARRAYS = (
-    *("rotations", "root", "times", "detail", "states", "centres"),
-    *(f"{name}.{field.name}" for name, kind in _PARTS.items() for field in fields(kind)),
-)
 _RENAMED = {"carriage.kinds": "carriage.clusters"}  # arrays of corpora built by 0.1: old name -> new
 _ADDED = {"carriage.aloft", "carriage.overhang", "carriage.touches"}  # arrays that corpora built by 0.1 lack
 
@@ -111,13 +108,13 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
         FormatError: it cannot be read.
     """
     folder = store.locate(name, home)
-    manifest = store.read_manifest(folder)
-    if manifest["format"] == store.BUILT:
-        return _open(folder, manifest)
-    source = parse_manifest(manifest, SourceManifest, folder / store.MANIFEST)
+    stored = store.load(folder)
+    if stored.manifest["format"] == store.BUILT:
+        return _open(folder, stored)
+    source = parse_manifest(stored.manifest, SourceManifest, folder / store.MANIFEST)
     built = store.cache() / f"{folder.name}-{store.fingerprint(_learned_files(folder, source))}"
     try:
-        return _open(built)
+        return _open(built, store.load(built))
     except MotionMindError:  # it is not there yet, or is damaged
         learned = learn(*_read_source(folder, source))
     with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
@@ -125,37 +122,46 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     return learned
 
 
-def _open(folder: Path, found: dict[str, Any] | None = None) -> Learned:
-    """Open a built corpus; `found` is its manifest, if that has been read."""
-    saved, stored = store.load(folder, found)
-    arrays = {_RENAMED.get(name, name): array for name, array in stored.items()}
+def _open(folder: Path, stored: store.Stored) -> Learned:
+    """Return what was learned, of what a folder holds; FormatError if something lacks or is not valid."""
+    arrays = {_RENAMED.get(name, name): array for name, array in stored.arrays.items()}
     path = folder / store.MANIFEST
-    manifest = parse_manifest(saved, BuiltManifest, path)
+    manifest = parse_manifest(stored.manifest, BuiltManifest, path)
     # Corpora built before 0.2 keep none of these; they take a second to learn for minutes of movement.
     new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
     new |= set() if _ADDED & arrays.keys() else {"carriage"}
-    missing = [name for name in _ARRAYS if name not in arrays and name.partition(".")[0] not in new]
+    arrays = {name: array for name, array in arrays.items() if name.partition(".")[0] not in new}
+    missing = [name for name in FORMS if name not in arrays and name.partition(".")[0] not in new]
     if missing:
         raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
-    body, states = manifest.skeleton, manifest.space
-    corpus = Corpus(
-        skeleton=Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips)),
-        clips=manifest.clips,
-        rotations=arrays["rotations"],
-        root=arrays["root"],
-        times=arrays["times"],
-        detail=arrays["detail"],
-        faults=manifest.faults,
-        **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
-    )
-    space = StateSpace(
-        corpus.chains,
-        arrays["centres"],
-        np.array(states.starts),
-        states.kind,
-        np.array(states.tolerances),
-        states.labels,
-    )
+    body, states, is_new = manifest.skeleton, manifest.space, not stored.is_checked
+    try:
+        skeleton = Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips))
+        if is_new:
+            check_forms(arrays, skeleton, manifest.facing)
+        corpus = Corpus(
+            skeleton=skeleton,
+            clips=manifest.clips,
+            rotations=arrays["rotations"],
+            root=arrays["root"],
+            times=arrays["times"],
+            detail=arrays["detail"],
+            faults=manifest.faults,
+            **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
+        )
+        space = StateSpace(
+            corpus.chains,
+            arrays["centres"],
+            np.array(states.starts),
+            states.kind,
+            np.array(states.tolerances),
+            states.labels,
+        )
+        if is_new:
+            check_values(arrays, corpus, space)
+            stored.remember_checked()
+    except (ValueError, OverflowError) as error:
+        raise FormatError(f"{error}; build the corpus again", path=path) from error
     grammar = Grammar(
         corpus.chains,
         arrays["centres"],

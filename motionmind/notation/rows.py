@@ -184,7 +184,7 @@ def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, d
         return lambda before: _backwards(_play_to_face(run, before))
     if how == "there and back":
         return lambda before: _check_count(_there_and_back(run(before), before), line.where)
-    if len(words) == 2 and words[1] in ("times", "time") and words[0].isdecimal() and 0 < int(words[0]) <= 1000:
+    if len(words) == 2 and words[1] in ("times", "time") and re.fullmatch(r"[1-9][0-9]{0,2}|1000", words[0]):
         return lambda before: _repeat(run, int(words[0]), before, line.where)
     if "of" in words and words[0] == "with" and 1 < words.index("of") < len(words) - 1:
         taken = words[1 : words.index("of")]

@@ -151,7 +151,7 @@ def _state(space: StateSpace, chain: int, wanted: int | str) -> int:
     word = str(wanted)
     if word in space.labels[chain]:
         return space.labels[chain].index(word)
-    if word.isdecimal():
+    if word.isdecimal() and len(word) < 10:
         space.label(chain, int(word))  # which says what numbers there are
         return int(word)
     named = f": {', '.join(space.labels[chain])}" if space.labels[chain] else "; here none is named"

@@ -73,6 +73,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         degrees: angle of each joint's move [T][L].
         likelihood: P(state arrived in | state left) of each joint's move; 0 where it is not attested [T][L].
         costs: the cost taken apart.
+        motion_sha256: hash of the file that the movement was written to with the report; null where none was.
 
     >>> from motionmind import Engine, read_report
     >>> engine = Engine.load("ballet")
@@ -116,6 +117,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     degrees: list[list[float]]
     likelihood: list[list[float]]
     costs: ReportedCosts
+    motion_sha256: str | None = None
 
     def __post_init__(self) -> None:
         """Check that every table has a row a move or a posture, and every row an entry a joint."""

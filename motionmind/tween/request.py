@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 MOST_MOVES = 10_000  # more is a slip of the keyboard, and more than memory holds
 MOST_NODES = 1_000_000_000
 MOST_MEMORY = 1 << 50  # bytes
+MOST_NATS = 1e6  # of any factor or price: sums of more lose the costs beside them, and then overflow
 SLOWEST = 0.01  # frames a second
 PACES = 0.05, 20.0  # times as fast as the corpus, the least and the most
 
@@ -151,8 +152,9 @@ class TweenRequest:
                 raise MotionMindError(f"{name} must be a number from 0 to 1, not {getattr(self, name)}")
         for name in ("lambda_", "beta", "tau", "bridge_price", "guide"):
             nats = getattr(self, name)
-            if not (math.isfinite(nats) and nats >= 0.0):
-                raise MotionMindError(f"{name.rstrip('_')} must be a number of nats of at least 0, not {nats}")
+            if not 0.0 <= nats <= MOST_NATS:
+                option = name.rstrip("_")
+                raise MotionMindError(f"{option} must be a number of nats from 0 to {MOST_NATS:g}, not {nats}")
         for number, (_, move) in enumerate(self.vias, start=1):
             if move is not None and not _is_whole(move, 1, MOST_MOVES - 1):
                 raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")

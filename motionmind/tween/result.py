@@ -139,8 +139,8 @@ class Tween:
         return cfn(replace(self.search_problem, vias=tuple(vias)), self.moves, self.joints)
 
 
-def report_of(tween: Tween) -> TweenReport:
-    """Return the report of a tween."""
+def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
+    """Return the report of a tween; `motion_sha256` is the hash of the file that its movement was written to."""
     costs, inner = tween.costs, tween.path_degrees[1:-1]
 
     def by_joint(row: Sequence[float]) -> dict[str, float]:
@@ -178,4 +178,5 @@ def report_of(tween: Tween) -> TweenReport:
         degrees=costs.degrees.tolist(),
         likelihood=costs.likelihood.tolist(),
         costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move, costs.guide.tolist()),
+        motion_sha256=motion_sha256,
     )

@@ -93,7 +93,8 @@ class SeamReport(msgspec.Struct, frozen=True):
 
 
 class VariationReport(msgspec.Struct, frozen=True):
-    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits."""
+    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits, and
+    `motion_sha256` the hash of the file that was written with the report, null where none was."""
 
     piece: PieceReport
     course: CourseReport
@@ -101,6 +102,7 @@ class VariationReport(msgspec.Struct, frozen=True):
     counts: CountsReport
     seams: list[SeamReport]
     edits: int
+    motion_sha256: str | None = None
 
 
 def report_of(piece: Piece, course: Course, order: Ints, seams: Sequence[Seam], edits: int) -> VariationReport:

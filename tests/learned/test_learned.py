@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from saved_corpora import as_in_0_1
 
 import motionmind
 from motionmind.corpus import store
@@ -37,6 +38,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_corpus_of_0_1_whose_clusters_were_called_kinds_is_loaded(built: Path, tmp_path: Path) -> None:
     old = tmp_path / "old"
     shutil.copytree(built, old)
+    as_in_0_1(old)
     (old / "carriage.clusters.npy").rename(old / "carriage.kinds.npy")
     text = (old / store.MANIFEST).read_text("utf-8")
     assert text.count('"carriage.clusters"') == 1
@@ -57,6 +59,7 @@ def test_a_corpus_that_was_built_without_some_of_a_part_learns_it(
 ) -> None:
     old = tmp_path / "old"
     shutil.copytree(built, old)
+    as_in_0_1(old)
     manifest = json.loads((old / store.MANIFEST).read_text("utf-8"))
     for name in [name for name in manifest["arrays"] if name.startswith(tuple(lacking))]:
         del manifest["arrays"][name]

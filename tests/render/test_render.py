@@ -23,7 +23,7 @@ from motionmind.body.mirror import LEFT, MIDDLE, RIGHT, sides_of
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
-from motionmind.formats import read_motion, read_posture, write_motion
+from motionmind.formats import read_motion, read_posture, write_atomically, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.render import sheet as sheets
 from motionmind.render.body_shape import shape_of
@@ -875,7 +875,7 @@ def test_of_sheets_that_cannot_all_be_written_none_is_left(
     def full(path: Path, data: bytes) -> None:
         if path.name == "wave.png":
             raise MotionMindError(f"{path}: cannot be written: the disk is full")
-        path.write_bytes(data)
+        write_atomically(path, data)
 
     monkeypatch.setattr("motionmind.formats.write_atomically", full)
     code, _, err = run("sheet", "walk-hexapod", "-o", "sheets", "--postures", 1)

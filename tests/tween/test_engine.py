@@ -254,6 +254,7 @@ REPORT = [
     "degrees",
     "likelihood",
     "costs",
+    "motion_sha256",
 ]
 
 
@@ -374,8 +375,9 @@ def test_what_is_loaded_answers_as_what_was_saved(six_segments: Engine, joined: 
     assert loaded.corpus.skeleton == six_segments.corpus.skeleton
     assert loaded.load_seconds > 0.0
     loaded.save(tmp_path / "again")
-    for path in (tmp_path / "corpora" / "insects").iterdir():
-        assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes()
+    saved = tmp_path / "corpora" / "insects"
+    for path in saved.rglob("*.*"):
+        assert path.read_bytes() == (tmp_path / "again" / path.relative_to(saved)).read_bytes()
 
 
 def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, tmp_path: Path) -> None:
@@ -401,7 +403,7 @@ def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, t
     refused(lambda broken: broken.update(facing="north"), r"\$.facing")
     (good / "manifest.json").write_text(json.dumps(manifest), "utf-8")
     Engine.load(str(good))
-    (good / "carriage.travel.npy").unlink()
+    (good / "1" / "carriage.travel.npy").unlink()
     with pytest.raises(FormatError, match=r"carriage\.travel\.npy"):
         Engine.load(str(good))
 
@@ -416,7 +418,7 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         write_motion(folder / "clips" / f"{clip.name}.json", clip)
     manifest = {
         "format": store.FORMAT,
-        "version": store.VERSION,
+        "version": store.VERSIONS[store.FORMAT][-1],
         **{"name": "mine", "title": "Insects", "author": "us", "source": "here", "licence": "CC0-1.0"},
         **{"facing": "free", "rate": None, "discretization": {"kind": "codebook", "tolerance": 15}},
         "clips": [{"name": f"the {c.name}", "file": f"clips/{c.name}.json", "about": "segments"} for c in CLIPS],
@@ -429,9 +431,9 @@ def test_a_written_corpus_is_learned_once_and_again_when_it_changes(written: Pat
     first = Engine.load("mine", tmp_path)
     assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "segments"}
     (built,) = (tmp_path / "cache").iterdir()
-    before = {path.name: path.stat().st_mtime_ns for path in built.iterdir()}
+    before = {path: path.stat().st_mtime_ns for path in built.rglob("*.*")}
     assert Engine.load("mine", tmp_path).info() == first.info()
-    assert {path.name: path.stat().st_mtime_ns for path in built.iterdir()} == before
+    assert {path: path.stat().st_mtime_ns for path in built.rglob("*.*")} == before
     write_motion(written / "clips" / "hurry.json", CLIPS[1].slice(0, 30))
     assert Engine.load("mine", tmp_path).info()["postures"] == 70
 
@@ -440,7 +442,7 @@ def test_a_damaged_cache_is_learned_again(written: Path, tmp_path: Path) -> None
     info = Engine.load("mine", tmp_path).info()
     (built,) = (tmp_path / "cache").iterdir()
     for damage in (
-        (built / "states.npy").unlink,
+        lambda: next(built.rglob("states.npy")).unlink(),
         lambda: (built / "manifest.json").write_text("{"),
         lambda: shutil.rmtree(built),
     ):

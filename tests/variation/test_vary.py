@@ -683,7 +683,7 @@ def test_vary_from_a_corpus_to_every_kind_of_file(run: Run, tmp_path: Path) -> N
     report = run("review", "out.json", "--json").json
     assert run(*common, "-o", "again.json", "--json").json == report
     assert run(*common, "-o", "again.json", "--report", "-").json == report
-    assert json.loads((tmp_path / "report.json").read_text()) == report
+    assert json.loads((tmp_path / "report.json").read_text()) | {"motion_sha256": None} == report
 
 
 def test_vary_says_what_there_is_to_know(run: Run) -> None:

@@ -1,0 +1,98 @@
+"""Standard output and standard error, neither of which may be in the way of the work."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
+
+# Control characters but ends of lines and tabs, and characters that turn the direction of text or end lines.
+_UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+_LONG = re.compile(r"\S{300,}")
+
+
+def printable(text: str) -> str:
+    """Return text, in which names from files may stand, so that a terminal shows it and does nothing else.
+
+    Characters that would move the cursor, set a title or turn the direction of text are written as escapes, and the
+    middle of words that fill lines is left out.
+    """
+    return _LONG.sub(lambda word: f"{word[0][:60]}...{word[0][-20:]}", _escape(text))
+
+
+def _escape(text: str) -> str:
+    """Write unsafe characters as JSON does, which so stays what it is."""
+    return _UNSAFE.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
+
+
+class _Escaping:
+    """Standard output, on which names from files stand."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write text with what a terminal would act on as escapes."""
+        self._stream.write(_escape(text))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+class _Forgiving:
+    """A stream that drops what it cannot write: nobody reads a closed terminal, and a full disk ends no search."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write text, or do without."""
+        try:
+            return self._stream.write(text)
+        except (OSError, ValueError):  # ValueError: it was closed
+            self._silence()
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush, or do without."""
+        try:
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._silence()
+
+    def _silence(self) -> None:
+        """Let what is buffered go nowhere, or Python would fail with it when it ends."""
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def forgiving() -> Iterator[None]:
+    """Let writing to standard error never fail, and standard output get no character that a terminal acts on.
+
+    Names that are no UTF-8 are printed with their bytes escaped.
+    """
+    if sys.stderr is None:  # closed; a file of ours would take its number, and get what libraries print
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - it stays open
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    given = sys.stdout, sys.stderr
+    sys.stderr = _Forgiving(sys.stderr)
+    if sys.stdout is not None:
+        sys.stdout = _Escaping(sys.stdout)
+    try:
+        yield
+    finally:
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = given

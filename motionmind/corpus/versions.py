@@ -1,0 +1,144 @@
+"""Folders whose content is replaced at once: each version has a folder of its own, and one file names the current one.
+
+    corpora/mine/manifest.json     the current version, in "folder": 3
+    corpora/mine/3/*.npy           its arrays
+
+To replace it, a writer makes folder 4, fills and flushes it, and moves a new manifest over the old one: up to that
+call readers find version 3, from then on version 4. Whoever reads or writes a version holds a lock on its folder, which
+ends with the process; cleaning removes versions that nobody holds. In corpora of 0.1 the arrays lie beside the
+manifest: that is a version too, in the folder itself.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import count
+from pathlib import Path
+
+from motionmind.files import TEMPORARY
+
+if sys.platform != "win32":
+    import fcntl
+
+CHECKED = "checked"  # the file in a version that says that its arrays were found valid
+_UNUSED = 3600.0  # seconds without change after which a folder that cannot be locked is taken to be unused
+
+
+@contextmanager
+def hold(version: Path) -> Iterator[bool]:
+    """Keep a version from being removed until the context ends; yield whether it is there."""
+    with ExitStack() as stack:
+        try:
+            there = stack.enter_context(_locked(version, alone=False))
+        except FileNotFoundError:
+            there = False
+        yield there
+
+
+@contextmanager
+def new_version(folder: Path) -> Iterator[Path]:
+    """Make a folder for the next version of `folder`, and hold it."""
+    numbers = [int(entry.name) for entry in folder.iterdir() if _is_version(entry)]
+    for number in count(max(numbers, default=0) + 1):
+        version = folder / str(number)
+        try:
+            version.mkdir()
+        except FileExistsError:  # another writer's
+            continue
+        with hold(version) as there:
+            if there:  # and not taken for a leftover before it was held
+                yield version
+                return
+
+
+def remove_others(folder: Path, current: Callable[[], Path | None]) -> None:
+    """Remove all versions of `folder` but the current one and those that are held, as far as that can be done.
+
+    Args:
+        folder: the folder.
+        current: returns the folder of the current version; None if there is none yet.
+    """
+    with suppress(OSError):
+        for version in [*filter(_is_version, folder.iterdir()), folder]:
+            with suppress(OSError), _locked(version, alone=True) as unused:
+                # Asked only now: whoever makes a version current holds it.
+                if not unused or (kept := current()) == version:
+                    continue
+                for file in version.iterdir() if kept or version != folder else ():
+                    if _is_array(file) or (version != folder and TEMPORARY.fullmatch(file.name)):
+                        file.unlink()
+                if version != folder:
+                    version.rmdir()
+
+
+def recover(folder: Path) -> None:
+    """Put back a folder that a killed process of 0.1 had moved aside, if there is none in its place."""
+    for old in _moved_aside(folder, "-old"):
+        if not folder.exists():
+            old.rename(folder)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed processes of 0.1 left beside a folder."""
+    for aside in _moved_aside(folder, "(-old)?"):
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def find_stranger(folder: Path, manifest: str) -> Path | None:
+    """Return a file or folder in `folder` that is no part of a version or its manifest; None if there is none."""
+    for entry in folder.iterdir() if folder.exists() else ():
+        parts = list(entry.iterdir()) if _is_version(entry) and entry.is_dir() else [entry]
+        for part in parts:
+            if not (_is_array(part) or TEMPORARY.fullmatch(part.name) or part == folder / manifest):
+                return part
+    return None
+
+
+def _is_version(entry: Path) -> bool:
+    return re.fullmatch("[1-9][0-9]{0,17}", entry.name) is not None
+
+
+def _is_array(entry: Path) -> bool:
+    return entry.suffix == ".npy" or entry.name == CHECKED
+
+
+def _moved_aside(folder: Path, suffix: str) -> list[Path]:
+    """Return the folders that 0.1 called ".mine-0123456789ab" or "...-old" while it replaced "mine"."""
+    name = re.compile(rf"\.{re.escape(folder.name)}-[0-9a-f]{{12}}{suffix}")
+    found = folder.parent.iterdir() if folder.parent.is_dir() else ()
+    return sorted(
+        entry for entry in found if name.fullmatch(entry.name) and find_stranger(entry, "manifest.json") is None
+    )
+
+
+@contextmanager
+def _locked(folder: Path, *, alone: bool) -> Iterator[bool]:
+    """Lock a folder until the context or the process ends: alone, or with others who do not lock it alone.
+
+    Yields:
+        Whether it is locked; alone if nobody else has locked it, with others if the folder is still in its place. Where
+        there are no locks, a folder that has not changed for an hour is taken to be unused; and Windows, which has none
+        on folders, removes no file that is open.
+    """
+    long_unchanged = time.time() - folder.stat().st_mtime > _UNUSED
+    if sys.platform == "win32":
+        yield long_unchanged or not alone
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
+            locked = alone or (folder.exists() and os.path.samestat(folder.stat(), os.fstat(descriptor)))
+        except BlockingIOError:
+            locked = False
+        except OSError:
+            locked = long_unchanged or not alone
+        yield locked
+    finally:
+        os.close(descriptor)

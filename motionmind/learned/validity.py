@@ -1,0 +1,193 @@
+"""Checks of a built corpus's arrays, which compiled code indexes without looking: types, shapes, ranges and pointers.
+
+Letters are sizes: N postures, M moves, J joints, L chains, G states in all, H = N + M moments, S = 2 M steps, E
+transitions, B bridges, V pair rows and Q pairs of the coordination, K frames of detail between postures, P pairs of
+limbs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.capsules import capsules_of
+from motionmind.body.limbs import limbs_of, parts_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Corpus, Facing
+from motionmind.discretize import StateSpace
+from motionmind.learned.plausibility import MEASURES
+
+_MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
+_SMALL, _TINY = 1e-9, 1e-300
+_UNIT = 1e-5  # by which the square of a unit quaternion's length may differ from 1
+
+
+class _Form(NamedTuple):
+    """The type of an array, its shape, and the range of its numbers; they may be NaN only if `or_nan`."""
+
+    kind: str
+    shape: str
+    low: float = -_MOST
+    high: float = _MOST
+    or_nan: bool = False
+
+
+FORMS = {
+    "rotations": _Form("f8", "N J 4", -2.0, 2.0),
+    "root": _Form("f8", "N 3"),
+    "times": _Form("f8", "N"),
+    "detail": _Form("f2", "N K J 3", -4.0, 4.0),
+    "states": _Form("i4", "N L"),
+    "centres": _Form("f8", "G 4", -2.0, 2.0),
+    "transitions.starts": _Form("i8", "L+1"),
+    "transitions.indptr": _Form("i8", "G+1"),
+    "transitions.targets": _Form("i4", "E"),
+    "transitions.counts": _Form("f8", "E", _TINY, 1e15),
+    "transitions.visits": _Form("f8", "G", _TINY, 1e15),
+    "transitions.attests": _Form("i4", "E"),
+    "transitions.arrives": _Form("i4", "E"),
+    "transitions.seconds": _Form("f8", "E", _SMALL),
+    "bridges.indptr": _Form("i8", "G+1"),
+    "bridges.targets": _Form("i4", "B"),
+    "bridges.degrees": _Form("f8", "B", 0.0, 180.0),
+    "coordination.parents": _Form("i8", "L"),
+    "coordination.pair_starts": _Form("i8", "L+1"),
+    "coordination.pair_ptr": _Form("i8", "V+1"),
+    "coordination.pair_states": _Form("i4", "Q"),
+    "coordination.pair_costs": _Form("f8", "Q"),
+    "coordination.child_costs": _Form("f8", "G"),
+    "coordination.parent_costs": _Form("f8", "V"),
+    "carriage.orientations": _Form("f8", "H L 4", -2.0, 2.0),
+    "carriage.weights": _Form("f8", "H", _TINY, 1.0),
+    "carriage.begins": _Form("i8", "S"),
+    "carriage.ends": _Form("i8", "S"),
+    "carriage.shares": _Form("f8", "S", _TINY, 1.0 + _SMALL),
+    "carriage.clusters": _Form("i4", "H parts"),
+    "carriage.turn": _Form("f8", "M"),
+    "carriage.travel": _Form("f8", "M 3"),
+    "carriage.clearance": _Form("f8", "H", 0.0),
+    "carriage.stands": _Form("f8", "H limbs+1", 0.0, 1.0 + _SMALL),
+    "carriage.aloft": _Form("f8", "H", 0.0, 1.0),
+    "carriage.overhang": _Form("f8", "1"),
+    "carriage.loose": _Form("b1", "J"),
+    "carriage.touches": _Form("f8", "P", 0.0),
+    "pace.usual": _Form("f8", "3", _SMALL),
+    "pace.fastest": _Form("f8", "J+2", _SMALL),
+    "pace.greatest": _Form("f8", "J+2", _SMALL),
+    "pace.slowest": _Form("f8", "1", 0.0),
+    "pace.law": _Form("f8", "3", -100.0, 100.0),
+    "plausibility.fastest": _Form("f8", "J+2", _SMALL),
+    "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
+}
+
+
+def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: Facing) -> None:
+    """Check the type, shape and range of each array; ValueError names the first that is wrong.
+
+    Args:
+        arrays: all arrays of `FORMS`, by name, or all but those of whole parts such as "pace".
+        skeleton: the body.
+        facing: whether the body's turn is a chain.
+    """
+    sizes = {"J": len(skeleton), "L": len(skeleton) + (facing == "free"), "P": len(capsules_of(skeleton).pairs())}
+    sizes |= {"parts": len(parts_of(skeleton)), "limbs": len(limbs_of(skeleton))}
+    for name, form in FORMS.items():
+        if name not in arrays:
+            continue
+        array = arrays[name]
+        if array.dtype != np.dtype(form.kind):
+            raise ValueError(f"{name} is of {array.dtype}, not of {np.dtype(form.kind)}")
+        words = form.shape.split()
+        if array.ndim == len(words):
+            # A size that is not known yet is that of the first array that has it.
+            for word, size in zip(words, array.shape, strict=True):
+                letter, _, more = word.partition("+")
+                sizes.setdefault(letter, size - int(more or 0))
+        shape = [_size(word, sizes) for word in words]
+        if list(array.shape) != shape:
+            raise ValueError(f"{name} is of the shape {list(array.shape)}, not {shape}")
+        numbers = array[~np.isnan(array)] if form.or_nan else array
+        if form.kind.startswith("f") and not ((numbers >= form.low) & (numbers <= form.high)).all():
+            raise ValueError(f"{name} holds a number that is not from {form.low:g} to {form.high:g}")
+
+
+def _size(word: str, sizes: Mapping[str, int]) -> int:
+    """Return the size that a word of a shape stands for, as 5, "J" or "J+2"; -1 if it is not known."""
+    letter, _, more = word.partition("+")
+    return (int(letter) if letter.isdecimal() else sizes.get(letter, -1)) + int(more or 0)
+
+
+def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: StateSpace) -> None:
+    """Check what arrays of valid forms point to, and how they fit the corpus; ValueError names the first that is wrong.
+
+    Args:
+        arrays: as for `check_forms`.
+        corpus: the corpus.
+        space: the states of each chain.
+    """
+    moves = corpus.moves
+    for name in ("rotations", "carriage.orientations"):
+        # Written so that a NaN fails too.
+        if name in arrays and not (np.abs(_squares(arrays[name]) - 1.0) <= _UNIT).all():
+            raise ValueError(f"{name} holds a quaternion that is not of unit length")
+    later = (corpus.times[moves.ends] - corpus.times[moves.begins]) * np.sign(moves.ends - moves.begins)
+    if not (later > 0.0).all():
+        raise ValueError("times does not rise within a clip")
+    if not np.array_equal(arrays["transitions.starts"], space.starts):
+        raise ValueError("transitions.starts is not where the manifest's chains start")
+    _check_range("states", arrays, space.sizes)
+    of_row = np.repeat(space.sizes, space.sizes)  # the number of states in the chain of each state
+    _check_rows("transitions.indptr", "transitions.targets", arrays, of_row)
+    _check_rows("bridges.indptr", "bridges.targets", arrays, of_row)
+    _check_range("transitions.attests", arrays, len(corpus))
+    _check_range("transitions.arrives", arrays, len(corpus))
+    seconds = arrays["transitions.seconds"]
+    if len(seconds) and not (later.min() - _SMALL <= seconds.min() and seconds.max() <= later.max() + _SMALL):
+        raise ValueError("transitions.seconds holds a duration that no move has")
+    _check_coordination(arrays, corpus.chain_parents, space.sizes)
+    moments = len(corpus) + len(later)
+    for name, size in (("turn", len(later)), ("begins", 2 * len(later)), ("weights", moments)):
+        if len(arrays.get(f"carriage.{name}", np.zeros(size))) != size:
+            raise ValueError(f"carriage.{name} has not {size} entries, as the corpus's moves make")
+    for name in ("carriage.begins", "carriage.ends", "carriage.clusters"):
+        _check_range(name, arrays, moments)
+
+
+def _squares(quaternions: Floats) -> Floats:
+    return np.asarray(np.einsum("...i,...i", quaternions, quaternions))
+
+
+def _check_range(name: str, arrays: Mapping[str, NDArray[Any]], size: int | Ints) -> None:
+    """Check that all of an array, if it is there, are indices of what has this size, or these sizes by column."""
+    if name in arrays and not ((arrays[name] >= 0) & (arrays[name] < size)).all():
+        raise ValueError(f"{name} holds an index of what is not there")
+
+
+def _check_rows(pointers: str, entries: str, arrays: Mapping[str, NDArray[Any]], sizes: Ints) -> None:
+    """Check rows of indices: where each starts, and that its entries rise and are less than the row's size [rows]."""
+    starts, found = arrays[pointers], arrays[entries]
+    lengths = np.diff(starts)
+    if starts[0] != 0 or starts[-1] != len(found) or (lengths < 0).any():
+        raise ValueError(f"{pointers} does not rise from 0 to {len(found)}")
+    _check_range(entries, arrays, np.repeat(sizes, lengths))
+    row = np.repeat(np.arange(len(lengths)), lengths)
+    if ((np.diff(found) <= 0) & (np.diff(row) == 0)).any():
+        raise ValueError(f"{entries} does not rise within a row")
+
+
+def _check_coordination(arrays: Mapping[str, NDArray[Any]], parents: Ints, sizes: Ints) -> None:
+    """Check the coordination of chains with these parents [L] and numbers of states [L]."""
+    above = arrays["coordination.parents"]
+    if not ((above == parents) | (above == -1)).all():
+        raise ValueError("coordination.parents is not the tree of the manifest's joints")
+    rows = np.where(above >= 0, sizes[above], 0)
+    starts = np.concatenate([[0], np.cumsum(rows)])
+    if not np.array_equal(arrays["coordination.pair_starts"], starts) or starts[-1] != len(
+        arrays["coordination.parent_costs"]
+    ):
+        raise ValueError("coordination.pair_starts has not a row for each state of a chain's parent")
+    _check_rows("coordination.pair_ptr", "coordination.pair_states", arrays, np.repeat(sizes, rows))

@@ -1,0 +1,161 @@
+"""A built corpus whose arrays were altered is an error in a line, or works: compiled code reads what is there."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from motionmind.corpus import store, versions
+from motionmind.errors import FormatError, MotionMindError, NoPathError
+from motionmind.learned.validity import FORMS
+from motionmind.tween.engine import Engine
+
+TRIALS = 1000
+EVERY = 10  # of the corpora that load, one is used
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A corpus with bridges, coordination and detail, of few postures."""
+    folder = tmp_path_factory.mktemp("built") / "hexapod"
+    Engine.load("walk-hexapod").save(folder)
+    return folder
+
+
+def altered(array: NDArray[Any], rng: random.Random) -> NDArray[Any]:
+    """An array with some entries that are too large, too small, no numbers, of other entries, or of other bits."""
+    out = np.array(array)
+    flat = out.reshape(-1)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        for _ in range(rng.choice([1, 1, 1, 3, 30])):
+            at = rng.randrange(flat.size)
+            match rng.randrange(5):
+                case 0:
+                    flat[at] = flat[rng.randrange(flat.size)]
+                case 1:
+                    flat[at] += rng.choice([-1, 1])
+                case 2:
+                    flat.view(np.uint8)[rng.randrange(flat.nbytes)] ^= 1 << rng.randrange(8)
+                case 3:
+                    flat[at] *= rng.choice([-1, 0, 2])
+                case 4:
+                    wild = (
+                        [np.nan, np.inf, -np.inf, 1e300, -1e-300] if out.dtype.kind == "f" else [-1, 10**4, 2**31 - 1]
+                    )
+                    flat[at] = np.array(rng.choice(wild)).astype(out.dtype)
+    return out
+
+
+def use(engine: Engine, rng: random.Random) -> None:
+    """Join two postures, by all that a corpus knows."""
+    count = len(engine.corpus)
+    a, b = (engine.corpus.motion(engine.corpus.clips[0]).posture(rng.randrange(20)) for _ in range(2))
+    assert count > 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        engine.tween(a, b, moves=rng.randint(1, 6), node_budget=1000)
+        engine.check(pairs=10)
+
+
+def test_a_thousand_alterations_are_each_an_error_in_a_line_or_work(built: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    place = store.load(folder).place
+    rng = random.Random(0)
+    names = [name for name in FORMS if np.load(place / f"{name}.npy").size]
+    messages: list[str] = []
+    used = 0
+    for trial in range(TRIALS):
+        file = place / f"{names[trial % len(names)]}.npy"
+        whole = file.read_bytes()
+        np.save(file, altered(np.load(file), rng))
+        try:
+            engine = Engine.load(str(folder))
+            if trial // len(names) % EVERY == 0:
+                used += 1
+                use(engine, rng)
+        except NoPathError:
+            pass
+        except MotionMindError as error:
+            messages.append(str(error))
+        file.write_bytes(whole)
+    assert [message for message in messages if "\n" in message or len(message) > 1000] == []
+    assert len(messages) > TRIALS // 4
+    assert used > TRIALS // EVERY // 4
+
+
+@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.kind in ("i4", "i8")])
+@pytest.mark.parametrize("value", [-1, 2**31 - 1])
+def test_an_index_of_what_is_not_there_is_refused_wherever_it_stands(
+    built: Path, tmp_path: Path, name: str, value: int
+) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    file = store.load(folder).place / f"{name}.npy"
+    whole = np.load(file)
+    for at in {0, whole.size // 2, whole.size - 1}:
+        array = whole.copy()
+        array.reshape(-1)[at] = value
+        np.save(file, array)
+        if name == "coordination.parents" and value == -1:
+            continue  # a chain may have no coordination
+        with pytest.raises(FormatError, match=f"{name} .*; build the corpus again"):
+            Engine.load(str(folder))
+
+
+@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.kind == "f8"])
+def test_what_is_no_number_is_refused_wherever_it_stands(built: Path, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    file = store.load(folder).place / f"{name}.npy"
+    array = np.load(file)
+    for value in (np.nan, np.inf):
+        if not array.size or (FORMS[name].or_nan and np.isnan(value)):
+            continue
+        array.reshape(-1)[array.size // 2] = value
+        np.save(file, array)
+        with pytest.raises(MotionMindError, match=name):
+            Engine.load(str(folder))
+
+
+def test_arrays_are_checked_once_and_again_when_a_file_is_another(built: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    Engine.load(str(folder))
+    mark = store.load(folder).place / versions.CHECKED
+    assert not mark.exists()  # files as new as this may change and keep their times
+    time.sleep(2.1)
+    Engine.load(str(folder))
+    assert store.load(folder).is_checked
+    written = mark.stat().st_mtime_ns
+    Engine.load(str(folder))
+    assert mark.stat().st_mtime_ns == written
+    file = mark.with_name("bridges.targets.npy")
+    before = file.stat()
+    array = np.load(file)
+    array[3] = 10**6
+    with file.open("r+b") as same:
+        np.save(same, array)
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    with pytest.raises(FormatError, match=r"bridges\.targets holds an index of what is not there"):
+        Engine.load(str(folder))
+
+
+def test_a_corpus_that_cannot_be_written_to_is_checked_each_time(built: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    mark = store.load(folder).place / versions.CHECKED
+    mark.mkdir()
+    time.sleep(2.1)
+    Engine.load(str(folder))
+    assert not store.load(folder).is_checked

@@ -1,0 +1,230 @@
+"""No fault of the cache of compiled code ends a run, or is in the way of the next one."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import random
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import motionmind
+from motionmind import files
+from motionmind import jit as door
+
+PACKAGE = Path(motionmind.__file__).parent
+# It prints what functions of two rooms return, and how many of them were compiled, and not found.
+PROGRAM = """
+import numpy as np
+from motionmind.body.capsules import radius_at
+from motionmind.geometry.distances import squared_distance
+from motionmind.geometry.segments import nearest_points
+print(nearest_points(np.zeros((2, 3)), np.ones((2, 3))))
+print(squared_distance(np.ones((2, 4)), np.zeros((2, 4))))
+print(radius_at(np.ones(2), 0.5))
+print(sum(sum(one._cache_misses.values()) for one in (nearest_points, squared_distance, radius_at)))
+"""
+
+
+def run(home: Path, program: str = PROGRAM, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a program whose caches and temporary files are in a folder."""
+    places = {"XDG_CACHE_HOME": str(home / "cache"), "TMPDIR": str(home / "tmp"), "PYTHONPATH": str(PACKAGE.parent)}
+    (home / "tmp").mkdir(exist_ok=True)
+    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    return subprocess.run(
+        [sys.executable, "-c", program], env=kept | places | environment, capture_output=True, text=True, check=True
+    )
+
+
+def kept(home: Path) -> list[Path]:
+    return sorted(home.rglob("*.nbc"))
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home in which the functions are compiled."""
+    home = tmp_path_factory.mktemp("compiled")
+    first, again = run(home), run(home)
+    assert kept(home)
+    assert first.stdout.split()[-1] == "3"
+    assert again.stdout.split()[-1] == "0"  # found
+    assert first.stderr == again.stderr == ""
+    return home
+
+
+def emptied(file: Path, rng: random.Random) -> None:
+    file.write_bytes(b"")
+
+
+def cut(file: Path, rng: random.Random) -> None:
+    file.write_bytes(file.read_bytes()[: rng.randrange(1, file.stat().st_size)])
+
+
+def random_bytes(file: Path, rng: random.Random) -> None:
+    file.write_bytes(rng.randbytes(file.stat().st_size))
+
+
+def a_bit_turned(file: Path, rng: random.Random) -> None:
+    data = bytearray(file.read_bytes())
+    data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    file.write_bytes(data)
+
+
+def of_another(file: Path, rng: random.Random) -> None:
+    """What is unpickled, and is no code."""
+    data = b"\x80\x04N."
+    file.write_bytes(door.hashlib.sha256(data).digest() + data)
+
+
+def a_folder(file: Path, rng: random.Random) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+@pytest.mark.parametrize("damage", [emptied, cut, random_bytes, a_bit_turned, of_another])
+def test_damaged_code_is_thrown_away_compiled_again_and_said_once(
+    compiled: Path, tmp_path: Path, damage: Callable[[Path, random.Random], None]
+) -> None:
+    home = tmp_path / "home"
+    shutil.copytree(compiled, home)
+    rng = random.Random(0)
+    before = {file: file.read_bytes() for file in kept(home)}
+    for file in before:
+        damage(file, rng)
+    told = run(home)
+    assert told.stdout == run(compiled).stdout.replace("\n0\n", "\n3\n")
+    assert told.stderr.count("was damaged") == 1
+    assert told.stderr.count("\n") == 1
+    assert kept(home) == list(before)
+    again = run(home)
+    assert (again.stdout.split()[-1], again.stderr) == ("0", "")
+
+
+def test_code_that_cannot_be_read_is_compiled_each_time(compiled: Path, tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    shutil.copytree(compiled, home)
+    for file in kept(home):
+        a_folder(file, random.Random(0))
+    for _ in range(2):
+        told = run(home)
+        assert told.stdout.split()[-1] == "3"
+        assert told.stderr.count("cannot be kept") == 1
+
+
+@pytest.fixture
+def untouched() -> Iterator[None]:
+    """Check that nothing was written into the package, whose files of bytecode may come and go."""
+
+    def listed() -> set[Path]:
+        return {path for path in PACKAGE.rglob("*") if path.suffix != ".pyc" and path.name != "__pycache__"}
+
+    before = listed()
+    yield
+    assert listed() - before == set()
+
+
+def a_file(place: Path) -> None:
+    place.write_text("not a folder")
+
+
+def in_a_file(place: Path) -> None:
+    place.mkdir()
+    (place / "motionmind").write_text("not a folder")
+
+
+def a_loop_of_links(place: Path) -> None:
+    place.symlink_to(place)
+
+
+@pytest.mark.parametrize("obstacle", [a_file, in_a_file, a_loop_of_links])
+@pytest.mark.usefixtures("untouched")
+def test_where_the_cache_can_be_no_folder_temporary_files_hold_it(
+    tmp_path: Path, obstacle: Callable[[Path], None]
+) -> None:
+    obstacle(tmp_path / "cache")
+    assert run(tmp_path).stderr == ""
+    assert kept(tmp_path / "tmp")
+    assert run(tmp_path).stdout.split()[-1] == "0"
+
+
+@pytest.mark.usefixtures("untouched")
+def test_where_nothing_can_be_kept_it_is_compiled_each_time_and_said_once(tmp_path: Path) -> None:
+    a_file(tmp_path / "cache")
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        program = f"import tempfile; tempfile.tempdir = {str(tmp_path / 'cache')!r}\n{PROGRAM}"
+        told = run(tmp_path, program, **{name: str(tmp_path / "cache")})
+        assert told.stderr.count("compiled code can be kept neither in") == 1
+        assert told.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("untouched")
+def test_a_full_disk_is_no_reason_to_fail(tmp_path: Path) -> None:
+    # No file may be longer than some bytes: writing fails as it does where a disk is full.
+    limit = "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+    limit += f"resource.setrlimit(resource.RLIMIT_FSIZE, (1000, {resource.RLIM_INFINITY}))\n"
+    told = run(tmp_path, limit + PROGRAM)
+    assert told.stdout.split()[-1] == "3"
+    assert told.stderr.count("cannot be kept") == 1
+    assert told.stderr.count("\n") == 1
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), OSError(errno.EROFS, "Read-only")])
+def test_code_that_cannot_be_written_at_any_step_is_done_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: OSError
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for name in ("open", "fsync", "fdopen"):
+        door._folder.cache_clear()
+        door._say.cache_clear()
+        with monkeypatch.context() as patch, caplog.at_level(logging.WARNING):
+            patch.setattr(files.os, name, failing(error))
+            assert door.jit(lambda x: 2.0 * x)(4.0) == 8.0
+        assert kept(tmp_path) == []
+    door._folder.cache_clear()
+
+
+def failing(error: OSError) -> Callable[..., object]:
+    def instead(*_: object, **__: object) -> object:
+        raise error
+
+    return instead
+
+
+def test_many_processes_that_compile_at_once_all_succeed(tmp_path: Path) -> None:
+    # Each compiles for types of its own first, then for those of all.
+    program = """
+import sys
+import numpy as np
+from motionmind.geometry.distances import squared_distance
+kinds = [np.float32, np.float64, np.int32, np.int64]
+first = int(sys.argv[1])
+for kind in kinds[first:] + kinds[:first]:
+    print(squared_distance(np.ones((2, 4), kind), np.zeros((2, 4), kind)))
+print(sum(squared_distance._cache_misses.values()))
+"""
+    places = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": str(PACKAGE.parent)}
+    kept_environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+
+    def start(first: int) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-c", program, str(first)],
+            env=kept_environment | places,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    for is_kept in (False, True):
+        outputs = [process.communicate() for process in [start(first) for first in range(4)]]
+        assert {error for _, error in outputs} == {""}
+        assert {tuple(sorted(out.splitlines()[:4])) for out, _ in outputs} == {("8.0",) * 4}
+        if is_kept:
+            assert {out.splitlines()[-1] for out, _ in outputs} == {"0"}

@@ -1,0 +1,250 @@
+"""The command line works whatever standard error is, whatever files are called, and whatever numbers it is given."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from command_line import Run
+
+import motionmind
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.cli.application import app
+from motionmind.cli.types import Moves, Number, Numbers, Point, Size, Span, Whole
+from motionmind.formats import read_motion, write_motion
+from motionmind.geometry import rotations as rot
+
+ROOT = Path(motionmind.__file__).parents[1]
+BODY = human23()
+POSTURES = ROOT / "corpora" / "ballet" / "postures"
+A, B = POSTURES / "arabesque.json", POSTURES / "fifth.json"
+DIGITS = "9" * 5000
+
+
+def motion(name: str = "clip", frames: int = 12) -> Motion:
+    angles = np.linspace(0.0, 1.0, frames)
+    rotations = np.tile(rot.IDENTITY, (frames, len(BODY), 1))
+    rotations[:, 5] = rot.about_vertical(angles)
+    return Motion(BODY, rotations, np.zeros((frames, 3)), np.arange(frames) / 30.0, name)
+
+
+# --- standard error ---------------------------------------------------------------------------------------------------
+
+
+def shell(folder: Path, line: str) -> subprocess.CompletedProcess[bytes]:
+    """Run a line of a shell in a folder; `motionmind` is the command line."""
+    function = f'motionmind() {{ "{sys.executable}" -m motionmind "$@"; }}; '
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(folder / "home")}
+    return subprocess.run(["sh", "-c", function + line], cwd=folder, env=environment, capture_output=True, check=False)
+
+
+WORK = [
+    ("motionmind convert clip.json clip.bvh", ["clip.bvh"]),
+    ("motionmind corpus build mine clip.json", ["home/corpora/mine/manifest.json"]),
+    (
+        f"motionmind tween {A} {B} --corpus ballet --moves 4 -o out.json --report report.json",
+        ["out.json", "report.json"],
+    ),
+    ("motionmind convert clip.json nothing.xyz", []),
+    ("motionmind convert nowhere.json clip.bvh", []),
+    ("motionmind nothing", []),
+]
+
+
+@pytest.mark.parametrize(("line", "written"), WORK)
+def test_standard_error_that_is_closed_or_full_changes_nothing(tmp_path: Path, line: str, written: list[str]) -> None:
+    for number, errors in enumerate(["2>errors", "2>&-", "2>/dev/full"]):
+        if "full" in errors and not Path("/dev/full").exists():
+            continue
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        write_motion(folder / "clip.json", motion())
+        done = shell(folder, f"{line} {errors}")
+        assert done.returncode == (0 if written else 2), (errors, done.stderr)
+        for name in written:
+            assert (folder / name).read_bytes() == (tmp_path / "0" / name).read_bytes() or name == "report.json"
+        assert not (folder / "clip.bvh").exists() or "clip.bvh" in written
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+def call(folder: Path, *words: str | bytes | Path) -> tuple[int, bytes]:
+    """Run the command line in another process, for no test's report may hold such names; return code and errors."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(folder / "home")}
+    command = [sys.executable, "-m", "motionmind", *words]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
+    assert b"Traceback" not in done.stderr, ascii(done.stderr)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "suffix"), [(b"caf\xe9", b".json"), (b"\xff\xfe", b".bvh"), (b"\xc3\x28\x80", b".npz")]
+)
+def test_files_whose_names_are_no_utf_8_are_read_and_written(tmp_path: Path, name: bytes, suffix: bytes) -> None:
+    source = name + suffix
+    write_motion(tmp_path / f"clip{suffix.decode()}", motion())
+    (tmp_path / f"clip{suffix.decode()}").rename(tmp_path / os.fsdecode(source))
+    for target in (b".json", b".bvh", b".glb", b".npz"):
+        assert call(tmp_path, "convert", source, b"to-" + name + target)[0] == 0
+    for target in (b".html", b".svg", b".png"):
+        assert call(tmp_path, "render", source, "-o", b"to-" + name + target)[0] == 0
+    assert call(tmp_path, "corpus", "build", "mine", source)[0] == 0
+    assert call(tmp_path, "corpus", "info", "mine")[0] == 0
+    ends = [source + b"@0", source + b"@9"]
+    files = ["--report", b"report-" + name, "-o", name + b"-out.bvh"]
+    assert call(tmp_path, "tween", *ends, "--corpus", "mine", "--moves", "1", *files)[0] == 0
+    made = os.fsdecode(name + b"-out.bvh")
+    assert read_motion(tmp_path / made).name == made.removesuffix(".bvh").encode("utf-8", "backslashreplace").decode()
+    for missing in (b"no-" + source, b"no-" + name):
+        code, errors = call(tmp_path, "convert", missing, "out.json")
+        assert (code, errors.count(b"\n")) == (2, 1)
+
+
+def test_words_that_are_no_utf_8_are_an_error_in_a_line(tmp_path: Path) -> None:
+    write_motion(tmp_path / "clip.json", motion())
+    strange = b"caf\xe9"
+    for words in (["--title", strange], ["--author", strange], ["--mix", strange]):
+        code, errors = call(tmp_path, "corpus", "build", "mine", "clip.json", *words)
+        assert (code, errors.count(b"error: ")) == (2, 1)
+    for command in (["corpus", "info", strange], ["corpus", "build", strange, "clip.json"], [strange]):
+        code, errors = call(tmp_path, *command)
+        assert (code, errors.count(b"\n")) == (2, 1)
+    assert not list(tmp_path.glob("home/corpora/*/manifest.json"))
+
+
+# --- foreign text -----------------------------------------------------------------------------------------------------
+
+FOREIGN = "\x1b]0;owned\x07 \u202egnp.\x9b31m \x08\x7f"
+UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) -> None:
+    write_motion(tmp_path / "clip.json", replace(motion(), name=FOREIGN))
+    joints = tuple(f"{FOREIGN}{number}" for number in range(len(BODY)))
+    body = Skeleton("strange", joints, BODY.parents, BODY.offsets, BODY.tips)
+    write_motion(tmp_path / "strange.json", replace(motion(), skeleton=body))
+    about = ["--title", FOREIGN, "--author", FOREIGN, "--source", FOREIGN, "--licence", FOREIGN]
+    calls: list[tuple[int, tuple[object, ...]]] = [
+        (0, ("corpus", "build", "mine", "clip.json", *about)),
+        (0, ("corpus", "list")),
+        (0, ("corpus", "info", "mine")),
+        (0, ("corpus", "check", "mine")),
+        (0, ("corpus", "build", "strange", "strange.json")),
+        (0, ("corpus", "check", "strange")),
+        (2, ("corpus", "build", "both", "strange.json", "clip.json")),
+        (2, ("tween", f"{FOREIGN}.json", "clip.json", "--corpus", "mine")),
+        (2, ("tween", "clip.json@0", "clip.json@9", "--corpus", FOREIGN)),
+        (2, ("tween", "strange.json@0", "strange.json@9", "--corpus", "mine")),
+        (2, (FOREIGN,)),
+    ]
+    for code, words in calls:
+        ran = run(*words)
+        assert ran.code == code, ran.err
+        assert UNSAFE.findall(ran.out + ran.err) == []
+    info = run("corpus", "info", "mine", "--json")
+    assert (info.json["title"], UNSAFE.findall(info.out)) == (FOREIGN, [])  # whole, escaped as JSON does
+    assert json.loads((tmp_path / "home/corpora/mine/manifest.json").read_bytes())["title"] == FOREIGN
+
+
+@pytest.mark.parametrize("name", ["secret", "secret.txt", "secret.score.txt", ".netrc"])
+def test_an_include_of_what_is_no_score_shows_nothing_of_it(tmp_path: Path, run: Run, name: str) -> None:
+    (tmp_path / name).write_text("password hunter2\n")
+    for file in (name, tmp_path / name):
+        (tmp_path / "a.score").write_text(f"title A\nbody human23\ninclude {file}\n")
+        ran = run("compose", "a.score", "-o", "out.json")
+        assert (ran.code, "hunter2" in ran.err) == (2, False)
+        assert ran.err.startswith("error: a.score:3: ")
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+NUMBERS = (Moves, Number, Numbers, Point, Size, Span, Whole, click.types.IntParamType, click.types.FloatParamType)
+
+
+def commands(group: click.Group, path: tuple[str, ...] = ()) -> list[tuple[tuple[str, ...], click.Command]]:
+    found: list[tuple[tuple[str, ...], click.Command]] = []
+    for name, command in group.commands.items():
+        found += commands(command, (*path, name)) if isinstance(command, click.Group) else [((*path, name), command)]
+    return found
+
+
+OPTIONS = [
+    pytest.param(path, command, parameter, id=f"{' '.join(path)} {parameter.opts[-1]}")
+    for path, command in commands(app)
+    for parameter in command.params
+    if isinstance(parameter, click.Option) and isinstance(parameter.type, NUMBERS)
+]
+
+
+@pytest.mark.parametrize(("path", "command", "parameter"), OPTIONS)
+@pytest.mark.parametrize("value", [DIGITS, f"-{DIGITS}", f"{DIGITS}.5", f"{DIGITS}..{DIGITS}", f"{DIGITS}MB", "1e999"])
+def test_a_number_that_nothing_can_hold_is_an_error_in_a_short_line(
+    run: Run, path: tuple[str, ...], command: click.Command, parameter: click.Option, value: str
+) -> None:
+    arguments = ["x.json" for one in command.params if isinstance(one, click.Argument)]
+    ran = run(*path, *arguments, f"{parameter.opts[-1]}={value}")
+    assert ran.code == 2
+    assert ran.err.startswith("error: ")
+    assert ran.err.count("\n") == 1
+    assert len(ran.err) < 600
+
+
+def test_options_of_numbers_are_of_types_that_know_their_bounds() -> None:
+    assert len(OPTIONS) > 40
+    for parameter in (values for _, _, values in (option.values for option in OPTIONS)):
+        assert type(parameter.type) not in (click.types.IntParamType, click.types.FloatParamType), parameter.opts
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--memory", "9" * 400], "is too large"),
+        (["--memory", "9" * 400 + "GB"], "is too large"),
+        (["--memory", "9" * 40], "memory must be a whole number from 1 to 1125899906842624"),
+        (["--alternatives", "1001"], "1001 is not in the range 1<=x<=1000"),
+        (["--alternatives", "9" * 15], "is not in the range 1<=x<=1000"),
+        (["--lambda", "1e308"], "is not in the range 0<=x<=1000000.0"),
+        (["--tau", "1e300"], "is not in the range"),
+        (["--avoid", f"left_hip={DIGITS}"], "avoid left_hip=9999"),
+        (["--seed", DIGITS], "is too large"),
+        (["--duration", DIGITS], "is too large"),
+        (["--duration", "nan"], "nan is not a finite number"),
+        (["--duration", "inf"], "inf is not a finite number"),
+    ],
+)
+def test_the_line_says_what_is_wrong(run: Run, words: list[str], message: str) -> None:
+    ran = run("tween", A, B, "--corpus", "ballet", *words)
+    assert ran.code == 2
+    assert message in ran.err
+    assert ran.err.count("\n") == 1
+    assert DIGITS[:300] not in ran.err
+
+
+def test_the_greatest_price_is_no_reason_for_no_path(run: Run) -> None:
+    for option in ("--lambda", "--beta", "--tau", "--bridge-price", "--guide"):
+        assert run("tween", A, B, "--corpus", "ballet", "--moves", 4, option, 1e6).code == 0
+
+
+def test_a_score_may_not_repeat_so_often_that_nobody_can_count_it(tmp_path: Path, run: Run) -> None:
+    shutil.copytree(ROOT / "corpora" / "walk-hexapod", tmp_path, dirs_exist_ok=True)
+    text = (tmp_path / "insect.score").read_text("utf-8")
+    for times in (DIGITS, "1001", "0"):
+        assert "cycle, 4 times" in text
+        (tmp_path / "insect.score").write_text(text.replace("cycle, 4 times", f"cycle, {times} times"), "utf-8")
+        ran = run("compose", "insect.score", "-o", "out.json")
+        assert ran.code == 2
+        assert "insect.score:" in ran.err
+        assert ran.err.count("\n") == 1
+        assert DIGITS[:300] not in ran.err

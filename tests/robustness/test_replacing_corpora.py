@@ -1,0 +1,283 @@
+"""A corpus that is replaced is the old one or the new one, whatever happens on the way and whoever looks."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+
+import pytest
+import saved_corpora
+from faults import failing_at
+from saved_corpora import MANIFEST, arrays, as_in_0_1, names, seed_of
+
+from motionmind import files
+from motionmind.corpus import store, versions
+from motionmind.errors import CorpusError, FormatError
+
+PROGRAM = Path(saved_corpora.__file__)
+WHOLE = ["manifest.json", "part.targets.npy", "rotations.npy", "states.npy"]
+# Calls that change what is on disk. Others fail or are repeated without a trace.
+CALLS = ("rename", "unlink", "unlinkat", "rmdir", "mkdir", "write", "fsync", "flock")
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """Where a corpus is to be, among a user's corpora."""
+    return tmp_path / "home" / "corpora" / "arms"
+
+
+def nothing(folder: Path) -> None:
+    """No corpus is there yet."""
+
+
+def saved(folder: Path) -> None:
+    """A corpus was replaced before."""
+    store.save(folder, MANIFEST, arrays(0))
+    store.save(folder, MANIFEST, arrays(1))
+
+
+def saved_by_0_1(folder: Path) -> None:
+    """A corpus of 0.1 is there."""
+    store.save(folder, MANIFEST, arrays(1))
+    as_in_0_1(folder)
+
+
+def check(folder: Path, before: Callable[[Path], None]) -> None:
+    """Check that all is old or all new, that nothing else is listed, and that the next build mends the rest."""
+    listed = {name for name, place in store.list_corpora(folder.parents[1]).items() if place.parent == folder.parent}
+    assert listed <= {"arms"}
+    if listed or before is not nothing:
+        assert seed_of(folder) in (1, 2)
+    for temporary in folder.glob(".motionmind-*"):
+        os.utime(temporary, (time.time() - 120.0,) * 2)  # no younger one is taken for a leftover
+    store.save(folder, MANIFEST, arrays(3))
+    assert seed_of(folder) == 3
+    assert sorted(Path(name).name for name in names(folder.parent)) == WHOLE
+
+
+def run(folder: Path, change: int = 0, tracer: tuple[str, ...] = ()) -> int:
+    words = [f"folder={folder}", "seed=2", f"change={change}"]
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(Path(files.__file__).parents[1])}
+    done = subprocess.run(
+        [*tracer, sys.executable, str(PROGRAM), *words], env=environment, capture_output=True, check=False
+    )
+    assert done.returncode in (0, -9, 137), done.stderr.decode()
+    return done.returncode
+
+
+@pytest.mark.parametrize("before", [nothing, saved, saved_by_0_1])
+def test_a_kill_before_any_change_of_the_disk_leaves_old_or_new(mine: Path, before: Callable[[Path], None]) -> None:
+    for change in count(1):
+        shutil.rmtree(mine.parent, ignore_errors=True)
+        before(mine)
+        ended = run(mine, change) == 0
+        check(mine, before)
+        if ended:
+            break
+    assert change > 8
+
+
+@pytest.mark.skipif(not shutil.which("strace"), reason="there is no strace")
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("before", [saved, saved_by_0_1])
+def test_a_kill_at_any_call_of_the_system_leaves_old_or_new(
+    mine: Path, before: Callable[[Path], None], call: str
+) -> None:
+    for number in count(1):
+        shutil.rmtree(mine.parent, ignore_errors=True)
+        before(mine)
+        kill = (
+            "strace",
+            "-f",
+            "-o",
+            os.devnull,
+            "-e",
+            f"trace={call}",
+            "-e",
+            f"inject={call}:signal=KILL:when={number}",
+        )
+        ended = run(mine, tracer=kill) == 0
+        check(mine, before)
+        if ended:
+            break
+    assert number > 1 or call in ("unlink", "rmdir", "unlinkat")
+
+
+@pytest.mark.parametrize("before", [saved, saved_by_0_1])
+def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
+    mine: Path, monkeypatch: pytest.MonkeyPatch, before: Callable[[Path], None]
+) -> None:
+    before(mine)
+    there = names(mine.parent)
+    calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], store.np: ["save"]}
+    for owner, name in [(owner, name) for owner, all_of_it in calls.items() for name in all_of_it]:
+        for error in (OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()):
+            for number in count(1):
+                with monkeypatch.context() as patch:
+                    patch.setattr(owner, name, failing_at(number, getattr(owner, name), error))
+                    try:
+                        store.save(mine, MANIFEST, arrays(2))
+                        break
+                    except (CorpusError, KeyboardInterrupt):
+                        pass
+                if seed_of(mine) == 1:
+                    assert names(mine.parent) == there
+                else:  # the folder could not be flushed after the move
+                    assert (name, seed_of(mine)) == ("fsync", 2)
+                    assert sorted(Path(file).name for file in names(mine.parent)) == WHOLE
+                    break
+            shutil.rmtree(mine)
+            before(mine)
+
+
+# --- leftovers --------------------------------------------------------------------------------------------------------
+
+
+def test_what_0_1_left_when_it_was_killed_is_put_back_then_removed(mine: Path) -> None:
+    saved_by_0_1(mine)
+    shutil.copytree(mine, mine.with_name(".arms-0123456789ab"))
+    diary = mine.with_name(".arms-0123456789ac")
+    diary.mkdir()
+    (diary / "diary.txt").write_text("dear diary")
+    mine.rename(mine.with_name(".arms-0123456789ab-old"))
+    assert {"arms", ".arms-0123456789ab", ".arms-0123456789ac"}.isdisjoint(store.list_corpora(mine.parents[1]))
+    with pytest.raises(ValueError, match="Object arrays"):
+        store.save(mine, MANIFEST, {"one": store.np.array([None])})
+    assert seed_of(mine) == 1
+    store.save(mine, MANIFEST, arrays(2))
+    assert seed_of(mine) == 2
+    assert sorted(path.name for path in mine.parent.iterdir()) == [".arms-0123456789ac", "arms"]
+
+
+def test_a_version_in_use_is_removed_once_nobody_uses_it(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    with versions.hold(mine / "1") as there:
+        assert there
+        store.save(mine, MANIFEST, arrays(2))
+        assert names(mine / "1") == WHOLE[1:]
+    store.save(mine, MANIFEST, arrays(3))
+    assert [path.name for path in mine.iterdir() if path.is_dir()] == ["3"]
+    with versions.hold(mine / "1") as there:
+        assert not there
+
+
+def test_a_version_that_is_being_written_is_not_removed(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    with versions.new_version(mine) as unfinished:
+        store.save(mine, MANIFEST, arrays(2))
+        assert unfinished.is_dir()
+    store.save(mine, MANIFEST, arrays(3))
+    assert not unfinished.exists()
+
+
+def test_a_folder_of_another_content_in_a_version_is_never_removed(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    (mine / "1" / "diary.txt").write_text("dear diary")
+    (mine / "2026").mkdir()
+    (mine / "2026" / "photograph.png").write_bytes(b"")
+    for stranger in ("1/diary.txt", "2026/photograph.png"):
+        with pytest.raises(CorpusError, match="which is no part of a built corpus; it is not replaced"):
+            store.save(mine, MANIFEST, arrays(2))
+        (mine / stranger).unlink(missing_ok=True)
+    store.save(mine, MANIFEST, arrays(2))
+
+
+def test_temporary_files_of_dead_processes_are_removed_and_of_living_ones_kept(tmp_path: Path) -> None:
+    program = "import os; print(os.getpid())"
+    dead = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    token, hour, week = "0" * 16, 3600.0, 7 * 86400.0
+    ages = {
+        f".motionmind-{os.getpid()}-{token}.tmp": (hour, True),
+        f".motionmind-{os.getpid()}-{'1' * 16}.tmp": (week, False),
+        f".motionmind-{dead.stdout.strip()}-{token}.tmp": (hour, False),
+        f".motionmind-{dead.stdout.strip()}-{'1' * 16}.tmp": (0.0, True),
+        f".motionmind-{token}.tmp": (week, False),  # as 0.1 called them
+        f".motionmind-{'9' * 30}-{token}.tmp": (hour, False),
+        ".motionmind-mine.tmp": (week, True),
+    }
+    for name, (age, _) in ages.items():
+        (tmp_path / name).write_bytes(b"")
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
+    files.write_atomically(tmp_path / "new", b"")
+    assert names(tmp_path) == sorted(["new", *(name for name, (_, stays) in ages.items() if stays)])
+
+
+def test_a_file_that_another_program_holds_open_is_replaced_when_it_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    denied = PermissionError(errno.EACCES, "in use")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", failing_at(1, Path.replace, denied))
+        files.write_atomically(tmp_path / "file", b"new")
+    assert (tmp_path / "file").read_bytes() == b"new"
+
+
+# --- readers and writers at once --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def writers(mine: Path) -> Iterator[None]:
+    """Two processes that replace a corpus without end, by what holds a seed of its own."""
+    store.save(mine, MANIFEST, arrays(0))
+    as_in_0_1(mine)
+    program = (
+        "import sys; from pathlib import Path; from saved_corpora import *\n"
+        "for seed in range(int(sys.argv[2]), 10**9, 2): store.save(Path(sys.argv[1]), MANIFEST, arrays(seed))"
+    )
+    paths = os.pathsep.join([str(PROGRAM.parent), str(Path(files.__file__).parents[1])])
+    running = [
+        subprocess.Popen([sys.executable, "-c", program, str(mine), str(first)], env=os.environ | {"PYTHONPATH": paths})
+        for first in (1, 2)
+    ]
+    yield
+    for process in running:
+        assert process.poll() is None  # neither failed
+        process.kill()
+        process.wait()
+
+
+def test_2000_loads_beside_two_writers_are_each_of_one_version(mine: Path, writers: None) -> None:
+    until = time.monotonic() + 60.0
+    while seed_of(mine) == 0 and time.monotonic() < until:
+        time.sleep(0.01)
+    seeds: list[int] = []
+    failures: list[BaseException] = []
+
+    def read() -> None:
+        try:
+            seeds.extend(seed_of(mine) for _ in range(1000))
+        except BaseException as error:  # told below, in the test's own thread
+            failures.append(error)
+
+    readers = [threading.Thread(target=read) for _ in range(2)]
+    for reader in readers:
+        reader.start()
+    for reader in readers:
+        reader.join()
+    assert not failures
+    assert len(seeds) == 2000
+    assert len(set(seeds)) > 20  # it was replaced meanwhile
+
+
+def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    shutil.rmtree(mine / "1")
+    with pytest.raises(FormatError, match=re.escape("there is no folder 1 beside it; build the corpus again")):
+        store.load(mine)
+
+
+def test_arrays_that_were_loaded_outlive_their_version(mine: Path) -> None:
+    store.save(mine, MANIFEST, arrays(1))
+    _, found, *_ = store.load(mine)
+    store.save(mine, MANIFEST, arrays(2))
+    assert not (mine / "1").exists()
+    assert all((array == 1).all() for array in found.values())

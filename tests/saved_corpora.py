@@ -1,0 +1,74 @@
+"""Small corpora on disk, and a program that saves one and is killed on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.corpus import store
+
+MANIFEST = {"name": "arms", "clips": []}
+# What changes the disk, as Python reports it before it asks the system.
+CHANGES = {"open", "os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate", "os.chmod"}
+
+
+def arrays(seed: int) -> dict[str, NDArray[Any]]:
+    """Arrays that hold nothing but the seed, so that a mixture shows."""
+    return {name: np.full((7, 3), seed) for name in ("rotations", "states", "part.targets")}
+
+
+def seed_of(folder: Path) -> int:
+    """The seed of the corpus in a folder; fails if it is a mixture."""
+    _, found, *_ = store.load(folder)
+    assert found.keys() == arrays(0).keys()
+    (seed,) = {int(value) for array in found.values() for value in array.ravel()}
+    return seed
+
+
+def as_in_0_1(folder: Path) -> None:
+    """Lay a saved corpus out as 0.1 did: the arrays beside the manifest."""
+    manifest = json.loads((folder / store.MANIFEST).read_text("utf-8"))
+    version = folder / str(manifest.pop("folder"))
+    for file in version.glob("*.npy"):
+        file.rename(folder / file.name)
+    shutil.rmtree(version)
+    (folder / store.MANIFEST).write_text(json.dumps(manifest | {"version": 1}), "utf-8")
+
+
+def names(folder: Path) -> list[str]:
+    """All files in a folder and below."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def kill_before(change: int) -> None:
+    """Kill this process before it changes the disk for the n-th time, counted from 1."""
+    seen = 0
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        nonlocal seen
+        if event in CHANGES and (event != "open" or arguments[2] & (os.O_WRONLY | os.O_RDWR)):
+            seen += 1
+            if seen == change:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    sys.addaudithook(watch)
+
+
+def main(words: Mapping[str, str]) -> None:
+    """Save a corpus in a folder, and be killed before a change if one is given."""
+    if change := int(words.get("change", 0)):
+        kill_before(change)
+    store.save(Path(words["folder"]), MANIFEST, arrays(int(words["seed"])))
+
+
+if __name__ == "__main__":
+    main(dict(word.split("=", 1) for word in sys.argv[1:]))
