@@ -58,8 +58,9 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     """
     if len(times) == 1:
         return np.broadcast_to(keys[0], (len(at), *keys.shape[1:])).copy()
-    if np.isin(at, times).all():
-        return keys[np.searchsorted(times, at)]
+    knots = np.minimum(np.searchsorted(times, at), len(times) - 1)
+    if np.array_equal(times[knots], at):
+        return keys[knots]
     if len(times) > _LONG:
         return _by_pieces(rotation_spline, times, keys, at)
     from motionmind.geometry.charts import vectors_around  # numba is slow to import

@@ -16,6 +16,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
+from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
@@ -158,7 +159,7 @@ def carry(
     bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
-    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
+    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, fps)
     return Carried(start, off, bearing.holds(fps), heights, bound)
 
 
@@ -170,14 +171,12 @@ def _with_detail(
     flying: Bools,
     root: Floats,
     off: Floats,
-    floor: Floats,
     fps: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
     If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
-    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height; one
-    that would swing into the floor is lifted, and not the body with it.
+    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height.
 
     Args:
         plain: the body without detail.
@@ -187,7 +186,6 @@ def _with_detail(
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
         off: displacements of feet without detail [N, feet, 3], metres.
-        floor: height of the floor [N], metres.
         fps: frames a second.
     """
     fades = fade_at_ends(len(loads), (True, True), fps)
@@ -200,8 +198,6 @@ def _with_detail(
     moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
     kept = reached + loads * (heights - reached)
-    sunk = np.maximum(floor[:, None] - kept, 0.0)
-    kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None] if kept.size else 0.0
     off = off.copy()
     off[..., 1] += kept - reached
     return moved, off, kept
@@ -341,12 +337,12 @@ def _reach_rows(
         aim = end - hip
         aim[:, [0, 2]] += bearing.targets[:, number]
         aim[:, 1] += floor - shape.low[:, number]
-        leans = np.linalg.norm(bearing.targets[:, number] - root[:, [0, 2]], axis=-1) / LEANS
-        straight = np.linalg.norm(end - hip, axis=-1) / foot.length(skeleton)
+        leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
+        straight = rot.norm(end - hip) / foot.length(skeleton)
         longest = np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
         longest *= foot.length(skeleton)
         leg = aim - root
-        far = np.linalg.norm(leg, axis=-1)
+        far = rot.norm(leg)
         along = leg / np.maximum(far, 1e-9)[:, None]
         short = (far > longest + 1e-6) & bearing.stands[:, number]
         target = np.sum(along * aim, axis=-1) - longest
@@ -356,4 +352,4 @@ def _reach_rows(
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
     """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    return position_rows(np.arange(len(targets)), np.tile(np.eye(3)[axis], (len(targets), 1)), targets, weights)
+    return position_rows(np.arange(len(targets)), np.eye(3)[axis], targets, weights)

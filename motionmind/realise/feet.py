@@ -354,14 +354,14 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, s
     """
     rotations, turned, places = posed
     out = rotations.copy()
-    for number, foot in enumerate(feet):
-        hip, knee, end = chain = foot.chain(skeleton)
-        thigh, shank = reach(
-            turned[:, hip], places[:, chain], places[:, end] + off[:, number], foot.hinge, soft[:, number]
-        )
-        thigh, shank = rot.mul(thigh, turned[:, hip]), rot.mul(shank, turned[:, knee])
-        out[:, hip] = rot.inv_mul(turned[:, skeleton.parents[hip]], thigh)
-        out[:, knee] = rot.inv_mul(thigh, shank)
-        if end < len(skeleton):
-            out[:, end] = rot.inv_mul(shank, turned[:, end])
+    if not feet:
+        return out
+    chains, hinges = np.array([foot.chain(skeleton) for foot in feet]), [foot.hinge for foot in feet]
+    (hips, knees, ends), hinge = chains.T, None if hinges[0] is None else np.array(hinges)
+    thigh, shank = reach(turned[:, hips], places[:, chains], places[:, ends] + off, hinge, soft)
+    thigh, shank = rot.mul(thigh, turned[:, hips]), rot.mul(shank, turned[:, knees])
+    out[:, hips] = rot.inv_mul(turned[:, np.array(skeleton.parents)[hips]], thigh)
+    out[:, knees] = rot.inv_mul(thigh, shank)
+    joints = ends < len(skeleton)
+    out[:, ends[joints]] = rot.inv_mul(shank[:, joints], turned[:, ends[joints]])
     return out

@@ -14,8 +14,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.realise.least_squares import bending_diagonals
 
 SHIFTS = 0.008  # metres that a foot may be off so that its knee keeps the fine detail of a movement
-STIRS = 2.0, 0.3  # rad/s^2 by which its acceleration may differ from its own, and share of that; chosen on cmu-05
-AROUND = 0.2  # seconds in which its own is seen
+STIRS = 2.0, 0.3  # rad/s^2 by which it may accelerate otherwise, and share of its own acceleration
+AROUND = 0.4  # seconds in which a knee's acceleration is seen: longer than detail; these were chosen on cmu-05
 LIFTS = 0.3  # seconds before and after a part would be too low, in which it is lifted
 EASES = 0.05  # seconds over which a knee that is too fast changes its speed
 
@@ -58,8 +58,9 @@ def slow_down(bends: Floats, stands: Bools, fixed: Bools, fastest: float, fps: f
 def keep_detail(bends: Floats, own: Floats, fixed: Bools, thigh: float, shank: float, fps: float) -> Floats:
     """Return bends [N] of a knee, radians, near the given ones, with the fine detail of its own [N].
 
-    The departure d from its own minimises sum_t (l (d - wanted) / SHIFTS)^2 + (d'' / a)^2, with l how far a leg's end
-    goes for its knee's bend, metres a radian, and a what its acceleration may differ by: STIRS.
+    The departure d from its own minimises sum_t (l (d - w) / SHIFTS)^2 + ((d'' - mean w'') / a)^2, with w the wanted
+    one, the mean of its acceleration taken AROUND, l how far a leg's end goes for its knee's bend, metres a radian, and
+    a what the acceleration may differ by: STIRS.
 
     Args:
         bends: wanted [N], radians.
@@ -73,15 +74,24 @@ def keep_detail(bends: Floats, own: Floats, fixed: Bools, thigh: float, shank: f
 
     widest = np.clip(np.maximum(bends, own), 0.0, 0.5 * np.pi)
     lever = thigh * shank * np.sin(widest) / distance_of(bends, thigh, shank)
-    quick = fps**2 * np.abs(np.diff(own, 2))
-    if len(quick) > 1:
-        quick = np.sqrt(smoothed(quick**2, AROUND, fps).clip(0.0))
-    diagonals = bending_diagonals((fps**2 / (STIRS[0] + STIRS[1] * quick)) ** 2)
+    quick = fps**2 * np.sqrt(_around(np.diff(own, 2) ** 2, fps).clip(0.0))
+    weights = (fps**2 / (STIRS[0] + STIRS[1] * quick)) ** 2
+    wanted = bends - own
+    turns = weights * _around(np.diff(wanted, 2), fps)
+    diagonals = bending_diagonals(weights)
     # A leg that is straight has no lever: how it bends is then told by the frames around.
     firm = np.where(fixed, 1e12, (lever / SHIFTS) ** 2 + 1e-3)
     diagonals[0] += firm
-    departure = solveh_banded(diagonals, firm * (bends - own), lower=True)
+    right = firm * wanted
+    for first, share in enumerate((1.0, -2.0, 1.0)):
+        right[first : first + len(turns)] += share * turns
+    departure = solveh_banded(diagonals, right, lower=True)
     return np.where(fixed, bends, np.clip(own + departure, 0.0, np.pi))
+
+
+def _around(values: Floats, fps: float) -> Floats:
+    """Return means [N] of values around each, within AROUND."""
+    return smoothed(values, AROUND, fps) if len(values) > 1 else values
 
 
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:

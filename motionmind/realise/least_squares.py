@@ -33,7 +33,7 @@ class Rows(NamedTuple):
 
 
 def position_rows(frames: Ints, directions: Floats, targets: Floats, weights: Floats) -> Rows:
-    """Return rows for how far along directions [R, 3] a trajectory is at some frames [R]: targets [R]."""
+    """Return rows for how far along directions [R, 3] or [3] a trajectory is at some frames [R]: targets [R]."""
     coefficients = np.zeros((len(frames), _BAND))
     coefficients[:, :3] = directions
     return Rows(frames, coefficients, targets, weights)

@@ -66,49 +66,50 @@ def stretched(now: Floats, wanted: Floats, length: Floats | float, soft: Floats 
 def reach(
     hip: Floats, leg: Floats, target: Floats, hinge: Floats | None = None, soft: Floats | float = SOFT
 ) -> tuple[Floats, Floats]:
-    """Return rotations [N, 4] of thigh and shank, in the world, that bring the leg's end to its target.
+    """Return rotations [N, ..., 4] of thighs and shanks, in the world, that bring the legs' ends to their targets.
 
     The knee bends about its own axis until the end is as far from the hip as the target, by the law of cosines; the
     leg then turns the shortest way towards it. A leg that is too short falls smoothly short of the target.
 
     Args:
-        hip: orientations of the hip in the world [N, 4].
-        leg: positions of hip, knee and end [N, 3, 3], metres.
-        target: positions for the end [N, 3], metres.
-        hinge: axis in the hip's frame about which the knee bends where the leg is all but straight [3]; None for that
-            of frames where it is not.
-        soft: of the leg's length: this near to its full length it stretches less than it would have to [N].
+        hip: orientations of the hips in the world [N, ..., 4].
+        leg: positions of hip, knee and end [N, ..., 3, 3], metres.
+        target: positions for the end [N, ..., 3], metres.
+        hinge: axis in the hip's frame about which each knee bends where the leg is all but straight [..., 3]; None for
+            that of frames where it is not.
+        soft: of the leg's length: this near to its full length it stretches less than it would have to [N, ...].
     """
-    thigh, shank = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 1]
+    start, middle, end = np.moveaxis(leg, -2, 0)
+    thigh, shank = middle - start, end - middle
     axis = _hinge(hip, thigh, shank, hinge)
     # Components along the axis do not change; across it, the bones and their angle form a triangle.
     along = np.sum(thigh * axis, axis=-1), np.sum(shank * axis, axis=-1)
     across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
     least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
-    now, wanted = rot.norm(leg[:, 2] - leg[:, 0]), rot.norm(target - leg[:, 0])
+    now, wanted = rot.norm(end - start), rot.norm(target - start)
     far = stretched(now, wanted, np.sqrt(least + product), soft)
     bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
     bend = rot.from_axis_angle(axis, bends[1] - bends[0])
-    turn = rot.between(thigh + rot.mul_vec(bend, shank), target - leg[:, 0])
+    turn = rot.between(thigh + rot.mul_vec(bend, shank), target - start)
     return turn, rot.mul(turn, bend)
 
 
 def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> Floats:
-    """Return unit axes [N, 3] about which a knee bends, from its bones [N, 3], metres.
+    """Return unit axes [N, ..., 3] about which knees bend, from their bones [N, ..., 3], metres.
 
-    In frames where the leg is all but straight the axis is the usual one, as seen from the hip [N, 4]: if that is not
-    given, that of other frames.
+    In frames where a leg is all but straight the axis is the usual one [..., 3], as seen from the hip [N, ..., 4]: if
+    that is not given, that of other frames.
     """
     normal = rot.cross(thigh, shank)
     if usual is None:
         usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
-    if np.linalg.norm(usual) < 1e-9:
-        # Straight in all frames: the body axis most nearly at right angles to the thigh, made exactly so.
-        bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
-        across = np.eye(3)[np.argmin(np.abs(bone))]
-        usual = across - bone * (across @ bone) / (bone @ bone)
+    # Straight in all frames: the body axis most nearly at right angles to the thigh, made exactly so.
+    bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
+    across = np.eye(3)[np.argmin(np.abs(bone), axis=-1)]
+    across -= bone * (np.sum(across * bone, axis=-1) / np.sum(bone * bone, axis=-1))[..., None]
+    usual = np.where(rot.norm(usual)[..., None] < 1e-9, across, usual)
     size = rot.norm(thigh) * rot.norm(shank)
-    normal += (HINGE * size)[:, None] * rot.mul_vec(hip, usual / np.linalg.norm(usual))
+    normal += (HINGE * size)[..., None] * rot.mul_vec(hip, usual / rot.norm(usual)[..., None])
     return np.asarray(normal / rot.norm(normal)[..., None])
 
 

@@ -102,7 +102,9 @@ def keep_limbs_apart(
     depths, directions = pair_depths(ends, capsules.radii, pairs)
     frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
     held = np.unique(np.concatenate([np.floor(given + 1e-6), np.ceil(given - 1e-6)])).astype(np.int64)
-    allowed = np.stack([np.interp(frames, held, depth[held]) for depth in depths.T], axis=1)
+    before = np.clip(np.searchsorted(held, frames, side="right") - 1, 0, len(held) - 2)
+    share = ((frames - held[before]) / np.diff(held)[before])[:, None]
+    allowed = (1.0 - share) * depths[held[before]] + share * depths[held[before + 1]]
     allowed = np.maximum(allowed, np.maximum(usual, TOUCHES))
     if not np.any(depths > allowed + LEAST):
         return rotations
@@ -123,7 +125,7 @@ def keep_limbs_apart(
         turns = np.zeros_like(steps)
         for limb in np.flatnonzero(needed.any(axis=0)):
             axis = placed.anchors[:, limb] - placed.pivots[:, limb]
-            axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+            axis /= np.maximum(rot.norm(axis), 1e-9)[:, None]
             own = steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
             turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
         _turn(placed, limbs, turns)
@@ -413,12 +415,13 @@ def _turn(placed: _Placed, limbs: _Limbs, turns: Floats) -> None:
     """Turn limbs about their first joints by rotation vectors [N, 4, 3]; what is carried moves along."""
     for t in range(len(turns)):
         for limb in range(4):
-            vector, pivot = turns[t, limb], placed.pivots[t, limb]
+            vector, pivot, anchor = turns[t, limb], placed.pivots[t, limb], placed.anchors[t, limb]
             angle = np.sqrt(np.sum(vector**2))
             if angle < 1e-12:
                 continue
-            moved = pivot + _turned(placed.anchors[t, limb] - pivot, vector, angle) - placed.anchors[t, limb]
-            placed.anchors[t, limb] += moved
+            moved = -anchor
+            _turn_point(anchor, pivot, vector, angle)
+            moved += anchor
             for capsule in range(len(limbs.owner)):
                 if limbs.owner[capsule] != limb:
                     continue
@@ -427,12 +430,16 @@ def _turn(placed: _Placed, limbs: _Limbs, turns: Floats) -> None:
                     if limbs.carried[capsule]:
                         point += moved
                     else:
-                        point[:] = pivot + _turned(point - pivot, vector, angle)
+                        _turn_point(point, pivot, vector, angle)
 
 
 @jit
-def _turned(arm: Floats, vector: Floats, angle: float) -> Floats:
-    """Return a vector [3] turned by a rotation vector [3] of some length, by Rodrigues' formula."""
-    across = np.cross(vector, arm)
-    turned: Floats = arm + np.sin(angle) / angle * across + (1.0 - np.cos(angle)) / angle**2 * np.cross(vector, across)
-    return turned
+def _turn_point(point: Floats, pivot: Floats, vector: Floats, angle: float) -> None:
+    """Turn a point [3] about a pivot [3] by a rotation vector [3] of some length, by Rodrigues' formula, in place."""
+    ax, ay, az = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
+    vx, vy, vz = vector[0], vector[1], vector[2]
+    sine, versine = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    bx, by, bz = vy * az - vz * ay, vz * ax - vx * az, vx * ay - vy * ax
+    point[0] = pivot[0] + (ax + sine * bx + versine * (vy * bz - vz * by))
+    point[1] = pivot[1] + (ay + sine * by + versine * (vz * bx - vx * bz))
+    point[2] = pivot[2] + (az + sine * bz + versine * (vx * by - vy * bx))

@@ -34,6 +34,7 @@ from motionmind.realise.walks import (
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
+BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
 class MeanWalk(NamedTuple):
@@ -115,23 +116,27 @@ def _mean_between(
     minimal = minimal_movement(orientations, times, leaving, arriving)
     poses, trusted = np.empty_like(minimal), np.empty(joints)
 
-    groups = _joints_by_parts(parts, joints)
-    members = np.empty((joints, len(SIZES)), dtype=np.int64)
-    for numbers, here in groups.items():
-        members[here] = numbers
-    passed = [*orientations, *(() if path is None else path)]
+    inside = np.zeros((joints, len(parts)), dtype=np.bool_)
+    for number, part in enumerate(parts):
+        inside[part, number] = True
+    members = np.nonzero(inside)[1].reshape(joints, len(SIZES))  # one part of each size
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for joint, numbers in enumerate(members.tolist()):
+        groups.setdefault(tuple(numbers), []).append(joint)
+    passed = orientations if path is None else np.concatenate([orientations, path])
 
-    def off(posture: Floats) -> Floats:
-        return squared_distances(carriage.orientations, members, len(parts), posture)
+    def off(postures: Floats) -> Floats:
+        return squared_distances(carriage.orientations, members, len(parts), postures)
 
     larger = sorted({number for numbers in groups for number in numbers[:-1]})
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
-    with ThreadPoolExecutor(THREADS) as pool:
-        distances = [*pool.map(off, passed)]
+    threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
+    with ThreadPoolExecutor(threads) as pool:
+        distances = [*pool.map(off, np.array_split(passed, threads))]
 
         def walk(number: int) -> tuple[Floats, float]:
-            own = np.stack([of_parts[number] for of_parts in distances])
+            own = np.concatenate([of_parts[number] for of_parts in distances])
             return _part_marginals(number, parts[number], carriage, rates, ends, times, own)
 
         known = dict(zip(larger, pool.map(walk, larger), strict=True))
@@ -217,14 +222,6 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
     return terms
 
 
-def _joints_by_parts(parts: tuple[Ints, ...], joints: int) -> dict[tuple[int, ...], list[int]]:
-    """Return groups of joints by the numbers of the parts that they are in, one of each size."""
-    groups: dict[tuple[int, ...], list[int]] = {}
-    for joint in range(joints):
-        groups.setdefault(tuple(number for number, part in enumerate(parts) if joint in part), []).append(joint)
-    return groups
-
-
 @jit
 def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
     """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
@@ -238,24 +235,24 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
-    out = np.zeros_like(about)
-    for t in range(len(weights)):
-        for i in range(weights.shape[1]):
-            weight = weights[t, i]
-            if weight < 1e-6:
-                continue
-            for j in range(about.shape[1]):
-                side = 0.0
-                shown = orientations[i, joints[j]]
-                for k in range(4):
-                    side += about[t, j, k] * shown[k]
-                signed = -weight if side < 0.0 else weight
-                for k in range(4):
-                    out[t, j, k] += signed * shown[k]
-        for j in range(about.shape[1]):
-            length = np.sqrt(np.sum(out[t, j] ** 2))
+    out = about.copy()
+    for j in range(len(joints)):
+        shown = orientations[:, joints[j]]
+        for t in range(len(weights)):
+            ax, ay, az, aw = about[t, j]
+            x, y, z, w = 0.0, 0.0, 0.0, 0.0
+            for i in range(weights.shape[1]):
+                weight = weights[t, i]
+                if weight < 1e-6:
+                    continue
+                bx, by, bz, bw = shown[i, 0], shown[i, 1], shown[i, 2], shown[i, 3]
+                if ax * bx + ay * by + az * bz + aw * bw < 0.0:
+                    weight = -weight
+                x += weight * bx
+                y += weight * by
+                z += weight * bz
+                w += weight * bw
+            length = np.sqrt(x * x + y * y + z * z + w * w)
             if length > 1e-6:
-                out[t, j] /= length
-            else:
-                out[t, j] = about[t, j]
+                out[t, j, 0], out[t, j, 1], out[t, j, 2], out[t, j, 3] = x / length, y / length, z / length, w / length
     return out

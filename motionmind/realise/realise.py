@@ -230,7 +230,7 @@ def _bend_to_states(
     inner[list(stops)] = False
     poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
     missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
-    far = np.linalg.norm(missing, axis=-1, keepdims=True)
+    far = rot.norm(missing)[..., None]
     bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
     poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))
     headings = walk.headings

@@ -36,23 +36,26 @@ ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some
 
 
 @jit
-def squared_distances(orientations: Floats, members: Ints, parts: int, posture: Floats) -> Floats:
-    """Return the squared distances of parts of the body from a posture, means over their joints [P, N], radians^2.
+def squared_distances(orientations: Floats, members: Ints, parts: int, postures: Floats) -> Floats:
+    """Return the squared distances of parts of the body from postures, means over their joints [P, K, N], radians^2.
 
     Args:
         orientations: of all chains in the corpus's N moments, the joints' first [N, L, 4].
         members: the parts that each joint is in [J, 3].
         parts: how many parts there are.
-        posture: orientations of the joints that distances are measured from [J, 4].
+        postures: orientations of the joints that distances are measured from [K, J, 4].
     """
-    out, sizes = np.zeros((parts, len(orientations))), np.bincount(members.ravel(), minlength=parts)
-    for i in range(len(orientations)):
-        for joint in range(len(members)):
-            squared = squared_turn(orientations[i, joint], posture[joint])
-            for part in members[joint]:
-                out[part, i] += squared
-        for part in range(parts):
-            out[part, i] /= sizes[part]
+    out, sizes = np.empty((parts, len(postures), len(orientations))), np.bincount(members.ravel(), minlength=parts)
+    sums = np.empty(parts)
+    for k in range(len(postures)):
+        for i in range(len(orientations)):
+            sums[:] = 0.0
+            for joint in range(len(members)):
+                squared = squared_turn(orientations[i, joint], postures[k, joint])
+                for part in members[joint]:
+                    sums[part] += squared
+            for part in range(parts):
+                out[part, k, i] = sums[part] / sizes[part]
     return out
 
 

@@ -68,6 +68,7 @@ def grounded(
     given: Sequence[float] = (),
     aloft: Floats | None = None,
     leap: float = 0.0,
+    plain: Floats | None = None,
     **options: Any,
 ) -> tuple[Floats, Floats]:
     """The movement on the floor, between the root's ends; walks stand on all limbs, but where they are `aloft`."""
@@ -85,7 +86,8 @@ def grounded(
     rates = options.pop("rates", (None, None))
     ends = root[0], root[-1]
     times = np.arange(len(q)) / fps
-    return set_on_floor(skeleton, q, q, times, stance, loose, fixed, low, ends, rates, **options)
+    plain = q if plain is None else plain
+    return set_on_floor(skeleton, q, plain, times, stance, loose, fixed, low, ends, rates, **options)
 
 
 def posed(degrees: dict[str, tuple[float, float, float]], frames: int) -> Floats:
@@ -313,6 +315,54 @@ def test_a_jump_on_the_way_lasts_as_long_as_its_height_asks() -> None:
     assert flying.mean() == pytest.approx(30.0, abs=2.0)
     np.testing.assert_allclose(fall(found, went, slice(flying[0], flying[-1] - 1)), -GRAVITY, rtol=0.15)
     assert lowest_height(human23(), *grounded(q, root, aloft=aloft, leap=0.2, without=("flight",))).max() < 0.01
+
+
+def detail(frames: int, size: float, joints: Sequence[int]) -> Floats:
+    """Rotations that waver by `size` radians, five times a second: what a recording has between its postures."""
+    rng, t = np.random.default_rng(3), np.arange(frames) / 30.0
+    phase = rng.uniform(0.0, 6.0, (len(joints), 3))
+    vectors = np.zeros((frames, 23, 3))
+    fades = np.minimum(np.minimum(t, t[::-1]) / 0.2, 1.0)[:, None, None]
+    vectors[:, joints] = size * fades * np.sin(10.0 * np.pi * t[:, None, None] + phase)
+    return rot.exp(vectors)
+
+
+def test_a_body_with_fine_detail_falls_freely() -> None:
+    frames = 46
+    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    root[-1, 1] += 0.25
+    aloft = np.zeros(17)
+    aloft[-2:] = 1.0
+    arms = [human23().index(f"{side}_shoulder") for side in ("left", "right")]
+    found, went = grounded(rot.mul(q, detail(frames, 0.1, arms)), root, aloft=aloft, leap=0.25, plain=q)
+    flying = np.flatnonzero(lowest_height(human23(), found, went) > 0.03)
+    assert np.mean(np.abs(fall(found, went, slice(flying[0] + 2, None)) + GRAVITY) < 0.2 * GRAVITY) > 0.9
+
+
+def test_an_end_in_the_air_shows_nothing_of_its_floor() -> None:
+    """It is higher than the corpus's bodies jump: that is no reason to climb."""
+    frames = 61
+    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    root[-1, 1] += 0.4
+    aloft = np.zeros(17)
+    aloft[-2:] = 1.0
+    found, went = grounded(q, root, aloft=aloft, leap=0.2)
+    assert lowest_height(human23(), found, went)[: frames // 2].max() < 0.01
+
+
+def test_a_foot_that_wavers_into_the_floor_does_not_lift_the_body() -> None:
+    frames = 61
+    angles = {f"left_{joint}": (bend, 0.0, 0.0) for joint, bend in (("hip", -20.0), ("knee", 37.0), ("ankle", 0.0))}
+    q = posed(angles | {"right_hip": (-15.0, 0.0, 0.0), "right_knee": (30.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    wavers = rot.mul(q, detail(frames, 0.4, [human23().index("left_ankle")]))
+    assert lowest_height(human23(), wavers, root).min() < -0.01
+    found, went = grounded(wavers, root, plain=q)
+    ankle = human23().positions(found, went)[:, human23().index("right_ankle"), 1]
+    assert np.ptp(ankle) < 0.02
+    assert lowest_height(human23(), found, went).min() > -0.006
 
 
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
