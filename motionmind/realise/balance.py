@@ -4,6 +4,8 @@ Two points are kept near the support, the hull of what bears on the floor. The *
 force acts, c - (h / g) c'' for a centre of mass c at height h: it cannot leave the support, however a body accelerates.
 Source: Kajita et al., "Biped walking pattern generation by using preview control of zero-moment point", ICRA (2003).
 The centre of mass itself may be as far beyond as the corpus's bodies have theirs.
+
+Constants were chosen on ballet, and looked at on recordings.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ GRAVITY = 9.81  # metres a second squared
 OVER = 0.005  # metres beyond what is allowed, standard deviation
 GIVES = 0.005  # metres beyond it from which a row pulls no harder: what cannot be had is not worth a jerk
 ACROSS = 0.3  # of a row's weight: that of not going round the support instead of towards it
-ROOM = 0.06  # metres that the zero-moment point may be beyond the support, which is smaller than a foot
+ROOM = (
+    0.04  # metres that the zero-moment point may be beyond the support: half a foot's width, points being in its middle
+)
 SWAYS = 0.5  # seconds in which a body that is given beyond its support comes back over it
 DEEP = 0.1  # metres beyond what is allowed at which a body surely falls
 WALKS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
