@@ -4,6 +4,8 @@ Two points are kept near the support, the hull of what bears on the floor. The *
 force acts, c - (h / g) c'' for a centre of mass c at height h: it cannot leave the support, however a body accelerates.
 Source: Kajita et al., "Biped walking pattern generation by using preview control of zero-moment point", ICRA (2003).
 The centre of mass itself may be as far beyond as the corpus's bodies have theirs.
+
+Constants were chosen on ballet, and looked at on recordings.
 """
 
 from __future__ import annotations
@@ -15,9 +17,15 @@ from motionmind.jit import jit
 from motionmind.realise.least_squares import Rows
 
 GRAVITY = 9.81  # metres a second squared
-OVER = 0.025  # metres beyond what is allowed, standard deviation
-ROOM = 0.03  # metres that the zero-moment point may be beyond the support, which is smaller than a foot
+OVER = 0.005  # metres beyond what is allowed, standard deviation
+GIVES = 0.005  # metres beyond it from which a row pulls no harder: what cannot be had is not worth a jerk
+ACROSS = 0.3  # of a row's weight: that of not going round the support instead of towards it
+ROOM = (
+    0.04  # metres that the zero-moment point may be beyond the support: half a foot's width, points being in its middle
+)
 SWAYS = 0.5  # seconds in which a body that is given beyond its support comes back over it
+DEEP = 0.1  # metres beyond what is allowed at which a body surely falls
+WALKS = 0.5  # metres a second: a body that travels faster falls from foot to foot, as walkers do
 
 
 def balance_rows(
@@ -45,23 +53,62 @@ def balance_rows(
     lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
     pressure = centre.copy()
     pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
-    since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)[:, None]
+    since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)
     fades = 1.0 - since * since * (3.0 - 2.0 * since)
     rows = []
     for point, share, room in ((pressure, lever, ROOM), (centre, 0.0 * lever, overhang)):
         nearest = nearest_in_support(points, touches, point)
         beyond = point - nearest
-        far = np.linalg.norm(beyond, axis=1, keepdims=True)
+        far = np.linalg.norm(beyond, axis=1)
         # Ends may be beyond the support; the body comes back from there, and goes there, within a while.
         allowed = np.maximum(np.maximum(far[0] * fades, far[-1] * fades[::-1]), room)
-        target = nearest + beyond * np.minimum(allowed / np.maximum(far, 1e-9), 1.0)
-        weights = np.where((far > allowed)[:, 0], OVER**-2.0, 0.0)[1:-1]
-        for k, axis in enumerate((0, 2)):
-            coefficients = np.zeros((len(weights), 9))
-            coefficients[:, axis::3] = np.stack([-share, 1.0 + 2.0 * share, -share], axis=1)
-            already = own[1:-1, k] - share * np.diff(own[:, k], 2)
-            rows.append(Rows(np.arange(len(weights)), coefficients, target[1:-1, k] - already, weights))
+        over = np.maximum(far - allowed, 0.0)
+        weights = np.where(over > 0.0, OVER**-2.0 / np.sqrt(1.0 + (over / GIVES) ** 2), 0.0)
+        along = beyond / np.maximum(far, 1e-9)[:, None]
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        for direction, further, weight in ((along, np.minimum(far, allowed), weights), (across, 0.0, ACROSS * weights)):
+            coefficients, target = np.zeros((len(far) - 2, 9)), np.sum(direction * nearest, axis=1) + further
+            missing = target[1:-1]
+            for k, axis in enumerate((0, 2)):
+                part = direction[1:-1, k]
+                coefficients[:, axis::3] = part[:, None] * np.stack([-share, 1.0 + 2.0 * share, -share], axis=1)
+                missing = missing - part * (own[1:-1, k] - share * np.diff(own[:, k], 2))
+            rows.append(Rows(np.arange(len(missing)), coefficients, missing, weight[1:-1]))
     return rows
+
+
+def walks(root: Floats, fps: float) -> bool:
+    """Return whether a body travels so fast that it is never to stand still over a foot: positions [N, 3], metres."""
+    return bool(np.linalg.norm((root[-1] - root[0])[[0, 2]]) * fps > WALKS * (len(root) - 1))
+
+
+def is_beyond(points: Floats, touches: Bools, centre: Floats, overhang: float) -> Bools:
+    """Return where a centre of mass is farther beyond its support than it may be [N].
+
+    Args:
+        points: level places of points of the body [N, P, 2], metres.
+        touches: which of them bear the body on the floor [N, P].
+        centre: level place of the centre of mass [N, 2], metres.
+        overhang: how far beyond the support it may be, metres.
+    """
+    return np.asarray(np.linalg.norm(centre - nearest_in_support(points, touches, centre), axis=1) > overhang)
+
+
+def falls_without(points: Floats, low: Bools, feet: Bools, centre: Floats, overhang: float) -> Floats:
+    """Return how far a body would fall without each foot [N, feet], from 0 to 1 where it surely falls.
+
+    Args:
+        points: level places of points of the body [N, P, 2], metres.
+        low: which of them would bear it if all its feet stood [N, P].
+        feet: which of them are each foot's [feet, P].
+        centre: level place of the centre of mass [N, 2], metres.
+        overhang: how far beyond its support that may be, metres.
+    """
+    out = np.zeros((len(centre), len(feet)))
+    for number, own in enumerate(feet):
+        far = np.linalg.norm(centre - nearest_in_support(points, low & ~own, centre), axis=1)
+        out[:, number] = np.clip((far - overhang) / DEEP, 0.0, 1.0)
+    return out
 
 
 @jit

@@ -20,6 +20,7 @@ MOSTLY = 0.3  # share of bearing from which a part other than a foot holds the b
 LOADS = 0.12  # seconds in which a foot takes over the body's weight
 ALONE = 0.05  # metres above a body's lowest point below which another part bears, too
 HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of a body at rest
+FALLS = 60.0  # a second: cost of swinging a foot without which the body falls; chosen on ballet
 RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
 UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
 NEAR = 0.1  # metres within which a foot is in one place
@@ -107,10 +108,18 @@ class Bearing(NamedTuple):
             out[:-away] = np.maximum(out[:-away], share * self.stands[away:])
         return out
 
+    def all_standing(self) -> Bearing:
+        """Return the same with all feet on the floor throughout."""
+        return self._replace(stands=np.ones_like(self.stands))
+
     def touching(self, shape: Shape) -> Bools:
         """Return which points touch the floor [N, P]: those of what bears, about as low as its lowest."""
         out = np.zeros(shape.places.shape[:2], dtype=np.bool_)
-        parts = [(shape.feet, shape.low, self.stands), (shape.others, shape.low_others, self.others > MOSTLY)]
+        # A foot that comes down, or lifts, in this very frame carries nothing yet, or no more.
+        still = self.stands.copy()
+        still[1:] &= self.stands[:-1]
+        still[:-1] &= self.stands[1:]
+        parts = [(shape.feet, shape.low, still), (shape.others, shape.low_others, self.others > MOSTLY)]
         for points_of_parts, low, bears in parts:
             for number, points in enumerate(points_of_parts):
                 near = shape.places[:, points, 1] < low[:, number, None] + TOUCHES
@@ -128,6 +137,7 @@ def find_bearing(
     moving: tuple[bool, bool],
     feet: list[Foot],
     fps: float,
+    falls: Floats | None = None,
 ) -> Bearing:
     """Find what bears a body, and where its feet step.
 
@@ -141,6 +151,7 @@ def find_bearing(
         moving: whether the body passes the first and the last frame with a velocity; else feet that are low rest there.
         feet: its feet.
         fps: frames a second.
+        falls: how far the body would fall without each foot [N, feet], from 0 to 1; None where that is not known.
     """
     low = shape.lowest[:, None]
     far = np.minimum(shape.low_others - low, 1.0)
@@ -162,6 +173,8 @@ def find_bearing(
         for k, foot in enumerate(feet)
     ]
     weighs = HEAVY * still[:, None] * _weights(shape, mass)
+    if falls is not None:
+        weighs += FALLS * falls
     costs = [(stand, swing + weighs[:, k]) for k, (stand, swing) in enumerate(costs)]
     tracks = shape.tracks + root[:, None]
     stands = np.stack([stand <= swing for stand, swing in costs], axis=1) if feet else np.zeros((len(root), 0), bool)

@@ -17,7 +17,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
 from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import balance_rows
+from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, fade_at_ends, pose, softness
@@ -38,7 +38,7 @@ PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
 HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
 NEARLY = 0.9  # of that speed: from here on it is held to it
 TIPTOE = 0.12  # metres above the floor: a body that is no higher at both ends, above one spot, stands there on one foot
-ROUNDS = 2, 3  # of placing feet, and of the root in each
+ROUNDS = 3, 2  # of placing feet, and of the root in each
 
 
 class Ends(NamedTuple):
@@ -122,16 +122,22 @@ def carry(
             known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
         )
     flying = flying_frames(flights, (hovering[0], hovering[1]), count)
-    bearing = find_bearing(shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps)
+    planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
+    bearing = find_bearing(*planned)
     if "steps" in without:
         bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
-    touches, holds = bearing.touching(shape), bearing.holds(fps)
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
     own = pose(skeleton, plain)
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
-    for _ in range(ROUNDS[0]):
+    balances = "balance" not in without and bool(mass.any())
+    stands = balances and "steps" not in without and not walks(root, fps)
+    for number_of_round in range(ROUNDS[0]):
+        if number_of_round and stands:
+            falls = _falls(shape, bearing, start, mass, overhang)
+            if falls is not None:
+                bearing = find_bearing(*planned, falls)
         mass = _mass(skeleton, posed)
         steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += _prior_rows(root, bearing, fps)
@@ -140,12 +146,9 @@ def carry(
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
             rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
-            if "balance" not in without and mass.any():
-                points = shape.places[..., [0, 2]] + start[:, None, [0, 2]]
-                for number, foot_points in enumerate(shape.feet):
-                    points[:, foot_points] += (bearing.targets[:, number] - start[:, [0, 2]])[:, None]
-                centre, level = start + mass, [0, 2]
-                height = centre[:, 1] - floor
+            if balances:
+                points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
+                centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
                 rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
             start = solve(rows, start, fixed)
         for number, foot in enumerate(feet):
@@ -154,12 +157,12 @@ def carry(
             places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
             stances, leg = bearing.stances[number], foot.length(skeleton)
             off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
-        posed = bend_legs(skeleton, own, feet, off, softness(holds))
+        posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
     bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
     start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, fps)
-    return Carried(start, off, holds, heights, bound)
+    return Carried(start, off, bearing.holds(fps), heights, bound)
 
 
 def _with_detail(
@@ -213,6 +216,30 @@ def _mass(skeleton: Skeleton, rotations: Floats) -> Floats:
     still = np.zeros((len(rotations), 3))
     mass = centre_of_mass(skeleton, rotations, still)
     return still if mass is None else mass
+
+
+def _falls(shape: Shape, bearing: Bearing, root: Floats, mass: Floats, overhang: float) -> Floats | None:
+    """Return how far a body would fall without each foot [N, feet], from 0 to 1; None where it is in balance.
+
+    Args:
+        shape: the body.
+        bearing: what bears it.
+        root: positions of the root [N, 3], metres.
+        mass: centre of mass relative to it [N, 3], metres.
+        overhang: how far beyond its support that may be, metres.
+    """
+    points, centre = _points_on_floor(shape, bearing, root), (root + mass)[:, [0, 2]]
+    if not is_beyond(points, bearing.touching(shape), centre, overhang)[1:-1].any():
+        return None
+    return falls_without(points, bearing.all_standing().touching(shape), shape.feet, centre, overhang)
+
+
+def _points_on_floor(shape: Shape, bearing: Bearing, root: Floats) -> Floats:
+    """Return the level places of a body's points [N, P, 2], metres: those of feet where the feet are to be."""
+    points = shape.places[..., [0, 2]] + root[:, None, [0, 2]]
+    for number, foot_points in enumerate(shape.feet):
+        points[:, foot_points] += (bearing.targets[:, number] - root[:, [0, 2]])[:, None]
+    return np.asarray(points)
 
 
 def _prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:

@@ -22,6 +22,7 @@ from motionmind.realise.detail import detail_of, likest_moves, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
+from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
@@ -157,6 +158,11 @@ def realise(
         without,
     )
     rotations = keep_apart(rotations, root)
+    if "balance" not in without:
+        held = _given_frames(clock, [*stops], (leaving is not None, arriving is not None))
+        rotations, root = shift_weight(
+            a.skeleton, rotations, root, stance.overhang, held, carriage.loose, fixed[: len(a.skeleton)], fps
+        )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
 
@@ -293,6 +299,16 @@ def _keeper(
     return lambda rotations, root: keep_limbs_apart(
         skeleton, rotations, root, clock.frames, given, stays, carriage.touches
     )
+
+
+def _given_frames(clock: Timeline, stops: Sequence[int], moving: tuple[bool, bool]) -> Bools:
+    """Return the frames that must not change [N]: those of given postures or beside them, and of given velocities."""
+    at = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
+    out = np.zeros(len(clock.frames), dtype=np.bool_)
+    out[np.floor(at + 1e-6).astype(np.int64)] = True
+    out[np.ceil(at - 1e-6).astype(np.int64)] = True
+    out[[1, -2]] |= moving
+    return out
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

@@ -1,0 +1,81 @@
+"""Leaning: a body whose limbs are in their places shifts its weight over what bears it, and its feet stay.
+
+The root is carried in balance before limbs are kept apart and legs reach for their places, and both move the mass and
+the feet that it is to be over. What they leave is made up for here: the hips move level, as little and as smoothly as
+will do, and the legs keep the feet where they are. A body that walks is not held up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.contact import contact_points
+from motionmind.body.limbs import limb_of_points
+from motionmind.body.limits import within_limits
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import NEAR, find_support, size_of
+from motionmind.realise.balance import GRAVITY, balance_rows, is_beyond, walks
+from motionmind.realise.feet import bend_legs, find_free_feet, pose
+from motionmind.realise.least_squares import difference_rows, position_rows, solve
+from motionmind.realise.legs import SOFT, find_legs
+
+PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement
+SHIFTS = 0.2  # metres that they shift
+ROUNDS = 4  # of finding the support's nearest points, and the shift
+
+
+def shift_weight(
+    skeleton: Skeleton,
+    rotations: Floats,
+    root: Floats,
+    overhang: float,
+    given: Bools,
+    loose: Bools,
+    fixed: Bools,
+    fps: float,
+) -> tuple[Floats, Floats]:
+    """Return rotations [N, J, 4] and positions of the root [N, 3], metres, that have the weight over what bears it.
+
+    Nothing changes where the weight is over it, where it is not known, where a leg must not change, and in a walk.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        overhang: how far beyond its support the centre of mass may be, metres.
+        given: frames that must not change, the first and the last among them [N].
+        loose: joints without limits [J].
+        fixed: joints that must not change [J].
+        fps: frames a second.
+    """
+    size, feet = size_of(skeleton), find_free_feet(skeleton, fixed)
+    if len(root) < 3 or not feet or len(feet) < len(find_legs(skeleton)[0]) or walks(root / size, fps):
+        return rotations, root
+    support = find_support(skeleton, rotations, root, fps)
+    if support.mass is None:
+        return rotations, root
+    places, joints = contact_points(skeleton, rotations, root)
+    low = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
+    touches = low & support.bears[:, limb_of_points(skeleton)[joints]]
+    points, mass, allowed = places[..., [0, 2]] / size, support.mass[:, [0, 2]] / size, overhang / size
+    if not is_beyond(points, touches, mass, allowed)[~given].any():
+        return rotations, root
+    height = (support.mass[:, 1] - places[..., 1].min(axis=1)) / size
+    shift = np.zeros_like(root)
+    for _ in range(ROUNDS):
+        now = mass + shift[:, [0, 2]]
+        rows = balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
+        for axis in range(3):
+            along, none = np.tile(np.eye(3)[axis], (len(root), 1)), np.zeros(len(root))
+            rows.append(position_rows(np.arange(len(root)), along, none, none + SHIFTS**-2.0))
+            bends = (fps**2, -2.0 * fps**2, fps**2)
+            rows.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
+        shift = solve(rows, shift, given)
+    shift[given] = 0.0
+    off = -size * np.repeat(shift[:, None], len(feet), axis=1)
+    bent = bend_legs(skeleton, pose(skeleton, rotations), feet, off, np.full(off.shape[:2], SOFT))
+    legs, out = [joint for foot in feet for joint in foot.leg], rotations.copy()
+    limited = within_limits(skeleton, bent, rotations[given], loose, legs)
+    out[:, legs] = np.where(given[:, None, None], rotations[:, legs], limited[:, legs])
+    return out, root + size * shift
