@@ -151,18 +151,34 @@ def carry(
                 centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
                 rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
             start = solve(rows, start, fixed)
-        for number, foot in enumerate(feet):
-            height = shape.low[:, number] + start[:, 1] - floor
-            tracks = shape.tracks[:, number] + start[:, [0, 2]]
-            places_of_foot = shape.tracks[:, number] + bearing.targets[:, number]
-            stances, leg = bearing.stances[number], foot.length(skeleton)
-            off[:, number] = departure(places_of_foot, tracks, height, stances, leg, fps, known.moving)
+        off = _departures(skeleton, shape, bearing, floor, start, feet, known.moving, fps)
         posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
     bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
-    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, fps)
+    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
     return Carried(start, off, bearing.holds(fps), heights, bound)
+
+
+def _departures(
+    skeleton: Skeleton,
+    shape: Shape,
+    bearing: Bearing,
+    floor: Floats,
+    root: Floats,
+    feet: list[Foot],
+    moving: tuple[bool, bool],
+    fps: float,
+) -> Floats:
+    """Return how far feet are to be from where rotations have them [N, feet, 3], metres, by the root's places."""
+    out = np.empty((len(root), len(feet), 3))
+    for number, foot in enumerate(feet):
+        height = shape.low[:, number] + root[:, 1] - floor
+        tracks = shape.tracks[:, number] + root[:, [0, 2]]
+        places = shape.tracks[:, number] + bearing.targets[:, number]
+        stances, leg = bearing.stances[number], foot.length(skeleton)
+        out[:, number] = departure(places, tracks, height, stances, leg, fps, moving)
+    return out
 
 
 def _with_detail(
@@ -173,12 +189,14 @@ def _with_detail(
     flying: Bools,
     root: Floats,
     off: Floats,
+    floor: Floats,
     fps: float,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
     If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
-    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height.
+    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height;
+    one that would swing into the floor is lifted, and not the body with it.
 
     Args:
         plain: the body without detail.
@@ -188,6 +206,7 @@ def _with_detail(
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
         off: displacements of feet without detail [N, feet, 3], metres.
+        floor: height of the floor [N], metres.
         fps: frames a second.
     """
     fades = fade_at_ends(len(loads), (True, True), fps)
@@ -200,6 +219,9 @@ def _with_detail(
     moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
     kept = reached + loads * (heights - reached)
+    if kept.size:
+        sunk = np.maximum(floor[:, None] - kept, 0.0)
+        kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
     off = off.copy()
     off[..., 1] += kept - reached
     return moved, off, kept

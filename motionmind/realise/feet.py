@@ -317,18 +317,22 @@ def ease_knees(
     shift[:, 1] = smoothed(gives, GIVES, fps) * bound
     aims -= shift[:, None]
     # What the body does not give, the feet do: upward, for the floor is in the way of the rest.
+    finer = lengths.copy()
     for number, foot in enumerate(feet):
         bones = foot.bones(skeleton)
         bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
         bends = slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps)
-        if fine:
-            bends = keep_detail(bends, own[:, number], fixed, *bones, fps)
         lengths[:, number] = distance_of(bends, *bones)
-    out = _lengthened(aims, lengths) - legs
-    sunk = np.maximum(off[..., 1] - room - out[..., 1] - shift[:, 1:2], 0.0)
+        if fine:
+            finer[:, number] = distance_of(keep_detail(bends, own[:, number], fixed, *bones, fps), *bones)
+    if not fine:
+        return _lengthened(aims, lengths) - legs, shift
+    lowest = (legs + off - shift[:, None])[..., 1] - room
+    firm, out = (_lengthened(aims, longer) for longer in (lengths, finer))
+    sunk = np.maximum(np.minimum(firm[..., 1], lowest) - out[..., 1], 0.0)
     for number in range(len(feet)):
         out[:, number, 1] += cover(sunk[:, number], fps) * fade_at_ends(len(out), moving, fps)
-    return out, shift
+    return out - legs, shift
 
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:

@@ -15,13 +15,15 @@ from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import NEAR, find_support, size_of
+from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, balance_rows, is_beyond, walks
-from motionmind.realise.feet import bend_legs, find_free_feet, pose
+from motionmind.realise.feet import QUICK, bend_legs, find_free_feet, pose
 from motionmind.realise.least_squares import difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT, find_legs
 
 PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement
 SHIFTS = 0.2  # metres that they shift
+LESS = 1.0, 0.7, 0.4  # shares of that shift: the first for which no leg has to hurry
 ROUNDS = 4  # of finding the support's nearest points, and the shift
 
 
@@ -34,6 +36,7 @@ def shift_weight(
     loose: Bools,
     fixed: Bools,
     fps: float,
+    fastest: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Return rotations [N, J, 4] and positions of the root [N, 3], metres, that have the weight over what bears it.
 
@@ -48,6 +51,7 @@ def shift_weight(
         loose: joints without limits [J].
         fixed: joints that must not change [J].
         fps: frames a second.
+        fastest: speeds of the joints [J], rad/s, for which the weight is shifted less; None for any speed.
     """
     size, feet = size_of(skeleton), find_free_feet(skeleton, fixed)
     if len(root) < 3 or not feet or len(feet) < len(find_legs(skeleton)[0]) or walks(root / size, fps):
@@ -73,9 +77,19 @@ def shift_weight(
             rows.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
         shift = solve(rows, shift, given)
     shift[given] = 0.0
-    off = -size * np.repeat(shift[:, None], len(feet), axis=1)
-    bent = bend_legs(skeleton, pose(skeleton, rotations), feet, off, np.full(off.shape[:2], SOFT))
-    legs, out = [joint for foot in feet for joint in foot.leg], rotations.copy()
-    limited = within_limits(skeleton, bent, rotations[given], loose, legs)
-    out[:, legs] = np.where(given[:, None, None], rotations[:, legs], limited[:, legs])
-    return out, root + size * shift
+    legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
+    most = None if fastest is None else np.maximum(QUICK * fastest, _fastest_turns(rotations, fps))[legs]
+    for share in LESS:
+        off = -share * size * np.repeat(shift[:, None], len(feet), axis=1)
+        bent = bend_legs(skeleton, posed, feet, off, np.full(off.shape[:2], SOFT))
+        out = rotations.copy()
+        limited = within_limits(skeleton, bent, rotations[given], loose, legs)
+        out[:, legs] = np.where(given[:, None, None], rotations[:, legs], limited[:, legs])
+        if most is None or np.all(_fastest_turns(out[:, legs], fps) <= most):
+            return out, root + share * size * shift
+    return rotations, root
+
+
+def _fastest_turns(rotations: Floats, fps: float) -> Floats:
+    """Return the greatest speed of each joint [J], rad/s, of rotations [N, J, 4]."""
+    return np.asarray(fps * rot.angle(rotations[:-1], rotations[1:]).max(axis=0))

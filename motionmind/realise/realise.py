@@ -161,7 +161,15 @@ def realise(
     if "balance" not in without:
         held = _given_frames(clock, [*stops], (leaving is not None, arriving is not None))
         rotations, root = shift_weight(
-            a.skeleton, rotations, root, stance.overhang, held, carriage.loose, fixed[: len(a.skeleton)], fps
+            a.skeleton,
+            rotations,
+            root,
+            stance.overhang,
+            held,
+            carriage.loose,
+            fixed[: len(a.skeleton)],
+            fps,
+            None if fastest is None else pace * fastest[: len(a.skeleton)],
         )
     return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
 
