@@ -19,9 +19,10 @@ from motionmind.cli.pictures import render, sheet
 from motionmind.cli.printing import Notes, show_warning
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
-from motionmind.cli.streams import forgiving, printable
+from motionmind.cli.streams import forgiving
 from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
+from motionmind.display import printable
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 
 BAD_INPUT = 2  # exit code for everything that the user can put right

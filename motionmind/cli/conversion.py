@@ -11,6 +11,7 @@ from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, rea
 from motionmind.cli.options import OUTPUTS, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE, RATE, Whole
+from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
@@ -48,7 +49,10 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], [clip])
     motion = own_skeleton(read(clip, **source), read_mapping(joints))
     write(output, motion.posture(frame))
-    click.echo(f"{output}: frame {frame} of {len(motion)}, on {motion.skeleton.name} ({len(motion.skeleton)} joints)")
+    click.echo(
+        f"{displayed_path(output)}: frame {frame} of {len(motion)}, on "
+        f"{displayed(motion.skeleton.name)} ({len(motion.skeleton)} joints)"
+    )
 
 
 @command("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30")
@@ -111,4 +115,7 @@ def convert(
     else:
         write_motion(output, motion, unit=out_unit or "cm")
     note_lossy_fields(output, lossy_fields(motion, output, source=file))
-    click.echo(f"{output}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints ({motion.skeleton.name})")
+    click.echo(
+        f"{displayed_path(output)}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints "
+        f"({displayed(motion.skeleton.name)})"
+    )

@@ -25,10 +25,13 @@ from motionmind.cli.options import (
 from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.words import parse_mixture, parse_tolerances
+from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
+
+_LINE = 300  # characters of a title, an author, a source: sentences rather than names
 
 
 @group("motionmind corpus check ballet", "corpus")
@@ -157,7 +160,7 @@ def build(
     )
     engine.save(place)
     print_check(engine.check())
-    click.echo(f"built {place}")
+    click.echo(f"built {displayed_path(place)}")
 
 
 def _read_clips(
@@ -203,9 +206,12 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
     if as_json:
         click.echo(json.dumps(found))
         return
-    width = max((len(entry["name"]) for entry in found), default=0)
+    width = max((len(displayed(entry["name"])) for entry in found), default=0)
     for entry in found:
-        click.echo(f"{entry['name']:{width}}  {entry['title'] or '-'}  ({entry['folder']})")
+        click.echo(
+            f"{displayed(entry['name']):{width}}  {displayed(entry['title'], _LINE) or '-'}  "
+            f"({displayed_path(entry['folder'])})"
+        )
 
 
 @command("motionmind corpus info ballet --json")
@@ -221,14 +227,16 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         click.echo(json.dumps(found))
         return
     for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
-        click.echo(f"{key:10} {found[key] if found[key] not in (None, '') else '-'}")
+        click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
     if found["repairs"]:
         click.echo(f"{'repaired':10} {format_repairs(found)}")
     print_origins(found)
-    width = max([16, *(len(clip["name"]) for clip in found["clips"])])
+    width = max([16, *(len(displayed(clip["name"])) for clip in found["clips"])])
     for clip in found["clips"]:
-        click.echo(f"  {clip['name']:{width}} {clip['postures']:5}  {clip['about']}".rstrip())
+        click.echo(
+            f"  {displayed(clip['name']):{width}} {clip['postures']:5}  {displayed(clip['about'], _LINE)}".rstrip()
+        )
 
 
 @command("motionmind corpus check ballet --pairs 500 --seed 1")

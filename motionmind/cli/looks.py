@@ -10,6 +10,7 @@ import click
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option
 from motionmind.cli.types import FILE
+from motionmind.display import displayed, displayed_path, printable
 
 
 @command("motionmind explain report.json")
@@ -25,7 +26,7 @@ def explain(report: Path, as_json: bool) -> None:
     from motionmind.tween.report import read_report
 
     explanation = explain(read_report(report))
-    click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
+    click.echo(json.dumps(explanation.plain()) if as_json else printable(str(explanation)))
 
 
 @command("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg")
@@ -60,6 +61,6 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     drawn = write_joint_graph(output, Engine.load(corpus, home), joint)
     alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
-        f"{output}: {joint}, {len(drawn)} states, {drawn.number_of_edges()} transitions; "
+        f"{displayed_path(output)}: {displayed(joint)}, {len(drawn)} states, {drawn.number_of_edges()} transitions; "
         f"{alone} states that none joins to another"
     )

@@ -13,6 +13,7 @@ from motionmind.cli.files import read, read_mapping
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE
+from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
@@ -69,7 +70,10 @@ def measure(
         click.echo(json.dumps(msgspec.to_builtins(MeasureReport.of(engine.corpus.name, len(motion), found))))
         return
     seconds = motion.times[-1] - motion.times[0]
-    click.echo(f"{file}: {count(len(motion), 'frame')} in {seconds:.2f} s, beside {engine.corpus.name}")
+    click.echo(
+        f"{displayed_path(file)}: {count(len(motion), 'frame')} in {seconds:.2f} s, "
+        f"beside {displayed(engine.corpus.name)}"
+    )
     width = max(map(len, found))
     click.echo(f"{'':{width}}     value    corpus 5 to 95 %")
     for name, figure in found.items():

@@ -15,6 +15,7 @@ from motionmind.cli.options import HOME, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import is_collection, read_movement, read_movements, select_frames
 from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE, Whole
+from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none
 from motionmind.render import PICTURES
@@ -129,7 +130,7 @@ def sheet(
             picture = contact_sheet(motion, drawn, columns=columns, side=side)
             write_atomically(path, png(picture))
             number = count(len(drawn), "posture")
-            click.echo(f"{path}: {number} of {len(motion)}, {picture.width} x {picture.height} pixels")
+            click.echo(f"{displayed_path(path)}: {number} of {len(motion)}, {picture.width} x {picture.height} pixels")
 
 
 @command("motionmind render clip.bvh -o clip.html")
@@ -191,7 +192,7 @@ def render(
     write_picture(output, motion, first=frames.start, **drawing)
     seconds = motion.times[-1] - motion.times[0]
     kilobytes = output.stat().st_size / 1000
-    click.echo(f"{output}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
+    click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
 
 
 def _make_files(folder: Path, motions: Sequence[Motion], source: Path) -> list[Path]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from motionmind.cli.streams import printable
+from motionmind.display import displayed, displayed_path, printable
 from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def print_tween(result: Tween, files: Sequence[Path]) -> None:
     """Print a tween in a few lines: moves, cost, proof, make-up, distances from the corpus, and the files written."""
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
-        lines.append(("detail", f"from {', '.join(dict.fromkeys(source.clip for source in result.detail))}"))
+        lines.append(("detail", f"from {', '.join(dict.fromkeys(displayed(source.clip) for source in result.detail))}"))
     lines.insert(1, ("pace", _tempo(result)))
     lines += [("seen", sentence) for sentence in _beyond(result.shown)]
     lines += [("without", format_what_if(one)) for one in result.what_if]
@@ -133,7 +133,9 @@ _SEEN = {
 
 def _beyond(shown: Mapping[str, Sighting]) -> list[str]:
     """Say in words what a viewer sees in a movement that goes beyond all that the corpus shows."""
-    return [_SEEN[name].format(one.value, one.most, one.part) for name, one in shown.items() if one.is_beyond]
+    return [
+        _SEEN[name].format(one.value, one.most, displayed(one.part)) for name, one in shown.items() if one.is_beyond
+    ]
 
 
 def _tempo(result: Tween) -> str:
@@ -142,7 +144,9 @@ def _tempo(result: Tween) -> str:
 
     tempo, said = result.tempo, []
     if tempo.least > tempo.usual:
-        said.append(f"{tempo.slowest} needs {tempo.least:.2f} s, so as not to be faster than is fast in the corpus")
+        said.append(
+            f"{displayed(tempo.slowest)} needs {tempo.least:.2f} s, so as not to be faster than is fast in the corpus"
+        )
     else:
         said.append(f"the corpus takes about {tempo.usual:.2f} s for so far a way")
     if tempo.usual_moves is not None:
@@ -165,20 +169,20 @@ def format_what_if(one: WhatIf) -> str:
     moves = count(abs(one.moves), "move")
     change = f" and {moves} less" if one.moves < 0 else f" less, {moves} more" if one.moves > 0 else " less"
     of = "" if one.compared == "cost" else f" ({one.compared})"
-    return f"{one.without}: {nats}{change}{of}"
+    return f"{displayed(one.without, 300)}: {nats}{change}{of}"
 
 
 def print_written(files: Sequence[Path]) -> None:
     """Print the names of the files that were written, if any."""
     if files:
-        click.echo(f"written   {', '.join(map(click.format_filename, files))}")
+        click.echo(f"written   {', '.join(displayed_path(file) for file in files)}")
 
 
 def _search_lines(result: Tween) -> list[tuple[str, str]]:
     """Describe a path and its certificate: headings, each with a line."""
     seconds = float(result.motion.times[-1])
-    bridged = [f"{b.joint} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
-    waited = Counter(wait.joint for wait in result.waits)
+    bridged = [f"{displayed(b.joint)} in move {b.move + 1} ({b.degrees:.0f} degrees)" for b in result.bridges]
+    waited = Counter(displayed(wait.joint) for wait in result.waits)
     return [
         ("moves", f"{result.moves}, in {seconds:.2f} s ({count(len(result.motion), 'frame')})"),
         ("cost", f"{result.cost:.3f} nats"),
@@ -198,7 +202,7 @@ def _distance_lines(result: Tween) -> list[tuple[str, str]]:
     lines = []
     for stop, where, row in stops:
         worst = int(row.argmax())
-        mean, most = f"{row.mean():.1f} degrees per joint", f"{row[worst]:.1f} ({result.joints[worst]})"
+        mean, most = f"{row.mean():.1f} degrees per joint", f"{row[worst]:.1f} ({displayed(result.joints[worst])})"
         lines.append((stop, f"{where}{mean} from the corpus's states, at most {most}"))
     if result.moves > 1:
         off, share = result.path_degrees[1:-1], result.followed[1:-1].mean()
@@ -243,8 +247,8 @@ def print_review(report: dict[str, Any]) -> None:
     values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
     nudge = ", ".join(f"{x:g}" for x in course["nudge"])
     click.echo(
-        f"{report['piece']['name'] or 'piece'}, {count(report['piece']['postures'], 'posture')}, by {course['flow']} "
-        f"({values}), nudge {nudge}, skip {course['skip']}"
+        f"{displayed(report['piece']['name']) or 'piece'}, {count(report['piece']['postures'], 'posture')}, "
+        f"by {course['flow']} ({values}), nudge {nudge}, skip {course['skip']}"
     )
     click.echo(
         f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
@@ -280,11 +284,11 @@ def _format_transition(seam: dict[str, Any]) -> str:
     if seam["corpus"] is None:
         return "not judged"
     if not seam["breaks"]:
-        return f"attested by {seam['corpus']}"
+        return f"attested by {displayed(seam['corpus'])}"
     ordered = sorted(seam["breaks"], key=lambda one: -float(one["degrees"]))
-    worst, others = ordered[0], [one["joint"] for one in ordered[1:]]
+    worst, others = ordered[0], [displayed(one["joint"]) for one in ordered[1:]]
     faults = ["not attested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
-    why = f"{worst['joint']} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
+    why = f"{displayed(worst['joint'])} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
     if not seam["candidates"]:
         state = "no path found" if seam["failure"] else "not smoothed"
         return f"abrupt, {state}: {', '.join([why, *others])}"
@@ -301,13 +305,13 @@ def _format_transition(seam: dict[str, Any]) -> str:
 def _format_origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:
     """Format where movement comes from: "ballet", "ballet (mirrored, reversed)"."""
     changes = ", ".join(["mirrored"] * is_mirrored + ["reversed"] * is_reversed)
-    return f"{corpus} ({changes})" if changes else corpus
+    return f"{displayed(corpus)} ({changes})" if changes else displayed(corpus)
 
 
 def print_origins(summary: dict[str, Any]) -> None:
     """Print where a corpus's movement comes from, unless that is only its own recordings as they are."""
     rows = [(_format_origin(row["corpus"], row["mirrored"], row["reversed"]), row) for row in summary["origins"]]
-    if len(rows) < 2 and not any(name != summary["name"] for name, _ in rows):
+    if len(rows) < 2 and not any(name != displayed(summary["name"]) for name, _ in rows):
         return
     width = max(len(name) for name, _ in rows)
     click.echo(f"{'learned from':{width}}  clips  postures  moves  each counts  of all moves")
@@ -322,14 +326,16 @@ def print_check(check: dict[str, Any]) -> None:
     """Print what `Engine.check` found: states, edges and out-degree of each joint, share of pairs joined, faults."""
     rate = f"{check['rate']:g} a second" if check["rate"] else "keyframes"
     click.echo(
-        f"{check['name']}: {count(len(check['clips']), 'clip')}, {check['postures']} postures ({rate}), "
-        f"{check['skeleton']}"
+        f"{displayed(check['name'])}: {count(len(check['clips']), 'clip')}, {check['postures']} postures ({rate}), "
+        f"{displayed(check['skeleton'])}"
     )
     print_origins(check)
-    width = max(len(joint) for joint in check["states"])
+    width = max(len(displayed(joint)) for joint in check["states"])
     click.echo(f"{'joint':{width}}  states  edges  out-degree")
     for joint, states in check["states"].items():
-        click.echo(f"{joint:{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}")
+        click.echo(
+            f"{displayed(joint):{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}"
+        )
     click.echo(f"{check['joinable']:.1%} of {check['pairs']} random pairs of postures can be joined without a bridge")
     _print_faults(check["faults"], check["repairs"])
 
@@ -356,9 +362,9 @@ def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, 
         stretches = [one for one in repairs if parts_of_clip.fullmatch(one["clip"]) and not one["exact"]]
         frames = {frame for one in stretches for frame in range(one["start"], one["stop"])}
         if frames:
-            joints = enumerated(dict.fromkeys(one["joint"] for one in stretches), 4)
+            joints = enumerated(dict.fromkeys(displayed(one["joint"]) for one in stretches), 4)
             parts.append(f"{count(len(frames), 'frame')} reconstructed ({joints})")
-        click.echo(f"  {clip}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
+        click.echo(f"  {displayed(clip)}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
     if len(clips) > MOST_CLIPS:
         click.echo(f"  and {count(len(clips) - MOST_CLIPS, 'more clip')}")
 

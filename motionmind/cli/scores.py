@@ -11,6 +11,7 @@ from motionmind.cli.options import OUTPUTS, Section, command, option
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE, RATE
 from motionmind.cli.words import parse_tolerances
+from motionmind.display import displayed, displayed_path
 from motionmind.render import PICTURES
 
 _TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
@@ -42,13 +43,19 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
     if posture:
         found = notation.posture(read_score(score), posture)
         write(output, found)
-        click.echo(f"{output}: {posture}, {len(found.skeleton)} joints ({found.skeleton.name})")
+        click.echo(
+            f"{displayed_path(output)}: {displayed(posture)}, {len(found.skeleton)} joints "
+            f"({displayed(found.skeleton.name)})"
+        )
         return
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
     motion = motion if fps is None else motion.resample(fps)
     write(output, motion)
-    click.echo(f"{output}: {motion.name}, {count(len(motion), 'frame')} in {seconds:.1f} s, {motion.skeleton.name}")
+    click.echo(
+        f"{displayed_path(output)}: {displayed(motion.name)}, {count(len(motion), 'frame')} in {seconds:.1f} s, "
+        f"{displayed(motion.skeleton.name)}"
+    )
 
 
 @command("motionmind library corpora/karate/*.score -o mine.toml --tolerance 12 --tolerance hip=8")
@@ -80,4 +87,7 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
     degrees, per_joint = parse_tolerances(tolerance, _TOLERANCE)
     found = name_states([read_score(score) for score in scores], degrees, per_joint, stage=stage)
     write_library(output, found)
-    click.echo(f"{output}: {sum(map(len, found.tables.values()))} states of {count(len(found.tables), 'joint')}")
+    click.echo(
+        f"{displayed_path(output)}: {sum(map(len, found.tables.values()))} states "
+        f"of {count(len(found.tables), 'joint')}"
+    )

@@ -4,29 +4,12 @@ from __future__ import annotations
 
 import io
 import os
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
-# Control characters but ends of lines and tabs, and characters that turn the direction of text or end lines.
-_UNSAFE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
-_LONG = re.compile(r"\S{300,}")
-
-
-def printable(text: str) -> str:
-    """Return text, in which names from files may stand, so that a terminal shows it and does nothing else.
-
-    Characters that would move the cursor, set a title or turn the direction of text are written as escapes, and the
-    middle of words that fill lines is left out.
-    """
-    return _LONG.sub(lambda word: f"{word[0][:60]}...{word[0][-20:]}", _escape(text))
-
-
-def _escape(text: str) -> str:
-    """Write unsafe characters as JSON does, which so stays what it is."""
-    return _UNSAFE.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
+from motionmind.display import escaped
 
 
 class _Escaping:
@@ -37,7 +20,7 @@ class _Escaping:
 
     def write(self, text: str) -> int:
         """Write text with what a terminal would act on as escapes."""
-        self._stream.write(_escape(text))
+        self._stream.write(escaped(text))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:

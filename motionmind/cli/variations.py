@@ -24,6 +24,7 @@ from motionmind.cli.sources import is_collection, read_movement, select_frames, 
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point, Whole
 from motionmind.cli.words import parse_parameters
+from motionmind.display import displayed_path
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
 
@@ -237,7 +238,7 @@ def attractor(variation: Path, output: Path) -> None:
     check_outputs([(output, ATTRACTORS)], [variation])
     found = read_variation(variation)
     write_attractor(output, found)
-    click.echo(f"{output}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
+    click.echo(f"{displayed_path(output)}: {found.course.flow}, {len(found.piece)} sites, {len(found.order)} points")
 
 
 def load_engine(corpus: str, home: Path | None) -> Engine:

@@ -163,7 +163,7 @@ def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float
     if name is None:
         raise FormatError(f"no array {_RATES[0]!r}: say how many frames per second there are", path=path)
     rate = arrays.get(name, np.array(fps, dtype=np.float64))
-    if rate.size != 1 or not 0.0 < rate.item() <= FASTEST:
+    if rate.size != 1 or not 1.0 / LARGEST <= rate.item() <= FASTEST:
         raise FormatError(f"{name!r} must be one number of frames per second, not {_in_one_line(rate)}", path=path)
     return float(rate.item())
 

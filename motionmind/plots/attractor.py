@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.plots import symbols
@@ -75,7 +76,7 @@ def attractor(portrait: Portrait) -> Plate:
 
 
 def _title(portrait: Portrait) -> str:
-    name = portrait.variation.piece.motion.name or "A piece"
+    name = displayed(portrait.variation.piece.motion.name) or "A piece"
     return f"{name} on the attractor of {portrait.flow.label}"
 
 

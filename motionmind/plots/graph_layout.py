@@ -11,6 +11,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.corpus.corpus import FACING
+from motionmind.display import displayed
 from motionmind.geometry import rotations as rot
 from motionmind.plots.brush import Point
 from motionmind.plots.marks import LETTER
@@ -244,7 +245,7 @@ def _arrow(graph: nx.DiGraph, a: int, b: int, place: dict[int, Floats], radius: 
     tip = end - (radius[b] + 1.0) * into
     base, side = tip - size * into, 0.45 * size * np.array([into[1], -into[0]])
     away = (bent - start) / max(hypot(*(bent - start)), 1e-9)
-    names = [graph.nodes[state]["label"] for state in (a, b)]
+    names = [displayed(graph.nodes[state]["label"]) for state in (a, b)]
     data = graph.edges[a, b]
     return Arrow(
         (_point(start + radius[a] * away), _point(bent), _point(base)),
@@ -264,18 +265,21 @@ def _names(graph: nx.DiGraph, states: Sequence[int]) -> list[str]:
     """Return the names of states: their labels, or the direction that the body faces."""
     if graph.graph["joint"] == FACING:
         return [f"{turn:.0f}°" for turn in np.degrees(rot.heading(_orientations(graph, states))).round() + 0.0]
-    return [graph.nodes[state]["label"].removeprefix("state ") for state in states]
+    return [displayed(graph.nodes[state]["label"].removeprefix("state "), 40) for state in states]
 
 
 def _facts(graph: nx.DiGraph, state: int) -> str:
     """List the facts about a state: visits, successors, and the parent joint's states that go with it."""
     data = graph.nodes[state]
-    lines = [f"{data['label']}: {data['visits']:g} visits, stays {probability(graph, state, state):.0%}"]
+    lines = [f"{displayed(data['label'])}: {data['visits']:g} visits, stays {probability(graph, state, state):.0%}"]
     after = sorted(
         ((probability(graph, state, t), t) for t in graph.succ[state] if t != state), key=lambda p: (-p[0], p[1])
     )
-    lines += [f"then {graph.nodes[t]['label']} {chance:.0%}" for chance, t in after[:3]]
-    lines += [f"{chance:.0%} where {graph.graph['parent']} is {above}" for above, chance in data.get("given", ())]
+    lines += [f"then {displayed(graph.nodes[t]['label'])} {chance:.0%}" for chance, t in after[:3]]
+    lines += [
+        f"{chance:.0%} where {displayed(graph.graph['parent'])} is {displayed(above)}"
+        for above, chance in data.get("given", ())
+    ]
     return "\n".join(lines)
 
 
@@ -283,7 +287,8 @@ def _words(graph: nx.DiGraph, left_out: int) -> tuple[str, str]:
     """Return the heading and the legend."""
     between = sum(a != b for a, b in graph.edges)
     heading = (
-        f"{graph.graph['joint']} ({graph.graph['corpus']}): {len(graph)} states, {between} transitions between them"
+        f"{displayed(graph.graph['joint'])} ({displayed(graph.graph['corpus'])}): {len(graph)} states, "
+        f"{between} transitions between them"
     )
     if left_out:
         heading += f"; {left_out} that no transition joins left out"

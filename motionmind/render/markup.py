@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from xml.sax.saxutils import escape
+
+from motionmind.display import printable
 
 
 def hexadecimal(rgb: Iterable[float]) -> str:
@@ -13,5 +14,5 @@ def hexadecimal(rgb: Iterable[float]) -> str:
 
 
 def xml_text(text: str) -> str:
-    """Escape text for XML; control characters, which XML cannot hold, become spaces, but line breaks stay."""
-    return escape(re.sub(r"[\x00-\x09\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]", " ", text))
+    """Escape text for XML, and as it is displayed (`printable`); ends of lines stay."""
+    return escape(printable(text))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.display import displayed
 from motionmind.files import FilePath, write_atomically
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
@@ -62,7 +63,7 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
 def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
     """Fill in the template of the page."""
     return Template(_text("page.html")).substitute(
-        title=html.escape(motion.name or motion.skeleton.name),
+        title=html.escape(displayed(motion.name or motion.skeleton.name)),
         style=_text("player.css") + style,
         beside=beside,
         modules=_modules(start),
@@ -97,10 +98,14 @@ def _data(motion: Motion, first: int) -> dict[str, Any]:
     skeleton = motion.skeleton
     body = shape_of(skeleton)
     return {
-        "name": motion.name,
+        "name": displayed(motion.name),
         "first": first,
         "farthest": _farthest(motion),
-        "skeleton": {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist()},
+        "skeleton": {
+            "names": [displayed(name) for name in skeleton.names],
+            "parents": skeleton.parents,
+            "offsets": skeleton.offsets.tolist(),
+        },
         "body": _body_data(body),
         "colours": {"given": COLOURS, "inserted": INSERTED, "bridged": BRIDGED, "ink": INK},
         "times": base64_of(motion.times.astype("<f8").tobytes()),

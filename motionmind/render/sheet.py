@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from motionmind._typing import Floats, Pixels
 from motionmind.body.motion import Motion
 from motionmind.body.palette import Colour
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.body_shape import shape_of
 from motionmind.render.body_solids import BodyShape
@@ -173,7 +174,7 @@ class _Sheet:
         header = _LINE * (len(lines) + 2)
         sheet = Image.new("RGB", (columns * wide + 1, header + ceil(count / columns) * tall + 1), SHEET_PAPER)
         pen = ImageDraw.Draw(sheet)
-        pen.text((6, 4), self.motion.name or self.motion.skeleton.name, TEXT, ImageFont.load_default(15))
+        pen.text((6, 4), displayed(self.motion.name or self.motion.skeleton.name), TEXT, ImageFont.load_default(15))
         for number, line in enumerate(lines):
             for x, words, ink in line:
                 pen.text((x, _LINE * (number + 1) + 9), words, ink, _small())

@@ -16,6 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from motionmind._typing import Floats, Pixels, Singles
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.palette import Colour
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.body_shape import shape_of
 from motionmind.render.camera import SMOOTH, Camera, Corner, aim
@@ -167,7 +168,7 @@ class Stage:
         if self._inserted[number]:
             words.append(("inserted", VIOLET))
         if self._bridged[number].any():
-            names = (self.motion.skeleton.names[joint] for joint in np.flatnonzero(self._bridged[number]))
+            names = (displayed(self.motion.skeleton.names[joint]) for joint in np.flatnonzero(self._bridged[number]))
             words.append((f"bridged: {', '.join(names)}", BRIDGED))
         return words
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Int16s, Singles
 from motionmind.body.motion import Motion
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.render.bspline import path
@@ -73,7 +74,7 @@ def svg(motion: Motion, *, fps: float | None = None, view: str = "quarter", size
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
         f' role="img" font-family="system-ui,Helvetica,Arial,sans-serif" font-size="{stage.letters}"'
         ' stroke-linejoin="round" stroke-linecap="round">',
-        f"<title>{_text(motion.name or 'movement')}</title>",
+        f"<title>{_text(displayed(motion.name) or 'movement')}</title>",
         "<style>text{font-variant-numeric:tabular-nums}"
         "@media(prefers-reduced-motion:reduce){.play{display:none}.still{display:inline}}</style>",
         f'<rect width="100%" height="100%" fill="{hexadecimal(PAPER)}"/>',

@@ -26,6 +26,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
+from motionmind.display import displayed
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.pace import over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
@@ -126,7 +127,7 @@ def tempo_of(
 
 def worded(faster: Sequence[FasterPart]) -> str:
     """Return parts that are faster than ever in words: "left_knee 2.1 times, travel 1.4 times"."""
-    return ", ".join(f"{one.part} {one.times:.1f} times" for one in faster)
+    return ", ".join(f"{displayed(one.part)} {one.times:.1f} times" for one in faster)
 
 
 def _parts(learned: LearnedCorpus) -> tuple[str, ...]:

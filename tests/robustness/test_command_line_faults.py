@@ -15,6 +15,8 @@ import click
 import numpy as np
 import pytest
 from command_line import Run
+from hypothesis import given
+from hypothesis import strategies as st
 
 import motionmind
 from motionmind.body.human import human23
@@ -22,6 +24,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.cli.application import app
 from motionmind.cli.types import Moves, Number, Numbers, Point, Size, Span, Whole
+from motionmind.display import displayed
 from motionmind.formats import read_motion, write_motion
 from motionmind.geometry import rotations as rot
 
@@ -156,6 +159,52 @@ def test_nothing_that_a_terminal_acts_on_is_printed(tmp_path: Path, run: Run) ->
     info = run("corpus", "info", "mine", "--json")
     assert (info.json["title"], UNSAFE.findall(info.out)) == (FOREIGN, [])  # whole, escaped as JSON does
     assert json.loads((tmp_path / "home/corpora/mine/manifest.json").read_bytes())["title"] == FOREIGN
+
+
+LONG = "a name that never ends " * 200
+
+
+def test_long_names_are_shortened_wherever_they_are_displayed(tmp_path: Path, run: Run) -> None:
+    joints = tuple(f"{number} {LONG}" for number in range(len(BODY)))
+    body = Skeleton(LONG, joints, BODY.parents, BODY.offsets, BODY.tips)
+    write_motion(tmp_path / "clip.json", replace(motion(name=LONG), skeleton=body))
+    calls: list[tuple[int, tuple[object, ...]]] = [
+        (0, ("corpus", "build", "mine", "clip.json", "--title", LONG, "--author", f"{LONG}\n{LONG}")),
+        (0, ("corpus", "list")),
+        (0, ("corpus", "info", "mine")),
+        (0, ("corpus", "check", "mine")),
+        (0, ("tween", "clip.json@0", "clip.json@9", "--corpus", "mine", "--moves", "1", "--report", "report.json")),
+        (0, ("explain", "report.json")),
+        (0, ("render", "clip.json", "-o", "clip.html")),
+        (0, ("render", "clip.json", "-o", "clip.svg")),
+        (0, ("graph", "--corpus", "mine", "--joint", joints[5], "-o", "graph.svg")),
+        (2, ("graph", "--corpus", "mine", "--joint", LONG, "-o", "graph.svg")),
+        (2, ("tween", A, B, "--corpus", "mine")),
+        (2, ("convert", "clip.json", f"{LONG}.bvh")),
+        (2, (LONG,)),
+    ]
+    for code, words in calls:
+        ran = run(*words)
+        assert ran.code == code, ran.err[:1000]
+        assert max(map(len, (ran.out + ran.err).splitlines()), default=0) < 2500, words[:2]
+        assert LONG[:1600] not in ran.out + ran.err
+    for name in ("clip.svg", "graph.svg"):
+        assert LONG[:400] not in (tmp_path / name).read_text("utf-8")
+    page = (tmp_path / "clip.html").read_text("utf-8")
+    shown = re.findall(r"<title>.*</title>|<h1>.*</h1>|\"names\":\[.*?\]", page)
+    assert [LONG[:100] in words for words in shown] == [False] * 3
+    assert run("corpus", "info", "mine", "--json").json["title"] == LONG
+    assert json.loads((tmp_path / "report.json").read_bytes())["joints"] == [*joints, "facing"]
+
+
+@given(st.text(max_size=400), st.integers(20, 300))
+def test_a_displayed_name_is_one_short_line_and_short_plain_names_stay(name: str, most: int) -> None:
+    shown = displayed(name, most)
+    assert len(shown) <= most
+    assert len(shown.splitlines()) <= 1
+    assert UNSAFE.findall(shown) == []
+    assert displayed(shown, most) == shown
+    assert shown == name or len(name) > most or re.search(r"[\W\s]", name)
 
 
 @pytest.mark.parametrize("name", ["secret", "secret.txt", "secret.score.txt", ".netrc"])
