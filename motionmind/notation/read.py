@@ -100,7 +100,8 @@ def _read_include(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Wher
         included = path.parent / file
         if not included.is_file():
             raise head.where.error(f"there is no file {included}")
-        if included.suffix.lower() != ".score":  # errors quote what they do not understand: no other file's lines
+        # Errors quote what they do not understand: no lines of what is no score, though a link to it has such a name.
+        if {included.suffix.lower(), included.resolve().suffix.lower()} != {".score"}:
             raise head.where.error(f"{file} is no score; the name of one ends in .score")
         if included.resolve() in above:
             raise head.where.error(f"{file} includes itself")

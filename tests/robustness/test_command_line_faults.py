@@ -217,6 +217,15 @@ def test_an_include_of_what_is_no_score_shows_nothing_of_it(tmp_path: Path, run:
         assert ran.err.startswith("error: a.score:3: ")
 
 
+def test_an_include_of_a_link_to_what_is_no_score_shows_nothing_of_it(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "secret").write_text("password hunter2\n")
+    (tmp_path / "link.score").symlink_to("secret")
+    (tmp_path / "a.score").write_text("title A\nbody human23\ninclude link.score\n")
+    ran = run("compose", "a.score", "-o", "out.json")
+    assert ran.code == 2
+    assert ran.err == "error: a.score:3: link.score is no score; the name of one ends in .score\n"
+
+
 # --- numbers ----------------------------------------------------------------------------------------------------------
 
 NUMBERS = (Moves, Number, Numbers, Point, Size, Span, Whole, click.types.IntParamType, click.types.FloatParamType)
