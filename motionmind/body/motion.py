@@ -272,7 +272,8 @@ def _freeze_checked(thing: Posture | Motion, rotations: tuple[int, ...], root: t
             raise MotionMindError(f"{name}: {_place(thing, what, where)} is not a finite number")
         array.setflags(write=False)
         object.__setattr__(thing, what, array)
-    length = np.linalg.norm(thing.rotations, axis=-1)
+    with np.errstate(over="ignore"):  # a length beyond all numbers is not 1 either
+        length = np.linalg.norm(thing.rotations, axis=-1)
     if np.any(np.abs(length - 1.0) > 1e-6):
         where = np.argwhere(np.abs(length - 1.0) > 1e-6)[0]
         raise MotionMindError(

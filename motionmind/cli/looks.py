@@ -10,7 +10,7 @@ import click
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option
 from motionmind.cli.types import FILE
-from motionmind.display import displayed, displayed_path, printable
+from motionmind.display import displayed, displayed_path
 
 
 @command("motionmind explain report.json")
@@ -26,7 +26,7 @@ def explain(report: Path, as_json: bool) -> None:
     from motionmind.tween.report import read_report
 
     explanation = explain(read_report(report))
-    click.echo(json.dumps(explanation.plain()) if as_json else printable(str(explanation)))
+    click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
 
 
 @command("motionmind graph --corpus ballet --joint left_shoulder -o graph.svg")

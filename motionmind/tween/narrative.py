@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from motionmind.display import displayed
 from motionmind.tween.certificate import Source
 from motionmind.tween.report import TweenReport
 from motionmind.tween.result import Tween, report_of
@@ -181,14 +182,20 @@ def _joint_lines(move: ExplainedMove) -> Iterator[str]:
     moving = sorted((step for step in move.joints if step.moved), key=lambda step: -step.degrees)
     still = [step for step in move.joints if not step.moved]
     cells = [
-        (step.joint, f"{step.before} -> {step.after}", f"{step.degrees:.0f} degrees", _likelihood(step), _place(step))
+        (
+            displayed(step.joint),
+            f"{displayed(step.before)} -> {displayed(step.after)}",
+            f"{step.degrees:.0f} degrees",
+            _likelihood(step),
+            _place(step),
+        )
         for step in moving
     ]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     for row in cells:
         yield "  " + "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
     for word, waits in (("still", False), ("waiting", True)):
-        joints = [step.joint for step in still if (step.how == "wait") == waits]
+        joints = [displayed(step.joint) for step in still if (step.how == "wait") == waits]
         if joints:
             yield f"  {word}: {', '.join(joints)}"
     clips = Counter(_clip(step.source) for step in move.joints if step.source)
@@ -197,7 +204,7 @@ def _joint_lines(move: ExplainedMove) -> Iterator[str]:
         yield f"  mostly from {most} ({times} of {len(move.joints)} joints), {len(clips)} clips in all"
     rarest = max(move.joints, key=lambda step: step.coordination, default=None)
     if rarest and rarest.coordination > 0.0:
-        yield f"  least expected beside its parent: {rarest.joint} ({rarest.coordination:.2f} nats)"
+        yield f"  least expected beside its parent: {displayed(rarest.joint)} ({rarest.coordination:.2f} nats)"
 
 
 def _likelihood(step: JointStep) -> str:
@@ -217,4 +224,4 @@ def _place(step: JointStep) -> str:
 def _clip(source: Source) -> str:
     """Return a clip by its corpus and name: "ballet: jump (mirrored, reversed)"."""
     changes = ", ".join(["mirrored"] * source.mirrored + ["reversed"] * source.reversed)
-    return f"{source.corpus}: {source.clip}" + (f" ({changes})" if changes else "")
+    return f"{displayed(source.corpus)}: {displayed(source.clip)}" + (f" ({changes})" if changes else "")
