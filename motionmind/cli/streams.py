@@ -38,7 +38,7 @@ class _Forgiving:
         try:
             return self._stream.write(text)
         except (OSError, ValueError):  # ValueError: it was closed
-            self._silence()
+            self.silence()
             return len(text)
 
     def flush(self) -> None:
@@ -46,9 +46,9 @@ class _Forgiving:
         try:
             self._stream.flush()
         except (OSError, ValueError):
-            self._silence()
+            self.silence()
 
-    def _silence(self) -> None:
+    def silence(self) -> None:
         """Let what is buffered go nowhere, or Python would fail with it when it ends."""
         with suppress(OSError, ValueError):
             nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -79,3 +79,10 @@ def forgiving() -> Iterator[None]:
     finally:
         sys.stderr.flush()
         sys.stdout, sys.stderr = given
+        # A reader that has gone away is no error, and Python would say it is one when it flushes what is left.
+        with suppress(OSError):
+            try:
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+            except BrokenPipeError:
+                _Forgiving(sys.stdout).silence()

@@ -132,7 +132,7 @@ def carry(
     own = pose(skeleton, plain)
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     balances = "balance" not in without and bool(mass.any())
-    stands = balances and "steps" not in without and not walks(root, fps)
+    stands = balances and staying is None and "steps" not in without and not walks(root, fps)
     for number_of_round in range(ROUNDS[0]):
         if number_of_round and stands:
             falls = _falls(shape, bearing, start, mass, overhang)

@@ -286,7 +286,7 @@ def test_the_floor_and_the_limits_hold() -> None:
         found, went = grounded(q, root)
         heights = lowest_height(human23(), found, went)
         assert heights.min() > -0.01
-        assert heights.max() < 0.02
+        assert heights.max() < 0.025
         # But for what it takes to keep the feet on the floor all the same.
         assert rot.angle(within_limits(human23(), found, found[[0, -1]], TIGHT), found).max() < 1e-9
 
