@@ -349,7 +349,7 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     balls, tips, back = (rot.mul_vec(turn[:, None], feet[taken]) for feet in (placed.balls, placed.tips, placed.back))
     held = np.minimum(weight[:-1], weight[1:])
     both: Bools = np.asarray(held > 0.0)  # else the foot rolls over its tip
-    held = np.where(both.any(axis=1)[:, None], held, rests[:-1] & rests[1:])
+    held = np.where(np.any(both, axis=1)[:, None], held, rests[:-1] & rests[1:])
     pivot = placed.pivot[taken[1:]]
     before, after = (
         np.where(both[..., None], balls[part] + pivot * back[part], tips[part]) for part in (slice(-1), slice(1, None))
