@@ -7,7 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from itertools import islice
 from typing import Any
+
+_MOST_COMPARED = 64, 2000  # characters of a word, and words, among which a slip of the pen is looked for
 
 
 class MotionMindError(Exception):
@@ -105,7 +108,10 @@ def quoted(text: str, most: int = 40) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return '; did you mean X?' for the known name most similar to `name`, or '' if none is similar."""
-    close = get_close_matches(name, list(known), n=1)
+    # Comparing takes the product of the lengths: long words and long lists are not what a slip is found among.
+    comparable = (word for word in known if len(word) <= _MOST_COMPARED[0])
+    near = list(islice(comparable, _MOST_COMPARED[1])) if len(name) <= _MOST_COMPARED[0] else []
+    close = get_close_matches(name, near, n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row, check_words, play_phrase, posture_row
+from motionmind.notation.rows import Row, Work, check_words, play_phrase, posture_row
 from motionmind.notation.score import Clip, Score, Setting
 from motionmind.notation.stance import Feet, place_legs
 
@@ -81,14 +81,15 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
     Raises:
         FormatError: as `compose`.
     """
+    work = Work()
     for phrase in score.phrases.values():
         if phrase.score is score:
-            check_words(phrase)
+            check_words(phrase, work)
     clips = score.clips if clips is None else clips
     if not clips:
         return []
-    parts = [play_phrase(clip) for clip in clips]
-    placed = _place_postures(score.body, [row for part in parts for row in part])
+    parts = [play_phrase(clip, work) for clip in clips]
+    placed = _place_distinct(score.body, [row for part in parts for row in part])
     ends = np.cumsum([len(part) for part in parts])
     return [
         (part, _join_moves(score.body, clip.name, part, placed.part(end - len(part), end)))
@@ -102,23 +103,25 @@ def posture(score: Score, name: str) -> Posture:
         hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
         raise FormatError(f"no posture {name!r}{hint}", path=score.path)
     row = posture_row(score, score.postures[name])
-    return _join_moves(score.body, name, [row], _place_postures(score.body, [row])).posture(0)
+    return _join_moves(score.body, name, [row], _place_distinct(score.body, [row])).posture(0)
 
 
 @dataclass(frozen=True)
 class _Placed:
-    """Postures placed on the floor, each in the frame that it faces in.
+    """D distinct postures placed on the floor, each in the frame that it faces in, and which of them are taken.
 
     Attributes:
-        rotations: local [T, J, 4].
-        root: [T, 3], metres.
-        weight: the share that each foot bears [T, F].
-        rests: whether a foot is on the floor [T, F].
-        balls, tips: places of the feet [T, F, 3], metres.
-        back: unit vectors from the ball of a foot towards its heel [T, F, 3].
-        pivot: distance in that direction to the point about which the foot turns [T, F, 1], metres.
+        taken: the posture of each row, among the D [T].
+        rotations: local [D, J, 4].
+        root: [D, 3], metres.
+        weight: the share that each foot bears [D, F].
+        rests: whether a foot is on the floor [D, F].
+        balls, tips: places of the feet [D, F, 3], metres.
+        back: unit vectors from the ball of a foot towards its heel [D, F, 3].
+        pivot: distance in that direction to the point about which the foot turns [D, F, 1], metres.
     """
 
+    taken: Ints
     rotations: Floats
     root: Floats
     weight: Floats
@@ -129,8 +132,22 @@ class _Placed:
     pivot: Floats
 
     def part(self, start: int, stop: int) -> _Placed:
-        """Return the postures from `start` up to `stop`."""
-        return _Placed(*(getattr(self, name)[start:stop] for name in self.__dataclass_fields__))
+        """Return what the rows from `start` up to `stop` take."""
+        return replace(self, taken=self.taken[start:stop])
+
+
+def _place_distinct(body: Anatomy, rows: list[Row]) -> _Placed:
+    """Place the postures that rows describe as `_place_postures` does, each of them once."""
+    numbers: dict[object, int] = {}
+    distinct: list[Row] = []
+    taken = np.empty(len(rows), dtype=np.int64)
+    for t, row in enumerate(rows):
+        # Settings are parsed and mirrored once each, so most that are equal are the same object.
+        key = *map(id, row.limbs), row.up
+        taken[t] = number = numbers.setdefault(key, len(distinct))
+        if number == len(distinct):
+            distinct.append(row)
+    return replace(_place_postures(body, distinct), taken=taken)
 
 
 def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
@@ -165,6 +182,7 @@ def _place_postures(body: Anatomy, rows: list[Row]) -> _Placed:
     on_floor = np.array([row.up is None for row in rows])[:, None]
     above = body.skeleton.global_rotations(rotations)[:, [body.skeleton.parents[joint] for joint in toes]]
     return _Placed(
+        np.arange(len(rows)),
         rotations,
         root,
         weight * on_floor,
@@ -295,32 +313,48 @@ def _check_limits(body: Anatomy, rows: list[Row], degrees: dict[str, Floats]) ->
 
 def _join_moves(body: Anatomy, name: str, rows: list[Row], placed: _Placed) -> Motion:
     """Join placed postures into movement: turn each to where it faces, and keep feet that bear weight in place."""
+    taken = placed.taken
     turn = rot.about_vertical(np.radians([row.face for row in rows]))
-    rotations = placed.rotations.copy()
-    rotations[:, 0] = rot.mul(turn, rotations[:, 0])
-    root = rot.mul_vec(turn, placed.root)
-    balls, tips, back = (rot.mul_vec(turn[:, None], feet) for feet in (placed.balls, placed.tips, placed.back))
-    centre = body.centre_of_mass(rotations, root)
-    go = rot.mul_vec(turn, np.array([[row.go[0], 0.0, row.go[1]] for row in rows]) / 100.0)
-    moved = np.zeros((len(rows), 3))
-    for t in range(1, len(rows)):
-        held = np.minimum(placed.weight[t - 1], placed.weight[t])
-        if not held.any():
-            held = (placed.rests[t - 1] & placed.rests[t]).astype(np.float64)
-        if held.any():
-            both = np.minimum(placed.weight[t - 1], placed.weight[t]) > 0.0  # else the foot rolls over its tip
-            before, after = (np.where(both[:, None], balls[i] + placed.pivot[t] * back[i], tips[i]) for i in (t - 1, t))
-            step = (held[:, None] * (before - after)).sum(axis=0) / held.sum()
-        else:
-            step = centre[t - 1] - centre[t] + go[t]
-        moved[t] = moved[t - 1] + step * [1.0, 0.0, 1.0]
-    # Rounded, so a score gives the same bytes on every machine.
-    times = np.cumsum([0.0, *(row.seconds or 0.0 for row in rows[1:])])
-    return Motion(
-        body.skeleton,
-        np.round(rot.canonical(rotations), 8) + 0.0,
-        np.round(root + moved, 5) + 0.0,
-        np.round(times, 4),
-        name,
-        keyframed=True,
+    root, centre = (
+        rot.mul_vec(turn, places[taken]) for places in (placed.root, body.centre_of_mass(placed.rotations, placed.root))
     )
+    moved = np.zeros((len(rows), 3))
+    moved[1:, [0, 2]] = np.cumsum(_steps(rows, placed, turn, centre), axis=0)[:, [0, 2]]
+    # Rounded, so a score gives the same bytes on every machine.
+    rotations = _rounded(placed.rotations)[taken]
+    rotations[:, 0] = _rounded(rot.mul(turn, placed.rotations[taken, 0]))
+    times = np.cumsum([0.0, *(row.seconds or 0.0 for row in rows[1:])])
+    return Motion(body.skeleton, rotations, np.round(root + moved, 5) + 0.0, np.round(times, 4), name, keyframed=True)
+
+
+def _rounded(rotations: Floats) -> Floats:
+    """Return rotations [..., 4] as they are told in a score's motion."""
+    return np.asarray(np.round(rot.canonical(rotations), 8) + 0.0)
+
+
+def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Floats:
+    """Return how far the body travels from each row to the next [T - 1, 3], metres.
+
+    Feet that bear weight before and after stay where they are, in the mean where they disagree; where none does, feet
+    that rest on the floor stay, and where none rests the centre of mass goes as far as the row says.
+
+    Args:
+        rows: the rows.
+        placed: their postures.
+        turn: where each faces [T, 4].
+        centre: their centres of mass [T, 3], turned, metres.
+    """
+    taken = placed.taken
+    weight, rests = placed.weight[taken], placed.rests[taken]
+    balls, tips, back = (rot.mul_vec(turn[:, None], feet[taken]) for feet in (placed.balls, placed.tips, placed.back))
+    held = np.minimum(weight[:-1], weight[1:])
+    both: Bools = np.asarray(held > 0.0)  # else the foot rolls over its tip
+    held = np.where(np.any(both, axis=1)[:, None], held, rests[:-1] & rests[1:])
+    pivot = placed.pivot[taken[1:]]
+    before, after = (
+        np.where(both[..., None], balls[part] + pivot * back[part], tips[part]) for part in (slice(-1), slice(1, None))
+    )
+    total = held.sum(axis=1)[:, None]
+    stay = (held[..., None] * (before - after)).sum(axis=1) / np.where(total > 0.0, total, 1.0)
+    go = rot.mul_vec(turn[1:], np.array([[row.go[0], 0.0, row.go[1]] for row in rows[1:]]).reshape(-1, 3) / 100.0)
+    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + go)

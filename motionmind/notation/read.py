@@ -29,6 +29,9 @@ from motionmind.notation.score import (
     tempo,
 )
 
+MAX_INCLUDES = 100  # scores that one is made of
+MAX_OPEN = 20  # words that a phrase leaves open
+
 NAME = re.compile(r"[^\W_][\w-]*")
 
 # Words of a standing leg, with the least and greatest number that may follow; `lean` has a direction before its number.
@@ -72,14 +75,17 @@ def read_score(path: FilePath) -> Score:
     >>> [clip.name for clip in read_score("bends.score").clips]
     ['bends']
     """
-    return _read(Path(path), ())
+    return _read(Path(path), (), {})
 
 
-def _read(path: Path, above: tuple[Path, ...]) -> Score:
-    """Read a score that those `above` include."""
+def _read(path: Path, above: tuple[Path, ...], known: dict[Path, Score]) -> Score:
+    """Read a score that those `above` include; each file once, for those that are `known` by their resolved paths."""
     lines = [Line(Where(str(path), number), text) for number, text in enumerate(read_lines(path), start=1)]
     blocks = list(_blocks(lines))
-    includes = [_read_include(path, head, (*above, path.resolve())) for head, _ in blocks if _word(head) == "include"]
+    heads = [head for head, _ in blocks if _word(head) == "include"]
+    if len(heads) > MAX_INCLUDES:
+        raise heads[MAX_INCLUDES].where.error(f"more than {MAX_INCLUDES} scores are included")
+    includes = [_read_include(path, head, (*above, path.resolve()), known) for head in heads]
     score = Score(str(path), _find_body(path, [head for head, _ in blocks], [other for _, _, other in includes]))
     for where, name, other in includes:
         _include(score, where, name, other)
@@ -93,7 +99,9 @@ def _word(head: Line) -> str:
     return head.text.split(maxsplit=1)[0]
 
 
-def _read_include(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Where, str, Score]:
+def _read_include(
+    path: Path, head: Line, above: tuple[Path, ...], known: dict[Path, Score]
+) -> tuple[Where, str, Score]:
     """Read the score of an `include` heading; return its line, the name that it gets, and the score."""
     file, _, name = (part.strip() for part in head.text.removeprefix("include").partition(" as "))
     try:
@@ -105,15 +113,20 @@ def _read_include(path: Path, head: Line, above: tuple[Path, ...]) -> tuple[Wher
             raise head.where.error(f"{file} is no score; the name of one ends in .score")
         if included.resolve() in above:
             raise head.where.error(f"{file} includes itself")
+        place = included.resolve()
     except (OSError, ValueError):
         raise head.where.error(f"{file:.60} cannot be a file") from None
-    return head.where, name, _read(included, above)
+    if place not in known:
+        if len(known) == MAX_INCLUDES or len(above) > MAX_INCLUDES // 2:
+            raise head.where.error(f"more than {MAX_INCLUDES} scores are included, or too many within one another")
+        known[place] = _read(included, above, known)
+    return head.where, name, known[place]
 
 
 def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
     """Yield each heading with the indented lines below it, without comments and empty lines."""
     head: Line | None = None
-    inner: list[Line] = []
+    inner: list[list[Line]] = []  # the lines that make one
     for line in lines:
         text = normalize("NFC", line.text).replace("\t", " ").partition("#")[0].rstrip()
         if not text.strip():
@@ -121,16 +134,20 @@ def _blocks(lines: list[Line]) -> Iterator[tuple[Line, list[Line]]]:
         if text[0].isspace():
             if head is None:
                 raise line.where.error("an indented line before any heading")
-            if inner and inner[-1].text.endswith(","):
-                inner[-1] = Line(inner[-1].where, f"{inner[-1].text} {text.strip()}")
-            else:
-                inner.append(Line(line.where, text.strip()))
+            if not inner or not inner[-1][-1].text.endswith(","):
+                inner.append([])
+            inner[-1].append(Line(line.where, text.strip()))
             continue
         if head:
-            yield head, inner
+            yield head, [_join(parts) for parts in inner]
         head, inner = Line(line.where, text), []
     if head:
-        yield head, inner
+        yield head, [_join(parts) for parts in inner]
+
+
+def _join(parts: list[Line]) -> Line:
+    """Join lines that go on in the next."""
+    return parts[0] if len(parts) == 1 else Line(parts[0].where, " ".join(part.text for part in parts))
 
 
 def _find_body(path: Path, heads: list[Line], included: list[Score]) -> Anatomy:
@@ -185,9 +202,13 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
     if bracket and (word == "clip" or not arguments.endswith(")")):
         raise where.error(f"{rest!r}: write phrase NAME, or phrase NAME (WORD, WORD)")
     words = tuple(part.strip() for part in arguments.removesuffix(")").split(",")) if bracket else ()
+    if len(words) > MAX_OPEN:
+        raise where.error(f"{len(words)} open words; a phrase has {MAX_OPEN} at most")
     for i, open_word in enumerate(words):
         _check_name(open_word, words[:i], where)
-    name = _check_name(name.strip(), {n: p for n, p in score.phrases.items() if p.score is score}, where)
+    name = name.strip()
+    known = score.phrases.get(name)
+    _check_name(name, (name,) if known and known.score is score else (), where)
     if name in ("start", "tempo") or name[0].isdigit():
         raise where.error(f"{name!r} cannot be a phrase's name: a line that begins so is something else")
     if not inner:
@@ -232,9 +253,10 @@ def _add_entry(score: Score, layer: str, line: Line) -> None:
         score.facings[_check_name(name, {}, line.where)] = number(text, name, line.where)
         return
     positions = score.positions.setdefault(layer, {})
-    own = {known: position for known, position in positions.items() if position.path == score.path}
     position = replace(_parse_position(score, layer, text, line.where), path=score.path)
-    positions[_check_name(name, own, line.where)] = position
+    known = positions.get(name)
+    _check_name(name, (name,) if known and known.path == score.path else (), line.where)
+    positions[name] = position
 
 
 def _parse_position(score: Score, layer: str, text: str, where: Where) -> Position:

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import cos, radians, sin
+from typing import Any, NamedTuple, TypeVar
 
 from motionmind.body.anatomy import SIDES
 from motionmind.notation.score import NUMBER, Clip, Line, Phrase, Score, Setting, Where, number, tempo
 
-MAX_DEPTH = 50  # of phrases within phrases; deeper ones call themselves
+MAX_DEPTH = 100  # of phrases, and ways of doing them, within one another; deeper ones call themselves
 MAX_POSTURES = 100_000  # of a clip
+MAX_WORK = 1_000_000  # lines read and postures made while the clips of a score are played: some seconds
+_LONG = 64  # characters of a line that count as one piece of work
+
+_T = TypeVar("_T")
 
 _DIRECTIONS = {"left": (1.0, 0.0), "right": (-1.0, 0.0), "ahead": (0.0, 1.0), "back": (0.0, -1.0)}
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One posture and the move that leads to it.
 
     Attributes:
@@ -30,6 +35,8 @@ class Row:
         seconds: duration of the move; None for a beginning.
         go: distance that the weight travels in the move to the body's left and ahead, centimetres, if no foot stays on
             the floor.
+        faced: whether it, or a line of its phrase before it, says where the body faces; else that follows from where
+            it faced before the phrase.
     """
 
     where: Where
@@ -39,30 +46,60 @@ class Row:
     up: float | None
     seconds: float | None
     go: tuple[float, float] = (0.0, 0.0)
+    faced: bool = False
 
     def same_posture(self, other: Row) -> bool:
         """Return whether the postures are the same, whatever moves lead to them."""
         return self.limbs == other.limbs and (self.face - other.face) % 360.0 == 0.0 and self.up == other.up
 
 
+class Work:
+    """The work that goes into playing phrases, which has a limit, and what of it is remembered.
+
+    Attributes:
+        done: lines read and postures made.
+        cells: by score, layer and text, the settings and the names of a cell.
+        postures: by score and text, lines that are postures.
+        images: by layer and identity, the mirror images of settings and of their names, each with its original.
+    """
+
+    def __init__(self) -> None:
+        self.done = 0
+        self.cells: dict[tuple[Score, str, str], tuple[tuple[Setting, Setting], tuple[str, str]]] = {}
+        self.postures: dict[tuple[Score, str], _Posture] = {}
+        self.images: dict[tuple[str, int], tuple[Any, Any]] = {}
+
+    def add(self, amount: int, where: Where) -> None:
+        """Count work that is about to be done at a line; FormatError if it is too much."""
+        self.done += amount
+        if self.done > MAX_WORK:
+            raise where.error(f"more than {MAX_WORK} lines and postures are played; repeat less")
+
+
 # Plays a phrase out after the row before it, if any; the rows include the phrase's own beginning if it has one.
 _Player = Callable[[Row | None], list[Row]]
 
 
-def play_phrase(phrase: Phrase) -> list[Row]:
+def play_phrase(phrase: Phrase, work: Work | None = None) -> list[Row]:
     """Play a phrase or clip out from its beginning.
+
+    Args:
+        phrase: the phrase.
+        work: the work so far, if several are played within one limit.
 
     Returns:
         Its postures, at least one.
 
     Raises:
-        FormatError: a line makes no sense, or there are too many postures; names file and line.
+        FormatError: a line makes no sense, or there are too many postures, or too much work; names file and line.
     """
-    return _player(phrase, {}, phrase.score.tempo, 0)(None)
+    return _player(phrase, {}, phrase.score.tempo, 0, work or Work())(None)
 
 
-def check_words(phrase: Phrase) -> None:
+def check_words(phrase: Phrase, work: Work) -> None:
     """Look up every word of a phrase, whether or not anything calls it; lines with open words are skipped.
+
+    What is looked up is remembered in `work`, and does not count as work.
 
     Raises:
         FormatError: a word is unknown; names file and line.
@@ -73,17 +110,17 @@ def check_words(phrase: Phrase) -> None:
         if _is_tempo(line.text):
             tempo(line.text.partition(" ")[2].strip(), line.where)
         elif "|" in line.text or _is_hold(line.text):
-            _row(phrase.score, line, None, 1.0)
+            _row(phrase.score, line, None, 1.0, work)
         else:
-            _call(phrase, line, phrase.score.tempo, 0)
+            _call(phrase, line, phrase.score.tempo, 0, work)
 
 
 def posture_row(score: Score, line: Line) -> Row:
     """Return the row of a single posture, written without its first cell; FormatError if it makes no sense."""
-    return _row(score, replace(line, text=f"start | {line.text}"), None, 1.0)
+    return _row(score, replace(line, text=f"start | {line.text}"), None, 1.0, Work())
 
 
-def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int) -> _Player:
+def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, work: Work) -> _Player:
     """Return the player of a phrase with its open words filled by `words`, at `counts` a minute."""
 
     def run(before: Row | None) -> list[Row]:
@@ -91,14 +128,15 @@ def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int) ->
             raise phrase.where.error(f"{phrase.name} calls itself")
         pace, rows = counts, list[Row]()
         for written in phrase.lines:
-            line = _fill(written, words)
+            line = _fill(written, words, work)
+            work.add(1 + len(line.text) // _LONG, line.where)
             standing = rows[-1] if rows else before
             if _is_tempo(line.text):
                 pace = tempo(line.text.partition(" ")[2].strip(), line.where)
             elif "|" in line.text or _is_hold(line.text):
-                rows += _continue([_row(phrase.score, line, standing, 60.0 / pace)], rows, line.where)
+                rows += _continue([_row(phrase.score, line, standing, 60.0 / pace, work)], rows, line.where)
             else:
-                rows += _continue(_call(phrase, line, pace, depth)(standing), rows, line.where)
+                rows += _continue(_call(phrase, line, pace, depth, work)(standing), rows, line.where)
             _check_count(rows, line.where)
         if not rows:
             raise phrase.where.error(f"{phrase.name} has no postures")
@@ -114,11 +152,13 @@ def _check_count(rows: list[Row], where: Where) -> list[Row]:
     return rows
 
 
-def _fill(line: Line, words: dict[str, str]) -> Line:
+def _fill(line: Line, words: dict[str, str], work: Work) -> Line:
     """Fill in a line's open words."""
     if not words:
         return line
-    text = re.sub(_whole_words(words), lambda found: words[found[0]], line.text)
+    pattern = _whole_words(words)
+    work.add(sum(len(words[found]) for found in re.findall(pattern, line.text)) // _LONG, line.where)
+    text = re.sub(pattern, lambda found: words[found[0]], line.text)
     if not text.strip():
         raise line.where.error("nothing is left of this line")
     return replace(line, text=text)
@@ -155,11 +195,14 @@ def _difference(before: Row, after: Row) -> str:
 # --- a line that calls another phrase ---------------------------------------------------------------------------------
 
 
-def _call(phrase: Phrase, line: Line, counts: float, depth: int) -> _Player:
+def _call(phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> _Player:
     """Return the player of a line `NAME (WORDS), HOW, HOW`."""
-    match = re.fullmatch(r"([\w.-]+)\s*(\((.*?)\))?\s*(,.*)?", line.text)
+    call, *ways = _split_outside_brackets(line.text)
+    match = re.fullmatch(r"([\w.-]++)\s*+(\(([^)]*+)\))?", call)
     if not match:
         raise line.where.error(f"{line.text!r}: a posture has cells with | between, a phrase is called by its name")
+    if depth + len(ways) > MAX_DEPTH:
+        raise line.where.error(f"{len(ways)} ways to do a phrase are too many")
     called = phrase.score.phrase(match[1], line.where)
     given = [part.strip() for part in match[3].split(",")] if match[2] else []
     if not all(given):
@@ -168,18 +211,45 @@ def _call(phrase: Phrase, line: Line, counts: float, depth: int) -> _Player:
         raise line.where.error(f"{called.name} leaves {len(called.open)} words open, and {len(given)} are given")
     own = called.score is not phrase.score
     pace = called.score.tempo if own and isinstance(called, Clip) else counts
-    run = _player(called, dict(zip(called.open, given, strict=True)), pace, depth + 1)
-    for how in (part.strip() for part in re.split(r",(?![^(]*\))", match[4] or "")[1:]):  # not within brackets
-        run = _modify(run, how, phrase, line, counts, depth)
+    run = _player(called, dict(zip(called.open, given, strict=True)), pace, depth + 1 + len(ways), work)
+    for how in ways:
+        run = _modify(_counted(run, line.where, work), how, phrase, line, counts, depth, work)
     return run
 
 
-def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, depth: int) -> _Player:
+def _split_outside_brackets(text: str) -> list[str]:
+    """Split a line at its commas, except those within brackets."""
+    parts: list[list[str]] = []
+    opened = 0
+    for piece in text.split(","):
+        if opened > 0:
+            parts[-1].append(piece)
+        else:
+            parts.append([piece])
+        opened += piece.count("(") - piece.count(")")
+    return [",".join(part).strip() for part in parts]
+
+
+def _counted(run: _Player, where: Where, work: Work) -> _Player:
+    """Return a player whose rows count as work again, for something is done to each of them."""
+
+    def counted(before: Row | None) -> list[Row]:
+        rows = run(before)
+        work.add(len(rows), where)
+        return rows
+
+    return counted
+
+
+def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> _Player:
     """Return a player that plays a phrase out the way `how` says."""
     words = how.split()
     layers = list(phrase.score.body.layers)
     if how == "other side":
-        return lambda before: [_mirror(row, phrase.score) for row in run(before and _mirror(before, phrase.score))]
+        score = phrase.score
+        return lambda before: [
+            _mirror(row, score, work) for row in run(None if before is None else _mirror(before, score, work))
+        ]
     if how == "backwards":
         return lambda before: _backwards(_play_to_face(run, before))
     if how == "there and back":
@@ -191,7 +261,7 @@ def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, d
         for layer in taken:
             if layer not in layers:
                 raise line.where.error(f"{layer!r} is no layer; there are {', '.join(layers)}")
-        other = _call(phrase, replace(line, text=" ".join(words[words.index("of") + 1 :])), counts, depth)
+        other = _call(phrase, replace(line, text=" ".join(words[words.index("of") + 1 :])), counts, depth, work)
         chosen = [layers.index(layer) for layer in taken]
         return lambda before: _with_layers(run(before), other(before), chosen)
     raise line.where.error(
@@ -200,27 +270,49 @@ def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, d
     )
 
 
-def _mirror(row: Row, score: Score) -> Row:
+def _mirror(row: Row, score: Score, work: Work) -> Row:
     """Exchange left and right."""
-    limbs = tuple(score.mirrored(layer, limb) for layer, limb in zip(score.body.layers, row.limbs, strict=True))
-    words = tuple(score.mirrored_words(layer, words) for layer, words in zip(score.body.layers, row.words, strict=True))
-    return replace(row, limbs=limbs, words=words, face=-row.face, go=(-row.go[0], row.go[1]))
+    layers = score.body.layers
+    return row._replace(
+        limbs=tuple(_image(layer, limbs, score.mirrored, work) for layer, limbs in zip(layers, row.limbs, strict=True)),
+        words=tuple(
+            _image(layer, words, score.mirrored_words, work) for layer, words in zip(layers, row.words, strict=True)
+        ),
+        face=-row.face,
+        go=(-row.go[0], row.go[1]),
+    )
+
+
+def _image(layer: str, what: _T, mirrored: Callable[[str, _T], _T], work: Work) -> _T:
+    """Return the mirror image of a layer's settings, or of their names; the same object each time."""
+    key = layer, id(what)
+    if key not in work.images:
+        image = mirrored(layer, what)
+        work.images[key] = what, image  # what is kept keeps its identity
+        work.images[layer, id(image)] = image, what
+    found: _T = work.images[key][1]
+    return found
 
 
 def _play_to_face(run: _Player, before: Row | None) -> list[Row]:
-    """Play a phrase out to end facing where `before` faces: it begins turned back by the turn that it makes."""
-    rows = run(before)
-    turned = rows[-1].face - before.face if before is not None else 0.0
-    return run(replace(before, face=before.face - turned)) if before is not None and turned else rows
+    """Play a phrase out to end facing where `before` faces: it begins turned back by the turn that it makes.
+
+    A phrase that says where it faces cannot be turned.
+    """
+    if before is None:
+        return run(None)
+    rows = run(before._replace(faced=False))
+    turned = 0.0 if rows[-1].faced else rows[-1].face - before.face  # once said, it holds to the end
+    return [row._replace(face=row.face - turned, faced=row.faced or before.faced) for row in rows]
 
 
 def _backwards(rows: list[Row]) -> list[Row]:
     """Reverse the rows, beginning with the last posture."""
     back = [
-        replace(row, seconds=after.seconds, go=_go_back(after, row))
+        row._replace(seconds=after.seconds, go=_go_back(after, row))
         for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True)
     ]
-    return [replace(rows[-1], seconds=None, go=(0.0, 0.0)), *back]
+    return [rows[-1]._replace(seconds=None, go=(0.0, 0.0)), *back]
 
 
 def _go_back(there: Row, row: Row) -> tuple[float, float]:
@@ -258,7 +350,7 @@ def _with_layers(rows: list[Row], others: list[Row], layers: Sequence[int]) -> l
             move += 1
         limbs = tuple(source.limbs[i] if i in layers else limb for i, limb in enumerate(row.limbs))
         words = tuple(source.words[i] if i in layers else word for i, word in enumerate(row.words))
-        out.append(replace(row, limbs=limbs, words=words))
+        out.append(row._replace(limbs=limbs, words=words))
     return out
 
 
@@ -275,28 +367,48 @@ def _is_hold(text: str) -> bool:
     return first == "start" or bool(re.fullmatch(r"[\d./]+", first))
 
 
-def _row(score: Score, line: Line, before: Row | None, beat: float) -> Row:
+def _row(score: Score, line: Line, before: Row | None, beat: float, work: Work) -> Row:
     """Return the row that a line describes after the row `before`; a count lasts `beat` seconds."""
-    cells = [cell.strip() for cell in line.text.split("|")]
+    if (score, line.text) not in work.postures:
+        work.postures[score, line.text] = _parse_posture(score, line, work)
+    first, cells = work.postures[score, line.text]
+    limbs = list(before.limbs) if before else [_NO_SETTINGS] * len(score.body.layers)
+    words = list(before.words) if before else [_NEUTRAL] * len(score.body.layers)
+    for index, setting, names in cells:
+        limbs[index], words[index] = setting, names
+    return Row(
+        line.where,
+        tuple(limbs),
+        tuple(words),
+        first.face if first.faced or before is None else before.face + first.face,
+        first.up,
+        None if first.counts is None else first.counts * beat,
+        first.go,
+        first.faced or (before is not None and before.faced),
+    )
+
+
+def _parse_posture(score: Score, line: Line, work: Work) -> _Posture:
+    """Parse a line that is a posture."""
+    first, *cells = (cell.strip() for cell in line.text.split("|"))
     names = list(score.body.layers)
-    if len(cells) > 1 + len(names):
-        raise line.where.error(f"{len(cells)} cells, where a posture has {1 + len(names)}: how | {' | '.join(names)}")
-    cells += [""] * (1 + len(names) - len(cells))
-    first = _first_cell(score, cells[0], before.face if before else 0.0, line.where)
-    limbs: list[tuple[Setting, Setting]] = []
-    words: list[tuple[str, str]] = []
-    for index, (layer, cell) in enumerate(zip(names, cells[1:], strict=True)):
+    if len(cells) > len(names):
+        raise line.where.error(
+            f"{1 + len(cells)} cells, where a posture has {1 + len(names)}: how | {' | '.join(names)}"
+        )
+    found = _first_cell(score, first, line.where)
+    out = []
+    for index, (layer, cell) in enumerate(zip(names, cells, strict=False)):
         if cell:
-            limbs.append(score.cell(layer, cell, line.where))
-            words.append(score.cell_words(layer, cell))
-        elif before:
-            limbs.append(before.limbs[index])
-            words.append(before.words[index])
-        else:
-            limbs.append(({}, {}))
-            words.append(("neutral", "neutral"))
-    seconds = None if first.counts is None else first.counts * beat
-    return Row(line.where, tuple(limbs), tuple(words), first.face, first.up, seconds, first.go)
+            key = score, layer, cell
+            if key not in work.cells:
+                work.cells[key] = score.cell(layer, cell, line.where), score.cell_words(layer, cell)
+            out.append((index, *work.cells[key]))
+    return found, out
+
+
+_NO_SETTINGS: tuple[Setting, Setting] = ({}, {})
+_NEUTRAL = "neutral", "neutral"
 
 
 @dataclass
@@ -304,73 +416,80 @@ class _Cell:
     """The first cell of a line: how the body gets to its posture.
 
     Attributes:
-        face: where the body faces then, degrees to the left of the audience.
+        face: where the body faces then, degrees to the left of the audience, or of where it faced before.
+        faced: whether it is of the audience.
         counts: None for a beginning.
         up: height in the air, centimetres; None on the floor.
         go: how far it goes to its left and ahead, centimetres.
     """
 
-    face: float
+    face: float = 0.0
+    faced: bool = False
     counts: float | None = 1.0
     up: float | None = None
     go: tuple[float, float] = (0.0, 0.0)
 
 
-def _first_cell(score: Score, text: str, face: float, where: Where) -> _Cell:
-    """Parse the first cell of a line; `face` is where the body faced before."""
-    words = text.split()
-    cell = _Cell(face)
+# A line that is a posture: its first cell, and of each other that is not empty the layer, the settings and their names.
+_Posture = tuple[_Cell, list[tuple[int, tuple[Setting, Setting], tuple[str, str]]]]
+
+
+def _first_cell(score: Score, text: str, where: Where) -> _Cell:
+    """Parse the first cell of a line."""
+    words = deque(text.split())
+    cell = _Cell()
     if words and words[0] == "start":
         cell.counts = None
-        words = words[1:]
+        words.popleft()
     elif words and re.fullmatch(r"[\d./]+", words[0]):
-        cell.counts = _counts(words[0], where)
-        words = words[1:]
+        cell.counts = _counts(words.popleft(), where)
     readers = {"up": _read_up, "face": _read_face, "turn": _read_turn, "go": _read_go}
     while words:
-        word, rest = words[0], words[1:]
+        word = words.popleft()
         if word not in readers:
             raise where.error(f"{word!r} is no way to move; there are a number of counts, up, face, turn, go")
-        words = readers[word](score, cell, rest, where)
+        readers[word](score, cell, words, where)
     return cell
 
 
-def _read_up(_: Score, cell: _Cell, words: list[str], where: Where) -> list[str]:
-    """Read the words after `up`; return those that follow."""
-    cell.up = number(words[0] if words else "", "up", where)
+def _next(words: deque[str]) -> str:
+    """Take the next word; "" if there is none."""
+    return words.popleft() if words else ""
+
+
+def _read_up(_: Score, cell: _Cell, words: deque[str], where: Where) -> None:
+    """Read the words after `up`."""
+    cell.up = number(_next(words), "up", where)
     if cell.up < 0.0:
         raise where.error(f"up {cell.up:g}: below the floor")
-    return words[1:]
 
 
-def _read_face(score: Score, cell: _Cell, words: list[str], where: Where) -> list[str]:
-    """Read the words after `face`; return those that follow."""
-    side = words[1] if len(words) > 1 and words[1] in SIDES else ""
-    cell.face = (-1.0 if side == "right" else 1.0) * score.facing(words[0] if words else "", where)
-    return words[2 if side else 1 :]
+def _read_face(score: Score, cell: _Cell, words: deque[str], where: Where) -> None:
+    """Read the words after `face`."""
+    facing = score.facing(_next(words), where)
+    right = bool(words) and words[0] in SIDES and words.popleft() == "right"
+    cell.face, cell.faced = -facing if right else facing, True
 
 
-def _read_turn(_: Score, cell: _Cell, words: list[str], where: Where) -> list[str]:
-    """Read the words after `turn`; return those that follow."""
+def _read_turn(_: Score, cell: _Cell, words: deque[str], where: Where) -> None:
+    """Read the words after `turn`."""
     if len(words) < 2 or words[1] not in SIDES:
         raise where.error("turn DEGREES left, or right")
-    degrees = number(words[0], "turn", where)
+    degrees = number(words.popleft(), "turn", where)
     if not 0.0 <= degrees < 180.0:
         raise where.error(f"turn {degrees:g}: a move turns less than half round; write more of them")
-    cell.face += -degrees if words[1] == "right" else degrees
-    return words[2:]
+    cell.face += -degrees if words.popleft() == "right" else degrees
 
 
-def _read_go(_: Score, cell: _Cell, words: list[str], where: Where) -> list[str]:
-    """Read the words after `go`; return those that follow."""
+def _read_go(_: Score, cell: _Cell, words: deque[str], where: Where) -> None:
+    """Read the words after `go`."""
     if not words or words[0] not in _DIRECTIONS:
         raise where.error("go ahead, back, left or right, and how many centimetres")
     while words and words[0] in _DIRECTIONS:
-        far = number(words[1] if len(words) > 1 else "", f"go {words[0]}", where)
-        left, ahead = _DIRECTIONS[words[0]]
+        direction = words.popleft()
+        far = number(_next(words), f"go {direction}", where)
+        left, ahead = _DIRECTIONS[direction]
         cell.go = (cell.go[0] + far * left, cell.go[1] + far * ahead)
-        words = words[2:]
-    return words
 
 
 def _counts(word: str, where: Where) -> float:

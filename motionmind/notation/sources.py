@@ -14,12 +14,15 @@ def sources(path: Path) -> list[Path]:
     Raises:
         FormatError: a file cannot be read.
     """
-    found = [path.resolve()]
-    for score in found:  # the list grows during the loop
+    waiting = [path.resolve()]
+    found = set(waiting)
+    for score in waiting:  # the list grows during the loop
         for line in read_lines(score):
             word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").partition(" ")
             file = rest.split(" as ")[0].strip()
             if word == "include" or (word == "body" and file.endswith(".toml")):
                 beside = (score.parent / file).resolve()
-                found += [] if beside in found else [beside]
-    return found
+                if beside not in found:
+                    found.add(beside)
+                    waiting.append(beside)
+    return waiting

@@ -6,7 +6,6 @@ import random
 import re
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -801,7 +800,7 @@ def test_a_layer_of_another_phrase_is_laid_over_line_by_line(folder: Path, said:
             source = upper if name in ("arms", "head") else lower
             assert whole.limbs[layer] == source.limbs[layer]
             assert whole.words[layer] == source.words[layer]
-        assert replace(whole, limbs=(), words=()) == replace(lower, limbs=(), words=())
+        assert whole._replace(limbs=(), words=()) == lower._replace(limbs=(), words=())
     assert len(both) == len(q)
 
 
