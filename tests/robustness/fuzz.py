@@ -299,8 +299,12 @@ class Tally:
     faults: list[str] = field(default_factory=list)
 
 
+class Overdue(BaseException):
+    """A reader that takes too long; no Exception, which readers may catch."""
+
+
 def _overdue(*_: object) -> None:
-    raise TimeoutError(f"more than {LONGEST:g} s")
+    raise Overdue(f"more than {LONGEST:g} s")
 
 
 @contextmanager
@@ -317,29 +321,29 @@ def _limits() -> Iterator[None]:
         signal.signal(signal.SIGALRM, previous)
 
 
-def _largest() -> int:
+def largest() -> int:
     """Return the most memory that this process has had, bytes."""
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
 def attempt(reader: Reader, path: Path, data: bytes) -> tuple[bool, str]:
-    """Give a reader a damaged file; return whether it read it, and the fault in a few lines, "" if there is none."""
+    """Give a reader a damaged file; return whether it read it, and the fault in a line, "" if there is none."""
     path.write_bytes(data)
-    before = _largest()
+    before, was_read, fault = largest(), False, ""
     try:
         with _limits(), warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", MotionMindWarning)
             reader.read(path)
+        was_read = True
     except MotionMindError as error:
-        message = str(error)
-        return False, f"a message of several lines: {message[:200]!r}" if "\n" in message else ""
-    except Exception as error:  # anything else is a fault, whatever it is
+        fault = f"a message of several lines: {str(error)[:200]!r}" if "\n" in str(error) else ""
+    except (Exception, Overdue) as error:  # anything else is a fault, whatever it is
         frame = traceback.extract_tb(error.__traceback__)[-1]
-        return False, f"{type(error).__name__}: {str(error)[:200]} ({Path(frame.filename).name}:{frame.lineno})"
-    grown = _largest() - before
-    return True, f"{grown / 1e9:.1f} GB" if grown > MOST_MEMORY else ""
+        fault = f"{type(error).__name__}: {str(error)[:200]} ({Path(frame.filename).name}:{frame.lineno})"
+    grown = largest() - before
+    return was_read, fault or (f"{grown / 1e9:.1f} GB of memory" if grown > MOST_MEMORY else "")
 
 
 def folder_of(reader: Reader) -> str:
@@ -371,7 +375,7 @@ def campaign(chosen: Sequence[Reader], folder: Path, seconds: float, seed: int, 
         was_read, fault = attempt(reader, paths[reader.name], data)
         took = time.perf_counter() - began
         tally.inputs += 1
-        tally.read += was_read
+        tally.read += was_read and not fault
         tally.refused += not was_read and not fault
         tally.seconds += took
         tally.slowest = max(tally.slowest, took)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
 import fuzz
+import numpy as np
 import pytest
 
 from motionmind.errors import FormatError
@@ -76,11 +78,22 @@ def test_a_reader_that_fails_is_found_out_and_its_inputs_kept(fragile: fuzz.Read
 def test_a_reader_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def read(_: Path) -> None:
         while True:
-            pass
+            with suppress(Exception):
+                while True:
+                    pass
 
     monkeypatch.setattr(fuzz, "LONGEST", 0.1)
     reader = fuzz.Reader("slow", "a.txt", [b""], read)
-    assert fuzz.attempt(reader, reader.lay_out(tmp_path / "a"), b"")[1].startswith("TimeoutError: more than 0.1 s")
+    assert fuzz.attempt(reader, reader.lay_out(tmp_path / "a"), b"")[1].startswith("Overdue: more than 0.1 s")
+
+
+def test_a_reader_that_takes_too_much_memory_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "MOST_MEMORY", 5 * 10**7)
+    more = fuzz.largest() // 8 + 10**7  # numbers of 8 bytes, which this process never had
+    reader = fuzz.Reader("large", "a.txt", [b""], lambda path: np.ones(more).sum())
+    was_read, fault = fuzz.attempt(reader, reader.lay_out(tmp_path / "a"), b"")
+    assert was_read
+    assert fault.endswith(" GB of memory")
 
 
 def test_a_seed_makes_the_same_inputs_again(readers: dict[str, fuzz.Reader]) -> None:
