@@ -8,15 +8,19 @@ import os
 import re
 import stat
 import time
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from motionmind.errors import FormatError, MotionMindError
 
 FilePath = str | os.PathLike[str]
+
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{20}}")
 
 TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
 _MINUTE, _DAY = 60.0, 86400.0  # seconds
@@ -39,6 +43,19 @@ def read_bytes(path: FilePath) -> bytes:
         return Path(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         raise FormatError(f"cannot be read: {_reason(error)}", path=path) from error
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parse TOML whose keys have 20 parts at most: the parser's memory grows with the square of their number.
+
+    Raises:
+        ValueError: it is not such TOML; the message names the line.
+        RecursionError: it is nested too deep.
+    """
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ValueError(f"a key of more than 20 parts (at line {line})")
+    return tomllib.loads(text)
 
 
 def write_atomically(path: FilePath, data: bytes) -> None:
