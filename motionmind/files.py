@@ -38,11 +38,38 @@ def as_text(name: str) -> str:
 
 
 def read_bytes(path: FilePath) -> bytes:
-    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read."""
+    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read, as a terminal.
+
+    A pipe gives its bytes once: in the context of `pipes_kept` they are kept for those who read it again.
+    """
+    kept = _kept.get()
     try:
-        return Path(path).read_bytes()
+        status = Path(path).stat()
+        place = status.st_dev, status.st_ino
+        if kept is not None and place in kept:
+            return kept[place]
+        with Path(path).open("rb") as file:
+            if file.isatty():
+                raise FormatError("cannot be read: it is a terminal", path=path)
+            data = file.read()
+        if kept is not None and stat.S_ISFIFO(status.st_mode):
+            kept[place] = data
+        return data
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         raise FormatError(f"cannot be read: {_reason(error)}", path=path) from error
+
+
+_kept: ContextVar[dict[tuple[int, int], bytes] | None] = ContextVar("kept", default=None)
+
+
+@contextmanager
+def pipes_kept() -> Iterator[None]:
+    """Keep what is read from pipes in the context, so that each can be read as often as a file."""
+    token = _kept.set({})
+    try:
+        yield
+    finally:
+        _kept.reset(token)
 
 
 def parse_toml(text: str) -> dict[str, Any]:
