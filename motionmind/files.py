@@ -8,15 +8,19 @@ import os
 import re
 import stat
 import time
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from motionmind.errors import FormatError, MotionMindError
 
 FilePath = str | os.PathLike[str]
+
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{20}}")
 
 TEMPORARY = re.compile(r"\.motionmind-(?:(\d+)-)?[0-9a-f]{16}\.tmp")  # with the process that writes it
 _MINUTE, _DAY = 60.0, 86400.0  # seconds
@@ -34,11 +38,51 @@ def as_text(name: str) -> str:
 
 
 def read_bytes(path: FilePath) -> bytes:
-    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read."""
+    """Return all bytes of the file at `path`; FormatError if it does not exist or cannot be read, as a terminal.
+
+    A pipe gives its bytes once: in the context of `pipes_kept` they are kept for those who read it again.
+    """
+    kept = _kept.get()
     try:
-        return Path(path).read_bytes()
+        status = Path(path).stat()
+        place = status.st_dev, status.st_ino
+        if kept is not None and place in kept:
+            return kept[place]
+        with Path(path).open("rb") as file:
+            if file.isatty():
+                raise FormatError("cannot be read: it is a terminal", path=path)
+            data = file.read()
+        if kept is not None and stat.S_ISFIFO(status.st_mode):
+            kept[place] = data
+        return data
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         raise FormatError(f"cannot be read: {_reason(error)}", path=path) from error
+
+
+_kept: ContextVar[dict[tuple[int, int], bytes] | None] = ContextVar("kept", default=None)
+
+
+@contextmanager
+def pipes_kept() -> Iterator[None]:
+    """Keep what is read from pipes in the context, so that each can be read as often as a file."""
+    token = _kept.set({})
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Parse TOML whose keys have 20 parts at most: the parser's memory grows with the square of their number.
+
+    Raises:
+        ValueError: it is not such TOML; the message names the line.
+        RecursionError: it is nested too deep.
+    """
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ValueError(f"a key of more than 20 parts (at line {line})")
+    return tomllib.loads(text)
 
 
 def write_atomically(path: FilePath, data: bytes) -> None:

@@ -5,7 +5,6 @@ The files are TOML; `bodies/human23.toml` is a commented example.
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from motionmind.body.anatomy import SIDES, Anatomy, Joint, Leg
 from motionmind.body.human import BODIES
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, did_you_mean
-from motionmind.files import FilePath, read_bytes
+from motionmind.files import FilePath, parse_toml, read_bytes
 
 FORMAT, VERSION = "motionmind-body", 1
 # The headings of a score besides its layers.
@@ -98,7 +97,7 @@ def read_body(path: FilePath) -> Anatomy:
 
 def _read_table(path: FilePath) -> dict[str, Any]:
     """Return the tables of a file, merged over those of the body that it `extends`, if any."""
-    data = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+    data = parse_toml(read_bytes(path).decode("utf-8-sig"))
     extended = data.pop("extends", None)
     return data if extended is None else _on_top(data, _read_table(_bundled(extended, path)))
 

@@ -12,11 +12,12 @@ from itertools import pairwise
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
+_AT_ONCE = 4096  # frames that are interpolated at a time
 _MOMENT = 1e-6  # seconds: times no further apart count as equal
 # Seconds over which a velocity is taken. In a dancer's recordings, at 30 and at 120 frames a second, a line over this
 # time is nearest to the movement on both sides of its end: a shorter one has more noise, a longer one is out of date.
@@ -191,27 +192,38 @@ class Motion:
             rate: postures a second, at most FASTEST.
 
         Raises:
-            MotionMindError: the rate is out of that range.
+            MotionMindError: the rate is out of that range, or gives too many frames (`check_size`).
         """
         if not 0.0 < rate <= FASTEST:
             raise MotionMindError(
                 f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
             )
         span = self.times[-1] - self.times[0]
-        steps = int(np.floor(span * rate + 1e-3))
+        steps = np.floor(span * rate + 1e-3)
+        check_size(steps + 1.0, len(self.skeleton), self.name)
         return self.at(self.times[0] + np.arange(steps + 1) / rate)
 
     def at(self, times: Floats) -> Motion:
-        """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it."""
+        """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it.
+
+        Raises:
+            MotionMindError: there are too many of them (`check_size`).
+        """
+        check_size(len(times), len(self.skeleton), self.name)
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
             return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times, keyframed=False)
         after = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self) - 1)
         before = after - 1
         share = ((times - self.times[before]) / (self.times[after] - self.times[before])).clip(0.0, 1.0)
+        rotations = np.empty((len(times), len(self.skeleton), 4))
+        for start in range(0, len(times), _AT_ONCE):  # what is in between takes some times the memory of the result
+            part = slice(start, start + _AT_ONCE)
+            ends = self.rotations[before[part]], self.rotations[after[part]]
+            rotations[part] = rot.normalise(rot.slerp(*ends, share[part, None]))
         return replace(
             self,
-            rotations=rot.normalise(rot.slerp(self.rotations[before], self.rotations[after], share[:, None])),
+            rotations=rotations,
             root=self.root[before] + share[:, None] * (self.root[after] - self.root[before]),
             times=times,
             keyframed=False,

@@ -22,6 +22,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.capsules import penetration
 from motionmind.body.contact import RATE, lowest_height
 from motionmind.body.motion import Motion
+from motionmind.body.rates import check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -74,7 +75,9 @@ def at_rate(motion: Motion) -> Motion:
     if motion.fps >= RATE or len(motion) < 2:
         return motion.resample(RATE)
     start, keys = motion.times[0], motion.times
-    times = start + np.arange(int(np.floor((keys[-1] - start) * RATE + 1e-3)) + 1) / RATE
+    steps = np.floor((keys[-1] - start) * RATE + 1e-3)
+    check_size(steps + 1.0, len(motion.skeleton), motion.name)
+    times = start + np.arange(steps + 1) / RATE
     rotations, root = rotation_spline(keys, motion.rotations, times), natural_spline(keys, motion.root, times)
     return replace(motion, rotations=rotations, root=root, times=times, insertions=(), keyframed=False)
 

@@ -24,6 +24,7 @@ from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
 from motionmind.display import printable
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
+from motionmind.files import pipes_kept
 
 BAD_INPUT = 2  # exit code for everything that the user can put right
 NO_PATH = 3  # exit code when nothing joins A and B
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     log.addHandler(notes)
     log.setLevel(logging.INFO)
     try:
-        with forgiving(), warnings.catch_warnings():
+        with forgiving(), pipes_kept(), warnings.catch_warnings():
             warnings.simplefilter("always", MotionMindWarning)
             warnings.showwarning = show_warning
             sys.exit(_run(arguments))

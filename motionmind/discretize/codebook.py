@@ -90,6 +90,8 @@ def codebook(rotations: Floats, tolerance: float) -> Floats:
     q = rot.canonical(rotations)
     q = q[np.lexsort(q.T)]
     limit = float(np.cos(0.5 * np.radians(tolerance)))
+    if np.min(np.sum(q * q, axis=-1)) < limit:  # quaternions rounded so that one is not within the limit of itself
+        q = rot.normalise(q)
     opened = farthest_points(q, limit)
     centres = opened
     for _ in range(_ROUNDS):

@@ -20,7 +20,6 @@ one has the mirrored states (x and -x exchanged).
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +32,7 @@ from motionmind.corpus.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
 from motionmind.errors import FormatError, did_you_mean
-from motionmind.files import FilePath, read_bytes, write_atomically
+from motionmind.files import FilePath, parse_toml, read_bytes, write_atomically
 from motionmind.geometry import rotations as rot
 
 FORMAT = "motionmind-library"
@@ -166,7 +165,7 @@ def parse_library(text: str, *, path: str = "library") -> Library:
         FormatError: it is not a library; the message names the table and the entry at fault.
     """
     try:
-        data = tomllib.loads(text)
+        data = parse_toml(text)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"not TOML: {error}", path=path) from None
     return library_from_mapping(data, path=path)

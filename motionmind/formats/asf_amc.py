@@ -23,6 +23,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.body.rates import check_size
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath, name_of
 from motionmind.formats._asf import Acclaim, fixed_axes, read_asf
@@ -57,6 +58,7 @@ def read_amc(path: FilePath, asf: FilePath | None = None, *, fps: float = 120.0)
     lines = read_lines(path)
     acclaim = read_asf(asf if asf is not None else _find_asf(path))
     numbers, values, degrees = _read_frames(lines, acclaim, path)
+    check_size(len(values), max(len(acclaim.bones) - values.shape[1], 1), str(path))  # the rest are written out
     rotations, root, ignored = _assemble(acclaim, values, degrees)
     if ignored:
         message = f"{path}: changes of the length or place of {enumerated(ignored)} are left out"

@@ -17,7 +17,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, quoted
 from motionmind.files import FilePath, name_of, write_atomically
@@ -100,6 +100,7 @@ def _read_body(path: FilePath) -> tuple[NormalisedRig, float]:
         raise FormatError("no joint has CHANNELS: nothing can move", path=path, line=start + 1)
     declared, frame_time, first = _read_motion_header(lines, start + 1, path)
     values = _read_frames(lines, first, channels, declared, path)
+    check_size(len(values), max(len(joints) - channels, 1), str(path))  # the rest are as many as the file is long
     body = normalise(_assemble(joints, values, name_of(path)))
     if declared != len(values):
         body.notes.append(
@@ -237,7 +238,7 @@ def write_bvh(path: FilePath, motion: Motion, unit: str | float = "cm") -> None:
     root = np.round(motion.root * scale, digits) + 0.0
     values = np.concatenate([root, np.round(degrees, 6).reshape(len(motion), -1) + 0.0], axis=1)
     row = " ".join([f"%.{digits}f"] * 3 + ["%.6f"] * (3 * len(skeleton)))
-    lines += [row % tuple(frame) for frame in values.tolist()]
+    lines += [row % tuple(frame.tolist()) for frame in values]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
 
 

@@ -187,7 +187,7 @@ def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] 
         insertions = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
         fields.append(f'"insertions": {msgspec.json.encode(insertions).decode()}')
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
-        rows = ",\n".join(_compact(row) for row in _json.rounded(array).tolist())
+        rows = ",\n".join(_compact(row.tolist()) for row in _json.rounded(array))  # all at once would fill the memory
         fields.append(f'"{what}": [\n{rows}\n]')
     fields += [f'"{what}": {value.decode()}' for what, value in (more or {}).items()]
     write_atomically(path, ("{\n" + ",\n".join(fields) + "\n}\n").encode())

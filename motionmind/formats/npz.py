@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import io
 import logging
-from pathlib import Path
+import math
+import zipfile
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import FASTEST, MOST_PLACES
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, name_of, read_bytes, write_atomically
 from motionmind.formats._clock import even_step
@@ -39,8 +40,10 @@ from motionmind.geometry import rotations as rot
 
 _RATES = ("mocap_framerate", "mocap_frame_rate")
 
-# Twice an hour at 120 frames per second; a compressed array that claims more is meant to exhaust memory.
-_LARGEST_ARRAY = 2**30  # bytes
+# Bytes of an array as it is read: as many as the largest motion has that is made, or twice as many as its file, but no
+# more than two hours take at 120 frames per second. A compressed array that claims more is meant to exhaust memory.
+_LARGE_ARRAY = 24 * MOST_PLACES
+_LARGEST_ARRAY = 2**30
 
 # From a world with z up, where a body faces -y, to ours, where it faces +z.
 _UPRIGHT = rot.from_axis_angle([1.0, 0.0, 0.0], -np.pi / 2)
@@ -128,12 +131,10 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
     name = ""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            members = file.zip.infolist()
+            members = file.zip.NameToInfo
             for name in ("poses", "trans", *_RATES):
-                # No more of a member is unpacked than the size that it claims.
-                if any(member.file_size > _LARGEST_ARRAY for member in members if Path(member.filename).stem == name):
-                    raise FormatError(f"{name!r} is too large to be movement", path=path)
                 if name in file:
+                    _check_claim(file.zip, members.get(name) or members[f"{name}.npy"], name, len(data), path)
                     found[name] = _numbers(file[name], name, path)
     except FormatError:
         raise
@@ -143,13 +144,25 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
     return found
 
 
+def _check_claim(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, size: int, path: FilePath) -> None:
+    """Raise FormatError if an array is too large for a file of `size` bytes, as is said before it is unpacked.
+
+    No more is unpacked than is claimed: zipfile ends a member at its size, numpy an array at its shape.
+    """
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, _ = read_header(stream)
+    most = min(max(_LARGE_ARRAY, 2 * size), _LARGEST_ARRAY)
+    if 8 * math.prod(shape) > most or member.file_size > 2 * most:
+        raise FormatError(f"{name!r} is too large to be movement: {list(shape)}", path=path)
+
+
 def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Floats:
     """Return the array as floats; FormatError names an element that is not a number in range."""
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise FormatError(f"{name!r} holds no numbers", path=path)
-    if array.size * 8 > _LARGEST_ARRAY:
-        raise FormatError(f"{name!r} is too large to be movement", path=path)
-    numbers = array.astype(np.float64)
+    numbers = array.astype(np.float64, copy=False)
     bad = np.argwhere(~(np.abs(numbers) <= LARGEST))  # NaN too
     if len(bad):
         value = numbers[tuple(bad[0])]

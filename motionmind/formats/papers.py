@@ -128,16 +128,17 @@ def _key(name: str) -> str:
 def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
     """Yield the postures of the brace form."""
     entries: list[_Entry] = []
-    text, start, opened = "", 0, 0  # the current joint's text, its line, and the line of the open brace
+    said: list[str] = []  # the current joint's text
+    start, opened = 0, 0  # its line, and the line of the open brace
     for number, line in enumerate(lines, start=1):
         for piece in re.split(r"([{};])", line):
             if piece == "{" and not opened:
-                entries, text, opened = [], "", number
+                entries, said, opened = [], [], number
             elif piece in ("}", ";") and opened:
-                if text.strip():
-                    name, *numbers = (word.strip() for word in text.split(","))
+                if said:
+                    name, *numbers = (word.strip() for word in " ".join(said).split(","))
                     entries.append((name, numbers, start))
-                text = ""
+                said = []
                 if piece == "}":
                     if not entries:
                         raise FormatError("a posture without joints", path=path, line=number)
@@ -145,9 +146,9 @@ def _split_braces(lines: list[str], path: FilePath) -> Iterator[list[_Entry]]:
                     opened = 0
             elif piece in ("{", "}", ";") or (piece.strip() and not opened):
                 raise FormatError(f"{quoted(piece.strip())} may not appear here", path=path, line=number)
-            else:
-                start = start if text.strip() else number
-                text += piece + " "
+            elif piece.strip():
+                start = start if said else number
+                said.append(piece)
     if opened:
         raise FormatError("the posture's '}' is missing: is the file cut short?", path=path, line=opened)
 

@@ -51,10 +51,13 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
         discretization: how orientations become states; only states with a posture in them are kept.
 
     Raises:
-        CorpusError: a joint has more than MOST_STATES_LEARNED states.
+        CorpusError: a joint, or the facing, has more than MOST_STATES_LEARNED states.
     """
     orientations = corpus.to_chains(corpus.rotations)
     joints = corpus.skeleton.names
+    if corpus.facing == "free":
+        # Tolerances do not depend on the postures, so one shows them before all are compared.
+        _check_facing(corpus, float(discretization.fit(joints, orientations[:1, : len(joints)]).tolerances[0]))
     space = discretization.fit(joints, orientations[:, : len(joints)])
     space, states = _keep_visited(space, space.assign(orientations[:, : len(joints)]))
     _check_size(corpus, space)
@@ -103,12 +106,26 @@ def _check_size(corpus: Corpus, space: StateSpace) -> None:
         )
 
 
+def _check_facing(corpus: Corpus, tolerance: float) -> None:
+    """Raise a CorpusError if the circle has too many states for a root of this tolerance, degrees."""
+    if _facings(tolerance) > MOST_STATES_LEARNED:
+        raise CorpusError(
+            f"corpus {corpus.name!r}: the facing has {_facings(tolerance)} states within {tolerance:g} degrees, and "
+            f"can have {MOST_STATES_LEARNED}; give {corpus.skeleton.names[0]} a coarser tolerance"
+        )
+
+
+def _facings(tolerance: float) -> int:
+    """Return the number of the facing's states for a root of this tolerance, degrees."""
+    return max(8, round(360.0 / tolerance))
+
+
 def _with_facing(space: StateSpace, turns: Floats) -> tuple[StateSpace, States]:
     """Return the state space with a chain for the facing, and the states [N] in it of the corpus's turns [N, 4].
 
     The facing's states are equal steps of a circle, about as wide as the root's tolerance.
     """
-    count = max(8, round(360.0 / float(space.tolerances[0])))
+    count = _facings(float(space.tolerances[0]))
     ring = rot.canonical(rot.about_vertical(np.arange(count) * 2.0 * np.pi / count))
     wider = StateSpace.of_joints(
         (*space.names, FACING),

@@ -11,6 +11,7 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion, Posture
+from motionmind.body.rates import check_size
 from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
@@ -89,6 +90,7 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
     if not clips:
         return []
     parts = [play_phrase(clip, work) for clip in clips]
+    check_size(sum(map(len, parts)), len(score.body.skeleton), score.path)
     placed = _place_distinct(score.body, [row for part in parts for row in part])
     ends = np.cumsum([len(part) for part in parts])
     return [
@@ -348,11 +350,11 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     weight, rests = placed.weight[taken], placed.rests[taken]
     balls, tips, back = (rot.mul_vec(turn[:, None], feet[taken]) for feet in (placed.balls, placed.tips, placed.back))
     held = np.minimum(weight[:-1], weight[1:])
-    both: Bools = np.asarray(held > 0.0)  # else the foot rolls over its tip
-    held = np.where(np.any(both, axis=1)[:, None], held, rests[:-1] & rests[1:])
+    both = held > 0.0  # else the foot rolls over its tip
+    held = np.where(both.any(axis=1, keepdims=True), held, rests[:-1] & rests[1:])
     pivot = placed.pivot[taken[1:]]
     before, after = (
-        np.where(both[..., None], balls[part] + pivot * back[part], tips[part]) for part in (slice(-1), slice(1, None))
+        np.where(both[:, :, None], balls[part] + pivot * back[part], tips[part]) for part in (slice(-1), slice(1, None))
     )
     total = held.sum(axis=1)[:, None]
     stay = (held[..., None] * (before - after)).sum(axis=1) / np.where(total > 0.0, total, 1.0)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, Int32s
+from motionmind.body.rates import check_size
 from motionmind.grammar.transitions import Transitions
 
 
@@ -64,6 +65,7 @@ def timeline(path: Int32s, transitions: Transitions, fps: float, length: float |
     seconds = durations(path, transitions)
     usually = float(seconds.sum())
     frames = max(1, round((length or usually) * fps))
+    check_size(frames + 1, path.shape[1], "the tween")
     length = length or frames / fps
     moves = np.concatenate([[0.0], np.cumsum(seconds * (length / usually))])
     moves[-1] = length

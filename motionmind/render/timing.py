@@ -6,6 +6,7 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.body.rates import check_size
 
 HOLD = 0.8  # seconds that a film shows its last frame before it starts again
 SLOWEST = 0.01  # frames a second, the least of a film
@@ -26,8 +27,12 @@ def frame_times(motion: Motion, rate: float) -> Floats:
 
     Returns:
         Times [T], seconds, increasing.
+
+    Raises:
+        MotionMindError: there would be too many frames (`check_size`).
     """
     if len(motion) == 1:
         return motion.times
     steps = max(int((motion.times[-1] - motion.times[0]) * rate + 1e-3), 1)
+    check_size(steps + 1, len(motion.skeleton), motion.name)
     return np.linspace(motion.times[0], motion.times[-1], steps + 1)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import json
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError
+from motionmind.files import parse_toml, read_bytes
 from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares
 
 # A skeleton must have one joint of each tuple; any other joint of human23 moves with its parent.
@@ -82,10 +82,8 @@ def read_joint_mapping(path: str | Path) -> dict[str, str]:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        table = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except OSError as error:
-        raise FormatError(f"cannot be read: {error.strerror or error}", path=path) from None
+        text = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
+        table = json.loads(text) if path.suffix.lower() == ".json" else parse_toml(text)
     except (ValueError, RecursionError) as error:  # of either parser, and of UTF-8
         raise FormatError(f"not a joint mapping: {error}", path=path) from None
     if isinstance(table, dict) and isinstance(table.get("joints"), dict):

@@ -16,7 +16,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Insertion, Motion, Posture
-from motionmind.body.rates import FASTEST
+from motionmind.body.rates import FASTEST, check_size
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -115,7 +115,8 @@ class Piece:
                 f"a rate must be a number of postures a second above 0, at most {FASTEST:g}, not {rate}"
             )
         own = motion.times
-        last = int((own[-1] - own[0]) * rate + 1e-3)  # the clock may jitter, as in Motion.resample
+        last = np.floor((own[-1] - own[0]) * rate + 1e-3)  # the clock may jitter, as in Motion.resample
+        check_size(last + 1.0, len(motion.skeleton), motion.name)
         wanted = own[0] + np.arange(last + 1) / rate
         after = np.searchsorted(own[:-1], wanted)  # the last frame comes after all that are earlier
         before = np.maximum(after - 1, 0)
