@@ -294,6 +294,16 @@ def test_the_floor_and_the_limits_hold() -> None:
 # --- flight -----------------------------------------------------------------------------------------------------------
 
 
+def into_the_air(frames: int, high: float) -> tuple[Floats, Floats, Floats]:
+    """A body that stands, and is so high in its last frame, metres: rotations, root, and how far walks are aloft."""
+    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    root[-1, 1] += high
+    aloft = np.zeros(17)
+    aloft[-2:] = 1.0
+    return q, root, aloft
+
+
 def fall(found: Floats, went: Floats, frames: slice) -> Floats:
     """Vertical acceleration of the centre of mass at some frames, metres a second squared."""
     mass = centre_of_mass(human23(), found, went)
@@ -303,11 +313,7 @@ def fall(found: Floats, went: Floats, frames: slice) -> Floats:
 
 def test_a_body_that_is_to_be_in_the_air_gets_there_from_a_bend_and_falls_freely() -> None:
     frames = 46
-    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
-    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
-    root[-1, 1] += 0.25
-    aloft = np.zeros(17)
-    aloft[-2:] = 1.0
+    q, root, aloft = into_the_air(frames, 0.25)
     found, went = grounded(q, root, aloft=aloft, leap=0.25)
     heights = lowest_height(human23(), found, went)
     flying = np.flatnonzero(heights > 0.03)
@@ -350,11 +356,7 @@ def detail(frames: int, size: float, joints: Sequence[int]) -> Floats:
 
 def test_a_body_with_fine_detail_falls_freely() -> None:
     frames = 46
-    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
-    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
-    root[-1, 1] += 0.25
-    aloft = np.zeros(17)
-    aloft[-2:] = 1.0
+    q, root, aloft = into_the_air(frames, 0.25)
     arms = [human23().index(f"{side}_shoulder") for side in ("left", "right")]
     found, went = grounded(rot.mul(q, detail(frames, 0.1, arms)), root, aloft=aloft, leap=0.25, plain=q)
     flying = np.flatnonzero(lowest_height(human23(), found, went) > 0.03)
@@ -364,11 +366,7 @@ def test_a_body_with_fine_detail_falls_freely() -> None:
 def test_an_end_in_the_air_shows_nothing_of_its_floor() -> None:
     """It is higher than the corpus's bodies jump: that is no reason to climb."""
     frames = 61
-    q = posed({"left_knee": (0.0, 0.0, 0.0)}, frames)
-    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
-    root[-1, 1] += 0.4
-    aloft = np.zeros(17)
-    aloft[-2:] = 1.0
+    q, root, aloft = into_the_air(frames, 0.4)
     found, went = grounded(q, root, aloft=aloft, leap=0.2)
     assert lowest_height(human23(), found, went)[: frames // 2].max() < 0.01
 
