@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -90,7 +91,9 @@ def _parse(path: Path, data: bytes) -> dict[str, Any]:
     try:
         manifest = msgspec.json.decode(data, type=dict[str, Any])
     except (ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
-        raise FormatError(f"cannot be read as a corpus's manifest: {error}", path=path) from error
+        is_built = versions.find_stranger(path.parent, MANIFEST) is None
+        advice = f"; {remedy(path.parent)}" if is_built else ""
+        raise FormatError(f"cannot be read as a corpus's manifest: {error}{advice}", path=path) from error
     form, version = manifest.get("format"), manifest.get("version")
     known = VERSIONS.get(form, ()) if isinstance(form, str) else ()
     if version not in known:
@@ -154,7 +157,7 @@ def _place_of(folder: Path, manifest: Mapping[str, Any]) -> Path:
     if manifest["version"] == 1:
         return folder
     if not isinstance(number := manifest.get("folder"), int):
-        raise FormatError("there is no key `folder` with a number; build the corpus again", path=folder / MANIFEST)
+        raise FormatError(f"there is no key `folder` with a number; {remedy(folder)}", path=folder / MANIFEST)
     return folder / str(number)
 
 
@@ -172,6 +175,16 @@ class Stored(NamedTuple):
     arrays: dict[str, NDArray[Any]]
     place: Path
     identity: str
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of the arrays."""
+        return [_array_file(self.place, name) for name in self.arrays]
+
+    @property
+    def is_current(self) -> bool:
+        """Whether it is a built corpus that keeps all that this version learns."""
+        return (self.manifest["format"], self.manifest["version"]) == (BUILT, VERSIONS[BUILT][-1])
 
     @property
     def is_checked(self) -> bool:
@@ -204,16 +217,26 @@ def load(folder: Path) -> Stored:
             # Only a version that is current while it is held is complete, and stays so.
             if _read(path) == data:
                 if not there:
-                    raise FormatError(f"there is no folder {place.name} beside it; build the corpus again", path=path)
+                    raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
                 shapes = manifest.get("arrays")
+                if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
+                    shapes = dict.fromkeys(shapes)  # as the first corpora of 0.1 listed them, without their shapes
                 if not isinstance(shapes, dict):
-                    raise FormatError("does not say which arrays there are; build the corpus again", path=path)
+                    raise FormatError(f"does not say which arrays there are; {remedy(folder)}", path=path)
                 identity = _identity(data, [_array_file(place, name) for name in shapes])
-                return Stored(manifest, _open_arrays(place, shapes), place, identity)
+                return Stored(manifest, _open_arrays(folder, place, shapes), place, identity)
 
 
-def _open_arrays(place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Open the arrays in a folder that the manifest states the type and shape of by name, as [type, *shape]."""
+def remedy(folder: Path) -> str:
+    """Return the advice to build the corpus of a folder again, with the command for it."""
+    words = ["motionmind", "corpus", "build", folder.name]
+    if folder.parent != home() / "corpora" and folder.parent.name == "corpora":
+        words += ["--home", str(folder.parent.parent)]
+    return f"build the corpus again: {shlex.join(words)} FILES"
+
+
+def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Open a corpus's arrays in `place`; the manifest states each one's type and shape, as [type, *shape], or None."""
     arrays = {}
     for name, shape in shapes.items():
         file = _array_file(place, name)
@@ -221,9 +244,9 @@ def _open_arrays(place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[An
             # A plain view: still mapped, but without the subclass, which slows every slice.
             arrays[name] = np.asarray(np.lib.format.open_memmap(file, mode="r"))
         except Exception as error:  # the header is Python; parsing a damaged one can raise anything
-            raise FormatError(f"cannot be read as an array: {error}; build the corpus again", path=file) from error
-        if [arrays[name].dtype.str, *arrays[name].shape] != shape:
-            raise FormatError("is not the array that was saved; build the corpus again", path=file)
+            raise FormatError(f"cannot be read as an array: {error}; {remedy(folder)}", path=file) from error
+        if shape is not None and [arrays[name].dtype.str, *arrays[name].shape] != shape:
+            raise FormatError(f"is not the array that was saved; {remedy(folder)}", path=file)
     return arrays
 
 

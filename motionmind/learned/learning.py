@@ -64,6 +64,17 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
     if corpus.facing == "free":
         space, facing = _with_facing(space, orientations[:, -1])
         states = np.concatenate([states, facing[:, None]], axis=1)
+    return learn_from_states(corpus, space, states)
+
+
+def learn_from_states(corpus: Corpus, space: StateSpace, states: States) -> Learned:
+    """Learn from a corpus whose postures have states.
+
+    Args:
+        corpus: the movement.
+        space: the states of each chain.
+        states: states of the corpus's postures [N, L].
+    """
     moves = corpus.moves
     grammar = learn_grammar(
         corpus.chains,

@@ -7,7 +7,7 @@ people wrote, a bundled one above all, is kept in a cache, under a name that is 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind._typing import States
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
@@ -29,11 +30,11 @@ from motionmind.grammar.bridges import Bridges
 from motionmind.grammar.coordination import Coordination
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
-from motionmind.learned.carriage import Carriage, learn_carriage
-from motionmind.learned.learning import Learned, learn
-from motionmind.learned.pace import Pace, learn_pace
-from motionmind.learned.plausibility import Plausibility, learn_plausibility
-from motionmind.learned.validity import FORMS, check_forms, check_values
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.learning import Learned, learn, learn_from_states
+from motionmind.learned.pace import Pace
+from motionmind.learned.plausibility import Plausibility
+from motionmind.learned.validity import FORMS, MOVEMENT, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
@@ -48,8 +49,6 @@ _PARTS = {
     "pace": Pace,
     "plausibility": Plausibility,
 }
-_RENAMED = {"carriage.kinds": "carriage.clusters"}  # arrays of corpora built by 0.1: old name -> new
-_ADDED = {"carriage.aloft", "carriage.overhang", "carriage.touches"}  # arrays that corpora built by 0.1 lack
 
 
 def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
@@ -109,14 +108,23 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
     """
     folder = store.locate(name, home)
     stored = store.load(folder)
-    if stored.manifest["format"] == store.BUILT:
+    if stored.is_current:
         return _open(folder, stored)
+    if stored.manifest["format"] == store.BUILT:
+        # Of what an earlier version kept, the movement and its states are taken; all else is learned again.
+        files = [folder / store.MANIFEST, *stored.files]
+        return _kept(folder, files, lambda: learn_from_states(*_read_movement(folder, stored)))
     source = parse_manifest(stored.manifest, SourceManifest, folder / store.MANIFEST)
-    built = store.cache() / f"{folder.name}-{store.fingerprint(_learned_files(folder, source))}"
+    return _kept(folder, _learned_files(folder, source), lambda: learn(*_read_source(folder, source)))
+
+
+def _kept(folder: Path, files: Iterable[Path], learn_it: Callable[[], Learned]) -> Learned:
+    """Return what is learned from a corpus of these files: from the cache, or else learned and kept there."""
+    built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
     try:
         return _open(built, store.load(built))
     except MotionMindError:  # it is not there yet, or is damaged
-        learned = learn(*_read_source(folder, source))
+        learned = learn_it()
     with suppress(MotionMindError):  # nowhere to keep it: it is learned again next time
         save(learned, built)
     return learned
@@ -124,16 +132,49 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
 
 def _open(folder: Path, stored: store.Stored) -> Learned:
     """Return what was learned, of what a folder holds; FormatError if something lacks or is not valid."""
-    arrays = {_RENAMED.get(name, name): array for name, array in stored.arrays.items()}
+    arrays = stored.arrays
+    corpus, space, states = _read_arrays(folder, stored, arrays, FORMS)
+    grammar = Grammar(
+        corpus.chains,
+        arrays["centres"],
+        _part(Transitions, "transitions", arrays),
+        _part(Bridges, "bridges", arrays),
+        _part(Coordination, "coordination", arrays),
+    )
+    carriage, pace = _part(Carriage, "carriage", arrays), _part(Pace, "pace", arrays)
+    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", arrays))
+
+
+def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpace, States]:
+    """Return the movement of a corpus that an earlier version built, and its states; FormatError as `_open`."""
+    arrays = {name: stored.arrays[name] for name in MOVEMENT if name in stored.arrays}
+    if "rotations" in arrays:  # the first corpora kept nothing of the movement between postures
+        postures, joints = (*arrays["rotations"].shape, 0, 0)[:2]
+        arrays.setdefault("detail", np.zeros((postures, 0, joints, 3), np.float16))
+    return _read_arrays(folder, stored, arrays, MOVEMENT)
+
+
+def _read_arrays(
+    folder: Path, stored: store.Stored, arrays: Mapping[str, NDArray[Any]], needed: Iterable[str]
+) -> tuple[Corpus, StateSpace, States]:
+    """Return the corpus, the state space and the states [N, L] that a folder's manifest and arrays hold.
+
+    Args:
+        folder: the corpus's folder.
+        stored: its content.
+        arrays: the arrays to take, by name.
+        needed: names of those that may not lack.
+
+    Raises:
+        FormatError: something lacks or is not valid.
+    """
     path = folder / store.MANIFEST
-    manifest = parse_manifest(stored.manifest, BuiltManifest, path)
-    # Corpora built before 0.2 keep none of these; they take a second to learn for minutes of movement.
-    new = {part for part in ("pace", "plausibility") if not any(name.startswith(f"{part}.") for name in arrays)}
-    new |= set() if _ADDED & arrays.keys() else {"carriage"}
-    arrays = {name: array for name, array in arrays.items() if name.partition(".")[0] not in new}
-    missing = [name for name in FORMS if name not in arrays and name.partition(".")[0] not in new]
-    if missing:
-        raise FormatError(f"lists no array {missing[0]}; build the corpus again", path=path)
+    try:
+        manifest = parse_manifest(stored.manifest, BuiltManifest, path)
+    except FormatError as error:
+        raise FormatError(f"{error}; {store.remedy(folder)}") from error
+    if missing := next((name for name in needed if name not in arrays), None):
+        raise FormatError(f"lists no array {missing}; {store.remedy(folder)}", path=path)
     body, states, is_new = manifest.skeleton, manifest.space, not stored.is_checked
     try:
         skeleton = Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips))
@@ -159,24 +200,11 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         )
         if is_new:
             check_values(arrays, corpus, space)
-            stored.remember_checked()
     except (ValueError, OverflowError) as error:
-        raise FormatError(f"{error}; build the corpus again", path=path) from error
-    grammar = Grammar(
-        corpus.chains,
-        arrays["centres"],
-        _part(Transitions, "transitions", arrays),
-        _part(Bridges, "bridges", arrays),
-        _part(Coordination, "coordination", arrays),
-    )
-    carriage = learn_carriage(corpus) if "carriage" in new else _part(Carriage, "carriage", arrays)
-    pace = learn_pace(corpus) if "pace" in new else _part(Pace, "pace", arrays)
-    plausibility = (
-        learn_plausibility(corpus, pace.fastest)
-        if "plausibility" in new
-        else _part(Plausibility, "plausibility", arrays)
-    )
-    return Learned(corpus, space, arrays["states"], grammar, carriage, pace, plausibility)
+        raise FormatError(f"{error}; {store.remedy(folder)}", path=path) from error
+    if is_new:
+        stored.remember_checked()
+    return corpus, space, arrays["states"]
 
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:

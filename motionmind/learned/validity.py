@@ -84,12 +84,14 @@ FORMS = {
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
 }
 
+MOVEMENT = [name for name in FORMS if "." not in name]  # from these, all the others can be learned
+
 
 def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: Facing) -> None:
     """Check the type, shape and range of each array; ValueError names the first that is wrong.
 
     Args:
-        arrays: all arrays of `FORMS`, by name, or all but those of whole parts such as "pace".
+        arrays: all arrays of `FORMS` or those of `MOVEMENT`, by name.
         skeleton: the body.
         facing: whether the body's turn is a chain.
     """
@@ -130,16 +132,20 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
         space: the states of each chain.
     """
     moves = corpus.moves
-    for name in ("rotations", "carriage.orientations"):
-        # Written so that a NaN fails too.
-        if name in arrays and not (np.abs(_squares(arrays[name]) - 1.0) <= _UNIT).all():
-            raise ValueError(f"{name} holds a quaternion that is not of unit length")
+    _check_units("rotations", arrays)
     later = (corpus.times[moves.ends] - corpus.times[moves.begins]) * np.sign(moves.ends - moves.begins)
     if not (later > 0.0).all():
         raise ValueError("times does not rise within a clip")
+    _check_range("states", arrays, space.sizes)
+    if FORMS.keys() <= arrays.keys():
+        _check_grammar(arrays, corpus, space, later)
+        _check_carriage(arrays, len(corpus), len(later))
+
+
+def _check_grammar(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: StateSpace, later: Floats) -> None:
+    """Check joint graphs, bridges and coordination; `later` are the durations of the corpus's moves [M], seconds."""
     if not np.array_equal(arrays["transitions.starts"], space.starts):
         raise ValueError("transitions.starts is not where the manifest's chains start")
-    _check_range("states", arrays, space.sizes)
     of_row = np.repeat(space.sizes, space.sizes)  # the number of states in the chain of each state
     _check_rows("transitions.indptr", "transitions.targets", arrays, of_row)
     _check_rows("bridges.indptr", "bridges.targets", arrays, of_row)
@@ -149,12 +155,24 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
     if len(seconds) and not (later.min() - _SMALL <= seconds.min() and seconds.max() <= later.max() + _SMALL):
         raise ValueError("transitions.seconds holds a duration that no move has")
     _check_coordination(arrays, corpus.chain_parents, space.sizes)
-    moments = len(corpus) + len(later)
-    for name, size in (("turn", len(later)), ("begins", 2 * len(later)), ("weights", moments)):
-        if len(arrays.get(f"carriage.{name}", np.zeros(size))) != size:
+
+
+def _check_carriage(arrays: Mapping[str, NDArray[Any]], postures: int, moves: int) -> None:
+    """Check the carriage of a corpus of so many postures and moves."""
+    _check_units("carriage.orientations", arrays)
+    moments = postures + moves
+    for name, size in (("turn", moves), ("begins", 2 * moves), ("weights", moments)):
+        if len(arrays[f"carriage.{name}"]) != size:
             raise ValueError(f"carriage.{name} has not {size} entries, as the corpus's moves make")
     for name in ("carriage.begins", "carriage.ends", "carriage.clusters"):
         _check_range(name, arrays, moments)
+
+
+def _check_units(name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Check that an array holds unit quaternions."""
+    # Written so that a NaN fails too.
+    if not (np.abs(_squares(arrays[name]) - 1.0) <= _UNIT).all():
+        raise ValueError(f"{name} holds a quaternion that is not of unit length")
 
 
 def _squares(quaternions: Floats) -> Floats:
@@ -162,8 +180,8 @@ def _squares(quaternions: Floats) -> Floats:
 
 
 def _check_range(name: str, arrays: Mapping[str, NDArray[Any]], size: int | Ints) -> None:
-    """Check that all of an array, if it is there, are indices of what has this size, or these sizes by column."""
-    if name in arrays and not ((arrays[name] >= 0) & (arrays[name] < size)).all():
+    """Check that all of an array are indices of what has this size, or these sizes by column."""
+    if not ((arrays[name] >= 0) & (arrays[name] < size)).all():
         raise ValueError(f"{name} holds an index of what is not there")
 
 

@@ -82,10 +82,10 @@ class Tempo(msgspec.Struct, frozen=True):
         usual_moves: how many moves of the corpus's usual length a given duration holds, where that is fewer than lead
             to B, so that more are made in that time; None elsewhere.
         faster: the parts that move faster than ever in the corpus, the worst first, a few of them.
-        detours: whether there was so much time that what the corpus does after a posture like A, and before one like B,
-            fills it.
         creeps: share of the time in which the body is slower than in all but the slowest hundredth of the corpus's
             seconds.
+        detours: whether there was so much time that what the corpus does after a posture like A, and before one like B,
+            fills it; the first reports with a tempo do not say so.
     """
 
     usual: float
@@ -93,8 +93,8 @@ class Tempo(msgspec.Struct, frozen=True):
     slowest: str
     usual_moves: int | None
     faster: list[FasterPart]
-    detours: bool
     creeps: float
+    detours: bool = False
 
 
 def tempo_of(
@@ -122,7 +122,7 @@ def tempo_of(
         creeps = float(np.mean(seconds < pace.slowest[0]))
     longest = max(times, key=lambda time: time.least)
     total = sum(time.median for time in times), sum(time.least for time in times)
-    return Tempo(*total, longest.slowest, usual_moves, faster, detours, creeps)
+    return Tempo(*total, longest.slowest, usual_moves, faster, creeps, detours)
 
 
 def worded(faster: Sequence[FasterPart]) -> str:

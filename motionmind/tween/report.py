@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -163,5 +165,7 @@ def read_report(path: FilePath) -> TweenReport:
     try:
         return msgspec.json.decode(read_bytes(path), type=TweenReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        fault = str(error).replace("Object missing required field", "there is no key")
+        lacks = "Object missing required field"  # as a report of 0.1 from before `explain` does
+        again = f"; write it again: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"
+        fault = str(error).replace(lacks, "there is no key") + again * str(error).startswith(lacks)
         raise FormatError(f"is no report of a tween: {fault}", path=path) from error

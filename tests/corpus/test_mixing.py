@@ -754,12 +754,12 @@ def test_what_is_loaded_answers_as_what_was_saved(everything: Engine, tmp_path: 
     np.testing.assert_array_equal(*cpds)
 
 
-def test_what_was_built_before_is_to_be_built_again(everything: Engine, tmp_path: Path) -> None:
+def test_a_manifest_that_lacks_an_array_or_has_no_such_weight_is_refused(everything: Engine, tmp_path: Path) -> None:
     everything.save(tmp_path / "old")
     manifest = json.loads((tmp_path / "old" / "manifest.json").read_text("utf-8"))
     del manifest["arrays"]["transitions.arrives"]
     (tmp_path / "old" / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    with pytest.raises(FormatError, match=r"lists no array transitions\.arrives; build the corpus again"):
+    with pytest.raises(FormatError, match=r"lists no array transitions\.arrives; build the corpus again: motionmind"):
         Engine.load(str(tmp_path / "old"))
     everything.save(tmp_path / "bent")
     manifest = json.loads((tmp_path / "bent" / "manifest.json").read_text("utf-8"))
