@@ -65,7 +65,7 @@ class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class MarksSchema(msgspec.Struct, omit_defaults=True):
-    """What formats of other programs have no place for but as text: see `Motion`."""
+    """Marks of a motion that formats of other programs hold as text only: see `Motion`."""
 
     insertions: list[InsertionSchema] = []
     keyframed: bool = False
