@@ -73,6 +73,13 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     help="Set the unit of length of a .bvh OUT, as --unit does for IN  [default: cm]",
 )
 @option(
+    "--for",
+    "program",
+    section=Section.OUTPUT,
+    type=click.Choice(["blender", "unreal", "maya"]),
+    help="Write OUT as a program takes it without settings: unit, frames per second, root.",
+)
+@option(
     "--form",
     section=Section.OUTPUT,
     type=click.Choice(["braces", "lines"]),
@@ -86,6 +93,7 @@ def convert(
     skeleton: str,
     fps: float | None,
     out_unit: str | None,
+    program: str | None,
     form: Form,
     joints: Path | None,
     **source: Any,
@@ -98,6 +106,7 @@ def convert(
     """
     from motionmind.formats import lossy_fields, write_motion
     from motionmind.formats.papers import write_papers
+    from motionmind.formats.programs import program_for, write_for
     from motionmind.retarget.joint_mapping import is_human44
     from motionmind.retarget.retarget import to_human23
 
@@ -105,12 +114,16 @@ def convert(
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
         raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
+    taker = program_for(program, output) if program else None
     motion = read(file, **source)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints))
+    fps = fps or (taker.rates[suffix] if taker else None)
     if fps is not None:
         motion = motion.resample(fps)
-    if suffix == ".txt":
+    if taker:
+        write_for(output, motion, taker, unit=out_unit)
+    elif suffix == ".txt":
         write_papers(output, motion, form=form)
     else:
         write_motion(output, motion, unit=out_unit or "cm")
@@ -119,3 +132,5 @@ def convert(
         f"{displayed_path(output)}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints "
         f"({displayed(motion.skeleton.name)})"
     )
+    if taker:
+        click.echo(f"{taker.title}: {taker.advice[suffix]}")

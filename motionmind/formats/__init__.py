@@ -138,6 +138,8 @@ def read_posture(
 def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") -> None:
     """Write `motion` in the format of the suffix.
 
+    For BVH, a log entry says what to set in Blender's import (logger "motionmind.formats.programs", level INFO).
+
     Args:
         path: the file: `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body) or `.npz` (AMASS).
         motion: the movement to write.
@@ -155,8 +157,10 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
     suffix = _suffix(path, _WRITABLE, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
+        from motionmind.formats.programs import note_settings
 
         write_bvh(path, motion, unit)
+        note_settings(path, motion, unit)
     elif suffix == ".txt":
         from motionmind.formats.papers import write_papers
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
+from motionmind.body.motion import Insertion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
@@ -56,6 +57,20 @@ class SkeletonSchema(msgspec.Struct, forbid_unknown_fields=True):
     joints: list[JointSchema]
 
 
+class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
+    """A stretch that the engine inserted: the times of its postures, and (joint, move) for each bridge."""
+
+    times: list[float]
+    bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
+
+
+class MarksSchema(msgspec.Struct, omit_defaults=True):
+    """Marks of a motion that formats of other programs hold as text only: see `Motion`."""
+
+    insertions: list[InsertionSchema] = []
+    keyframed: bool = False
+
+
 T = TypeVar("T")
 
 
@@ -69,6 +84,16 @@ def kind_of(data: bytes, path: FilePath) -> str:
         problem = f"version {header.version}" if header.version else "no version"
         raise FormatError(f"{problem} of {header.format}: this MotionMind reads version {VERSION}", path=path)
     return header.format
+
+
+def to_insertion(schema: InsertionSchema) -> Insertion:
+    """Build an insertion; MotionMindError if its times do not increase, or it bridges a move that it does not have."""
+    return Insertion(np.array(schema.times), tuple(schema.bridged))
+
+
+def insertion_schema(insertion: Insertion, start: float = 0.0) -> InsertionSchema:
+    """Return what a file holds of an insertion, with its times counted from `start`, seconds."""
+    return InsertionSchema(rounded(insertion.times - start).tolist(), list(insertion.bridged))
 
 
 def decode(data: bytes, schema: type[T], path: FilePath) -> T:

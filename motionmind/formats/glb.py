@@ -13,6 +13,8 @@ The layout makes programs recognise an armature:
 - A mesh on that skin (`_glb_body`): an unused skin is a fault, and an animation without a skin is not an armature.
 - One animation that rotates all joints and moves the root. A single frame has no animation; its nodes stand in the
   posture instead, where programs show it without playing anything. The skin still holds the rest pose.
+- What glTF has no place for, the stretches that the engine made and whether frames are keyframes, is text in the root
+  joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and writes it again if asked to.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import json
 import struct
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,17 +33,18 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
-from motionmind.formats._json import rounded
+from motionmind.formats._json import MarksSchema, insertion_schema, rounded
 from motionmind.geometry import rotations as rot
 
 # The format's constants: 3.6.2.2 and 5.11.5.
 _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # the target of a buffer view
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+MARKS = "motionmind"  # of the root joint's extras, where the marks are
 _LONGEST = 1e6  # metres; single precision is off by centimetres there, and by more beyond
 
 
-def write_glb(path: FilePath, motion: Motion) -> None:
+def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None:
     """Write `motion` as binary glTF.
 
     Interpolated (rotations by slerp, root linearly), all joints are where `motion` has them, to the seven digits of
@@ -50,6 +54,8 @@ def write_glb(path: FilePath, motion: Motion) -> None:
     Args:
         path: the file to write.
         motion: the movement, on any skeleton.
+        has_root: whether to hang the body from a bone called "root", which stays on the floor at the origin, unless its
+            own root is called so.
 
     Raises:
         MotionMindError: the body or its path is longer than 1000 km, times are too close together for single
@@ -61,7 +67,7 @@ def write_glb(path: FilePath, motion: Motion) -> None:
         if np.abs(lengths).max() > _LONGEST:
             raise MotionMindError(f"{name}: {what}: GLB cannot hold {np.abs(lengths).max():.3g} metres")
     rest = _at_rest(skeleton)
-    moving = len(motion) > 1
+    moving, has_root = len(motion) > 1, has_root and skeleton.names[0].lower() != "root"
     buffer = _Buffer()
     mesh = body_mesh(skeleton, rest[0])
     document: dict[str, Any] = {
@@ -79,18 +85,33 @@ def write_glb(path: FilePath, motion: Motion) -> None:
                 "name": skeleton.name,
                 "joints": list(range(len(skeleton))),
                 "skeleton": 0,
-                "inverseBindMatrices": buffer.add(_inverse_binds(rest)),
+                "inverseBindMatrices": buffer.add(_inverse_binds(np.vstack([rest, np.zeros((int(has_root), 3))]))),
             }
         ],
     }
     if moving:
         document["animations"] = [_animation(buffer, motion, name)]
+    if marks := marks_text(motion):
+        document["nodes"][0]["extras"] = {MARKS: marks}
+    if has_root:
+        document["scenes"][0]["nodes"] = [len(skeleton) + 1, len(skeleton)]
+        document["nodes"].append({"name": "root", "children": [0]})
+        skin = document["skins"][0]
+        skin["joints"].append(len(skeleton) + 1)
+        skin["skeleton"] = len(skeleton) + 1
     document |= {
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
     write_atomically(path, _container(document, bytes(buffer.data), name))
+
+
+def marks_text(motion: Motion) -> str:
+    """Return what glTF has no place for, as JSON of MarksSchema, times from the first frame's on; "" if nothing."""
+    insertions = [insertion_schema(one, float(motion.times[0])) for one in motion.insertions]
+    marks = MarksSchema(insertions, motion.keyframed)
+    return msgspec.json.encode(marks).decode() if insertions or motion.keyframed else ""
 
 
 class _Buffer:

@@ -52,9 +52,16 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
         lossy.append("where the body is")
     elif abs(motion.times[0]) > _TINY:
         lossy.append(f"the time when it begins, {motion.times[0]:.6g} s")
+    if suffix != ".glb":
+        lossy += _lossy_marks(motion)
+    return lossy + _lossy_body(motion, suffix)
+
+
+def _lossy_marks(motion: Motion) -> list[str]:
+    """Name the marks of what frames are."""
+    lossy = []
     if motion.keyframed and motion.fps >= FILM_RATE:
         lossy.append("that its frames are postures of a score, not of a recording")
-    lossy += _lossy_body(motion, suffix)
     inserted = int(motion.inserted().sum())
     if inserted:
         lossy.append(f"the marks of frames that the engine made ({inserted})")

@@ -37,18 +37,12 @@ from itertools import chain
 import msgspec
 import numpy as np
 
-from motionmind.body.motion import Insertion, Motion
+from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.formats import _json
-
-
-class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """A stretch that the engine inserted: the times of its postures, and (joint, move) for each bridge."""
-
-    times: list[float]
-    bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
+from motionmind.formats._json import InsertionSchema
 
 
 class FramesSchema(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -138,7 +132,7 @@ def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend:
     if mend:
         rotations = _json.unit_rotations(rotations, skeleton.names, path)
     try:
-        insertions = tuple(Insertion(np.array(one.times), tuple(one.bridged)) for one in schema.insertions)
+        insertions = tuple(_json.to_insertion(one) for one in schema.insertions)
         return Motion(skeleton, rotations, root, times, schema.name, insertions, schema.keyframed)
     except FormatError:
         raise
@@ -184,7 +178,7 @@ def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] 
     if motion.keyframed:
         fields.append('"keyframed": true')
     if motion.insertions:
-        insertions = [{"times": _json.rounded(one.times).tolist(), "bridged": one.bridged} for one in motion.insertions]
+        insertions = [_json.insertion_schema(one) for one in motion.insertions]
         fields.append(f'"insertions": {msgspec.json.encode(insertions).decode()}')
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
         rows = ",\n".join(_compact(row.tolist()) for row in _json.rounded(array))  # all at once would fill the memory

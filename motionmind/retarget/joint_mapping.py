@@ -36,8 +36,7 @@ def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -
     Args:
         skeleton: a file's own skeleton.
         joints: the user's mapping, as `read_joint_mapping` returns it. Names of the file's joints may lack their
-            namespace and differ in case. None recognises the rig by its names: CMU (BVH and ASF), Mixamo, Biovision,
-            Poser (and DAZ), Bandai-Namco, SMPL, or human44.
+            namespace and differ in case. None recognises the rig by its names: one of `RIGS`, or human44.
 
     Returns:
         The mapping in the skeleton's order; None if `joints` is None and no rig has these names.

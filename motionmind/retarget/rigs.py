@@ -6,8 +6,10 @@ from the last.
 
 Sources of the names: the CMU Motion Capture Database's ASF files and their conversion to BVH by B. Hahne
 (cgspeed.com), also to the figures of Poser and DAZ Studio; Mixamo's and Autodesk HumanIK's rigs (the same but for the
-namespace); Biovision's own names, in use since the format's first files; Bandai-Namco-Research-Motiondataset; the
-published code of SMPL and its variants.
+namespace); Biovision's own names, in use since the format's first files, and in Xsens MVN's BVH; Xsens MVN's segments,
+as in the MVN User Manual (MV0319P) and in MVNX; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its
+variants; Rokoko's Newton skeleton; Unreal Engine's mannequins; the humanoid bones of VRM (VRMC_vrm-1.0) and what VRoid
+Studio calls them; Blender's Rigify; DAZ Studio's Genesis figures.
 """
 
 from __future__ import annotations
@@ -236,6 +238,151 @@ _SMPL = {
     }
 )
 
+# SMPL's models for Maya, Unity and Unreal call the same joints so; SMPL+H's count knuckles from 0 there.
+_SMPL_MODELS = {name: joint for name, joint in _SMPL.items() if not name.startswith(("left", "right"))} | _both_sides(
+    {
+        "{s}hip": "hip",
+        "{s}knee": "knee",
+        "{s}ankle": "ankle",
+        "{s}foot": "toes",
+        "{s}collar": "clavicle",
+        "{s}shoulder": "shoulder",
+        "{s}elbow": "elbow",
+        "{s}wrist": "wrist",
+        "{s}middle0": "fingers",
+        "{s}hand": "fingers",
+    }
+)
+
+# Genesis 1 and 2 have thigh and shldr; 3 and 8 divide them in bend and twist; 9 says upperarm. Unlike Poser's figures
+# they have a pelvis below the hip, and elbows of their own: at rest palms face down, and forearms turn about the
+# vertical.
+_GENESIS = {
+    "hip": "pelvis",
+    "pelvis": "pelvis",
+    "neck": "cervical",
+    "necklower": "cervical",
+    "neckupper": "cervical",
+    "neck1": "cervical",
+    "neck2": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{s}thigh": "hip",
+        "{s}thighbend": "hip",
+        "{s}thightwist": "hip",
+        "{s}shin": "knee",
+        "{s}foot": "ankle",
+        "{s}toe": "toes",
+        "{s}toes": "toes",
+        "{s}collar": "clavicle",
+        "{s}shoulder": "clavicle",
+        "{s}shldr": "shoulder",
+        "{s}shldrbend": "shoulder",
+        "{s}shldrtwist": "shoulder",
+        "{s}upperarm": "shoulder",
+        "{s}forearm": "elbow",
+        "{s}forearmbend": "elbow",
+        "{s}forearmtwist": "elbow",
+        "{s}hand": "wrist",
+        "{s}mid1": "fingers",
+    }
+)
+_GENESIS_SPINE = (
+    *("abdomen", "abdomenlower", "abdomen2", "abdomenupper", "chest", "chestlower", "chestupper"),
+    *("spine1", "spine2", "spine3", "spine4"),
+)
+
+_ROKOKO = {"hips": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{side}thigh": "hip",
+        "{side}shin": "knee",
+        "{side}foot": "ankle",
+        "{side}toe": "toes",
+        "{side}shoulder": "clavicle",
+        "{side}arm": "shoulder",
+        "{side}forearm": "elbow",
+        "{side}hand": "wrist",
+        "{side}finger3proximal": "fingers",
+    }
+)
+
+# MVN's segments, each named for the bone that begins at the joint.
+_XSENS = {"pelvis": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{side}upperleg": "hip",
+        "{side}lowerleg": "knee",
+        "{side}foot": "ankle",
+        "{side}toe": "toes",
+        "{side}shoulder": "clavicle",
+        "{side}upperarm": "shoulder",
+        "{side}forearm": "elbow",
+        "{side}hand": "wrist",
+    }
+)
+
+# Bones that only twist a limb (upperarm_twist_01_l) hang beside it, and are left out.
+_UNREAL = {"pelvis": "pelvis", "neck01": "cervical", "neck02": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "thigh{s}": "hip",
+        "calf{s}": "knee",
+        "foot{s}": "ankle",
+        "ball{s}": "toes",
+        "clavicle{s}": "clavicle",
+        "upperarm{s}": "shoulder",
+        "lowerarm{s}": "elbow",
+        "hand{s}": "wrist",
+        "middle01{s}": "fingers",
+    }
+)
+
+_VRM = {"hips": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{side}upperleg": "hip",
+        "{side}lowerleg": "knee",
+        "{side}foot": "ankle",
+        "{side}toes": "toes",
+        "{side}shoulder": "clavicle",
+        "{side}upperarm": "shoulder",
+        "{side}lowerarm": "elbow",
+        "{side}hand": "wrist",
+        "{side}middleproximal": "fingers",
+    }
+)
+_VROID = {"jbipchips": "pelvis", "jbipcneck": "cervical", "jbipchead": "atlantal"} | _both_sides(
+    {
+        "jbip{s}upperleg": "hip",
+        "jbip{s}lowerleg": "knee",
+        "jbip{s}foot": "ankle",
+        "jbip{s}toebase": "toes",
+        "jbip{s}shoulder": "clavicle",
+        "jbip{s}upperarm": "shoulder",
+        "jbip{s}lowerarm": "elbow",
+        "jbip{s}hand": "wrist",
+        "jbip{s}middle1": "fingers",
+    }
+)
+
+# The metarig; a generated rig's bones that carry the skin are called the same after DEF-, and limbs are divided in two.
+_METARIG = {"spine": "pelvis", "spine004": "cervical", "spine005": "cervical", "spine006": "atlantal"} | _both_sides(
+    {
+        "thigh{s}": "hip",
+        "thigh{s}001": "hip",
+        "shin{s}": "knee",
+        "shin{s}001": "knee",
+        "foot{s}": "ankle",
+        "toe{s}": "toes",
+        "shoulder{s}": "clavicle",
+        "upperarm{s}": "shoulder",
+        "upperarm{s}001": "shoulder",
+        "forearm{s}": "elbow",
+        "forearm{s}001": "elbow",
+        "hand{s}": "wrist",
+        "fmiddle01{s}": "fingers",
+    }
+)
+_METARIG_SPINE = ("spine001", "spine002", "spine003")
+
 _OWN = {name.replace("_", ""): name for name in human23().names}
 _OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
 
@@ -257,7 +404,16 @@ RIGS: tuple[Rig, ...] = (
     Rig("CMU, ASF", _CMU_ASF, ("lowerback", "upperback", "thorax"), neck_leans=True, twists=_CMU_TWISTS),
     Rig("Mixamo", _HUMANIK, _HUMANIK_SPINE),
     Rig("Biovision", _BIOVISION, ("lowerback", "ab", "abdomen", "chest", "chest2", "chest3", "chest4")),
+    Rig("DAZ Genesis", _GENESIS, _GENESIS_SPINE, frozenset({"hip", "pelvis"})),
     Rig("Poser", _POSER, ("abdomen", "chest"), frozenset({"abdomen", "lshldr"}), twists=_CMU_TWISTS),
     Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
     Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
+    Rig("SMPL, models", _SMPL_MODELS, (), frozenset({"spine3", "lcollar"}), frames=_OWN_FRAMES),
+    Rig("Rokoko", _ROKOKO, ("spine1", "spine2", "spine3", "spine4")),
+    Rig("Xsens MVN", _XSENS, ("l5", "l3", "t12", "t8")),
+    Rig("Unreal", _UNREAL, ("spine01", "spine02", "spine03", "spine04", "spine05")),
+    Rig("VRM", _VRM, ("spine", "chest", "upperchest")),
+    Rig("VRoid", _VROID, ("jbipcspine", "jbipcchest", "jbipcupperchest")),
+    Rig("Rigify", {f"def{name}": joint for name, joint in _METARIG.items()}, [f"def{name}" for name in _METARIG_SPINE]),
+    Rig("Rigify, metarig", _METARIG, _METARIG_SPINE),
 )

@@ -29,7 +29,8 @@ from motionmind.corpus.corpus import Facing
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes
 from motionmind.formats import _json
-from motionmind.formats.motion_json import FramesSchema, InsertionSchema, MotionSchema, motion_of, write_motion_json
+from motionmind.formats._json import InsertionSchema
+from motionmind.formats.motion_json import FramesSchema, MotionSchema, motion_of, write_motion_json
 from motionmind.variation.course import Course
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam

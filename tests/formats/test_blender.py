@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
+from command_line import Run
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
@@ -62,6 +63,30 @@ for file, frames in json.loads(sys.argv[1]):
     }
 print("\\n" + json.dumps(found))
 """.replace("RATE", str(RATE))
+
+AT_DEFAULTS = """
+import json, sys
+import bpy
+
+found = {}
+for file, options, seconds in json.loads(sys.argv[1]):
+    bpy.ops.wm.read_factory_settings()
+    if file.endswith(".bvh"):
+        bpy.ops.import_anim.bvh(filepath=file, **options)
+    else:
+        bpy.ops.import_scene.gltf(filepath=file)
+    armature = bpy.context.object if bpy.context.object.type == "ARMATURE" else bpy.context.object.parent
+    scene, matrix = bpy.context.scene, armature.matrix_world
+    rate, begins = scene.render.fps / scene.render.fps_base, 1 if file.endswith(".bvh") else 0
+    places = []
+    for second in seconds:
+        scene.frame_set(begins + int(second * rate), subframe=second * rate % 1.0)
+        bpy.context.view_layer.update()
+        places.append({bone.name: list(matrix @ bone.head) for bone in armature.pose.bones})
+    end = (armature.animation_data.action.frame_range[1] - begins) / rate
+    found[file] = {"places": places, "end": end}
+print("\\n" + json.dumps(found))
+"""
 
 
 def wandering(skeleton: Skeleton, frames: int, seed: int = 0) -> Motion:
@@ -143,3 +168,30 @@ def test_every_joint_is_where_it_was_in_every_frame(name: str, suffix: str, seen
     if suffix == "glb":
         assert found["name"] == skeleton.name
         assert found["skinned"] == [f"{skeleton.name} body"]
+
+
+@pytest.mark.skipif(not PYTHON, reason="Blender's module bpy is not here (pip install bpy, or set BLENDER_PYTHON)")
+def test_at_default_settings_lengths_and_seconds_are_right(tmp_path: Path, run: Run) -> None:
+    motion = ballet_clip("adagio").resample(60.0)
+    write_motion(tmp_path / "in.json", motion)
+    files = {
+        "blender.bvh": (["--for", "blender"], {}),
+        "blender.glb": (["--for", "blender"], {}),
+        "unreal.glb": (["--for", "unreal"], {}),
+        "boxes.bvh": ([], {"global_scale": 0.01, "update_scene_fps": True}),
+    }
+    seconds = (np.arange(20) * 10 / 24.0).tolist()
+    jobs = []
+    for name, (options, settings) in files.items():
+        assert run("convert", tmp_path / "in.json", tmp_path / name, *options).code == 0
+        jobs.append((str(tmp_path / name), settings, seconds))
+    ran = subprocess.run(
+        [str(PYTHON), "-c", AT_DEFAULTS, json.dumps(jobs)], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    at = motion.at(np.array(seconds))
+    here = motion.skeleton.positions(at.rotations, at.root)
+    for file, shown in json.loads(ran.stdout.splitlines()[-1]).items():
+        there = y_up([[place[joint] for joint in motion.skeleton.names] for place in shown["places"]])
+        assert np.linalg.norm(there - here, axis=-1).max() < 1e-3, file
+        assert shown["end"] == pytest.approx(motion.times[-1], abs=1.0 / 24.0), file

@@ -76,10 +76,53 @@ def test_frames_a_second(target: str, convert: Run) -> None:
 def test_units(unit: str | None, metres: float, convert: Run) -> None:
     motion = moving(human23())
     write_motion("in.json", motion)
-    assert convert("in.json", "a.bvh", *(["--out-unit", unit] if unit else [])).err == ""
+    assert convert("in.json", "a.bvh", *(["--out-unit", unit] if unit else [])).code == 0
     np.testing.assert_allclose(read_bvh("a.bvh", unit=1.0).root * metres, motion.root, atol=1e-6)
-    assert convert("a.bvh", "b.bvh", "--unit", metres, "--out-unit", "mm").err == ""
+    assert convert("a.bvh", "b.bvh", "--unit", metres, "--out-unit", "mm").code == 0
     np.testing.assert_allclose(read_bvh("b.bvh", unit=1.0).root * 0.001, motion.root, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "rate", "said"),
+    [
+        ("cm", 20, "set Scale to 0.01 and tick Update Scene FPS"),
+        ("m", 20, "tick Update Scene FPS"),
+        ("in", 24, "set Scale to 0.0254"),
+        ("m", 24, ""),
+    ],
+)
+def test_settings_of_blenders_import(unit: str, rate: int, said: str, convert: Run) -> None:
+    write_motion("in.json", moving(human23()))
+    ran = convert("in.json", "a.bvh", "--out-unit", unit, "--fps", rate)
+    assert ran.err == (
+        f"note: a.bvh: in Blender's import, {said} (or write it by convert --for blender)\n" if said else ""
+    )
+
+
+@pytest.mark.parametrize(("program", "metres"), [("blender", 1.0), ("maya", 0.01)])
+def test_bvh_for_a_program(program: str, metres: float, convert: Run) -> None:
+    motion = moving(human23())
+    write_motion("in.json", motion)
+    ran = convert("in.json", "a.bvh", "--for", program)
+    assert (ran.code, ran.err) == (0, "")
+    again = read_bvh("a.bvh", unit=1.0)
+    assert again.fps == pytest.approx(24.0)
+    np.testing.assert_allclose(again.root * metres, motion.resample(24.0).root, atol=1e-6)
+    assert convert("in.json", "b.bvh", "--for", program, "--fps", 10, "--out-unit", "in").code == 0
+    assert read_bvh("b.bvh").fps == pytest.approx(10.0)
+    np.testing.assert_allclose(read_bvh("b.bvh", unit="in").root[0], motion.root[0], atol=1e-6)
+
+
+def test_the_format_to_take_instead(convert: Run) -> None:
+    write_motion("in.json", moving(human23()))
+    assert (
+        "a.bvh: not for Unreal Engine: it reads no BVH: write .glb"
+        in convert("in.json", "a.bvh", "--for", "unreal").err
+    )
+    assert "a.glb: not for Maya: it reads no glTF: write .bvh" in convert("in.json", "a.glb", "--for", "maya").err
+    refused = convert("in.json", "a.npz", "--for", "blender")
+    assert (refused.code, refused.err) == (2, "error: a.npz: not for Blender: it reads .bvh and .glb\n")
+    assert [path.name for path in Path().iterdir()] == ["in.json"]
 
 
 def test_units_that_cannot_be(convert: Run) -> None:
@@ -108,7 +151,7 @@ def test_of_what_a_format_holds_nothing_is_said(body: Skeleton) -> None:
     assert lossy_fields(replace(motion, name="another"), "a.JSON") == []
 
 
-@pytest.mark.parametrize("suffix", ["bvh", "glb", "npz", "txt"])
+@pytest.mark.parametrize("suffix", ["bvh", "npz", "txt"])
 def test_what_the_engine_made(suffix: str) -> None:
     given = lossy_fields(moving(human23()), f"a.{suffix}")
     assert lossy_fields(inserted(moving(human23())), f"a.{suffix}") == [
@@ -176,7 +219,7 @@ def test_joints_that_smpl_lacks() -> None:
 def test_the_command_says_it(convert: Run, shared_data: Path) -> None:
     write_motion("in.json", inserted(moving(human23())))
     said = "the marks of frames that the engine made (3); the marks of joints that it bridged (left_hip, right_knee)\n"
-    assert convert("in.json", "a.bvh").err == f"note: a.bvh: no place for {said}"
+    assert f"note: a.bvh: no place for {said}" in convert("in.json", "a.bvh").err
     assert convert("in.json", "b.json").err == ""
     assert convert("a.bvh", "c.npz", "--unit", "cm").err == ""
     recording = shared_data / "cmu-05" / "05_02.bvh"

@@ -1,0 +1,120 @@
+"""Movement for other programs: the unit, rate and root with which each takes a file as it comes, without settings.
+
+Read from the sources of Blender 5.0 (io_anim_bvh): its import takes one unit as a metre, y as up and -z as forward, and
+each frame as one of the scene's, 24 a second in a new one; Scale multiplies lengths, Update Scene FPS sets the scene's
+rate to the file's. glTF has metres, y up and seconds everywhere, and is turned by whoever reads it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError
+from motionmind.files import FilePath
+from motionmind.formats.units import metres_per_unit
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program that movement is written for.
+
+    Attributes:
+        title: its name.
+        rates: by suffix of a file that it reads, the frames a second that it expects; None if the file's count.
+        other: the suffixes that it does not read, each with what to do.
+        unit: the unit of BVH's lengths that it takes as they are.
+        has_root: whether bodies have a bone of their own on the floor at the origin, below the one that moves.
+        advice: by suffix, how to open the file.
+    """
+
+    title: str
+    rates: Mapping[str, float | None]
+    other: Mapping[str, str]
+    unit: str = "m"
+    has_root: bool = False
+    advice: Mapping[str, str] = field(default_factory=dict)
+
+
+_SCENE_RATE = 24.0  # frames a second of a new scene in Blender, and in Maya
+_TINY = 1e-6
+
+PROGRAMS = {
+    "blender": Program(
+        "Blender",
+        {".bvh": _SCENE_RATE, ".glb": None},
+        {},
+        advice={
+            ".bvh": "File, Import, Motion Capture (.bvh)",
+            ".glb": "File, Import, glTF 2.0",
+        },
+    ),
+    "unreal": Program(
+        "Unreal Engine",
+        {".glb": 30.0},
+        {".bvh": "it reads no BVH: write .glb"},
+        has_root=True,
+        advice={".glb": "Import to the Content Browser, as a skeletal mesh with its animation"},
+    ),
+    "maya": Program(
+        "Maya",
+        {".bvh": _SCENE_RATE},
+        {".glb": "it reads no glTF: write .bvh for MotionBuilder, or open the .glb in Blender and export FBX"},
+        unit="cm",
+        advice={".bvh": "open it in MotionBuilder (File, Motion File Import), or by a script: Maya alone reads no BVH"},
+    ),
+}
+
+
+def program_for(name: str, path: FilePath) -> Program:
+    """Return the program called `name` in `PROGRAMS`, which reads the format of `path`.
+
+    Raises:
+        MotionMindError: it does not; the message names the format to take.
+    """
+    program, suffix = PROGRAMS[name], Path(path).suffix.lower()
+    if suffix not in program.rates:
+        what = program.other.get(suffix, f"it reads {' and '.join(program.rates)}")
+        raise MotionMindError(f"{path}: not for {program.title}: {what}")
+    return program
+
+
+def write_for(path: FilePath, motion: Motion, program: Program, *, unit: str | None = None) -> None:
+    """Write `motion` for a program, with its unit (`unit`, if given) and root; the rate is as the motion has it.
+
+    Raises:
+        MotionMindError: as `write_motion`.
+    """
+    if Path(path).suffix.lower() == ".bvh":
+        from motionmind.formats.bvh import write_bvh
+
+        write_bvh(path, motion, unit or program.unit)
+        if program is PROGRAMS["blender"]:
+            note_settings(path, motion, unit or program.unit)
+    else:
+        from motionmind.formats.glb import write_glb
+
+        write_glb(path, motion, has_root=program.has_root)
+
+
+def note_settings(path: FilePath, motion: Motion, unit: str | float) -> None:
+    """Log what to set in Blender's import of BVH in `unit`, if anything.
+
+    The logger is "motionmind.formats.programs", the level INFO.
+
+    Args:
+        path: the file that was written.
+        motion: the movement in it.
+        unit: the unit of its lengths.
+    """
+    scale = metres_per_unit(unit)
+    settings = [f"set Scale to {scale:.5g}"] if abs(scale - 1.0) > _TINY else []
+    if len(motion) > 1 and abs(motion.fps / _SCENE_RATE - 1.0) > _TINY:
+        settings.append("tick Update Scene FPS")
+    if settings:
+        _log.info("%s: in Blender's import, %s (or write it by convert --for blender)", path, " and ".join(settings))
