@@ -16,8 +16,15 @@ if TYPE_CHECKING:
 
 
 def parse_movement(word: str, home: Path | None) -> PostureName:
-    """Parse the name of movement, or of one posture of it; MotionMindError if the posture is to be moving."""
+    """Parse the name of movement, or of one posture of it.
+
+    Raises:
+        MotionMindError: the posture is to be moving, or there is no such movement, though its word could be a corpus's.
+    """
+    from motionmind.names.finding import check_exists
+
     named = parse_posture(word, home)
+    check_exists(named.source, home)
     if named.is_moving:
         raise MotionMindError(f"{word}: ~ is for the ends of tween, which may be moving; leave it out")
     return named

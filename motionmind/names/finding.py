@@ -81,7 +81,7 @@ class Collection(ABC):
 
 
 class _ScoreCollection(Collection):
-    """What a score holds, and the postures of scores that it includes."""
+    """A score's clips and postures, and the postures of scores that it includes."""
 
     def __init__(self, path: str) -> None:
         super().__init__(path)
@@ -104,7 +104,7 @@ class _ScoreCollection(Collection):
 
 
 class _CorpusCollection(Collection):
-    """What a corpus holds; one that people wrote has the postures that its scores name."""
+    """A corpus's clips; one that people wrote has the postures that its scores name, too."""
 
     def __init__(self, name: str, home: Path | None) -> None:
         super().__init__(name)
@@ -206,16 +206,14 @@ def check_exists(source: Source, home: Path | None = None) -> None:
         return  # those who read files say what is wrong with one
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
-    corpora = store.list_corpora(home)
     first, slash, _ = word.partition("/")
+    corpora = list(store.list_corpora(home))
     if slash:
-        raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{_hint(first, list(corpora))}")
-    spelled = (
-        "frames are spelled clip.bvh@240 or clip.bvh@2.0s"
-        if "@" in word
-        else "a corpus's postures are spelled CORPUS/NAME"
-    )
-    raise MotionMindError(f"{word}: there is no such file; {spelled}{_elsewhere(word, home)}")
+        raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{_hint(first, corpora)}")
+    if "@" in word:
+        raise MotionMindError(f"{word}: there is no such file; frames are spelled clip.bvh@240 or clip.bvh@2.0s")
+    hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, _MOST)}, a posture of one is CORPUS/NAME"
+    raise MotionMindError(f"{word}: there is no such file or corpus{hint}")
 
 
 def frame_of(name: PostureName, motion: Motion) -> int:
@@ -276,7 +274,7 @@ def _example(source: Source, collection: Collection) -> str:
 
 
 def _elsewhere(name: str, home: Path | None) -> str:
-    """Return "; did you mean CORPUS/NAME?" for a corpus that names this posture, or that has this name itself."""
+    """Return "; did you mean CORPUS/NAME?" for a corpus that names this posture, or that is called nearly so; or ""."""
     corpora = store.list_corpora(home)
     for corpus in corpora:
         try:

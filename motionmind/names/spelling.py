@@ -1,4 +1,4 @@
-"""How words name movement and postures.
+"""Names of movement and postures, as words spell them.
 
     arabesque.json           the only posture of a file
     clip.bvh@240             frame 240 of a file, counted from 0; @-1 is the last
@@ -114,6 +114,8 @@ def parse_source(word: str, home: Path | None = None) -> Source:
         return Source(word, "corpus", corpus, name)
     parts = word.split("/")
     for length in range(len(parts), 0, -1):
+        if length < len(parts) and os.path.isdir(word):  # noqa: PTH112 - as in `is_file`
+            break  # a folder in a corpus's, and none of its names
         folder = "/".join(parts[:length])
         if folder and os.path.isfile(f"{folder}/{MANIFEST}"):  # noqa: PTH113 - as in `is_file`
             return Source(word, "corpus", folder, "/".join(parts[length:]))

@@ -95,11 +95,7 @@ def contact_sheet(
     check_frames(motion, chosen)
     if captions is not None and len(captions) != len(chosen):
         raise MotionMindError(f"a sheet of {len(chosen)} postures has as many captions, not {len(captions)}")
-    if captions is None:
-        notes = [(f"{first + frame}", f"{motion.times[frame]:.2f} s") for frame in chosen]
-    else:
-        notes = [(displayed(caption, _LONGEST), "") for caption in captions]
-    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, notes)
+    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, first, captions)
     return sheet.picture(columns)
 
 
@@ -144,9 +140,14 @@ def check_frames(motion: Motion, frames: Sequence[int]) -> None:
 class _Sheet:
     """The postures to draw, placed in the world, and the windows through which all of them are seen."""
 
-    def __init__(self, motion: Motion, frames: list[int], side: View, notes: list[tuple[str, str]]) -> None:
+    def __init__(
+        self, motion: Motion, frames: list[int], side: View, first: int = 0, captions: Sequence[str] | None = None
+    ) -> None:
         self.motion, self.frames = motion, frames
-        self.notes = notes  # of each posture, on the left and on the right
+        # Of each posture, what stands on the left and on the right.
+        self.notes = [(f"{first + frame}", f"{motion.times[frame]:.2f} s") for frame in frames]
+        if captions is not None:
+            self.notes = [(displayed(caption, _LONGEST), "") for caption in captions]
         self.body: BodyShape = shape_of(motion.skeleton)
         root = motion.root[frames]
         self.cones, self.balls = self.body.solids(motion.rotations[frames], root)

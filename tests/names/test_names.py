@@ -165,8 +165,10 @@ def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("arabesque", r"arabesque: there is no such file; .* CORPUS/NAME; did you mean ballet/arabesque\?$"),
-        ("balet", r"balet: there is no such file; .* CORPUS/NAME; did you mean ballet\?$"),
+        ("arabesque", r"^arabesque: there is no such file or corpus; did you mean ballet/arabesque\?$"),
+        ("balet", r"^balet: there is no such file or corpus; did you mean ballet\?$"),
+        ("zzz", r"^zzz: there is no such file or corpus; corpora are ballet, .*, a posture of one is CORPUS/NAME$"),
+        ("zzz@x", r"^zzz@x: there is no such file; frames are spelled clip\.bvh@240 or clip\.bvh@2\.0s$"),
         ("balet/fifth", r"balet/fifth: there is no such file, and no corpus 'balet'; did you mean ballet\?$"),
         ("opera/fifth", r"no corpus 'opera'; there are ballet, hands, "),
         ("ballet/fith", r"^ballet: no posture or clip 'fith'; did you mean fifth\?$"),
@@ -180,7 +182,7 @@ def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None
         (f"{CENTRE}/tendue", r"centre\.score: no posture or clip 'tendue'; did you mean tendus\?|tendu\?"),
         ("centre.score/tendu", r"^centre\.score: cannot be read: there is no such file or folder$"),
         ("nothing.bvh@3", r"^nothing\.bvh: cannot be read: there is no such file or folder$"),
-        (str(BALLET / "postures"), r"postures: no posture or clip|postures'"),
+        (str(BALLET / "postures"), r"postures: is a folder, and no corpus"),
         (".", r"^\.: is a folder, and no corpus"),
         ("x\0y", r"there is no such file"),
         ("A" * 5000, r"there is no such file"),
