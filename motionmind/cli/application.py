@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import click
 
+from motionmind.cli.catalogue import postures
 from motionmind.cli.conversion import convert, posture
 from motionmind.cli.corpora import corpora
 from motionmind.cli.looks import explain, graph
@@ -31,7 +32,7 @@ NO_PATH = 3  # exit code when nothing joins A and B
 
 
 @group(
-    "motionmind tween A.json B.json --corpus ballet -o tween.bvh",
+    "motionmind tween ballet/arabesque ballet/fifth -o tween.bvh",
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
 @click.version_option(package_name="motionmind", message="%(prog)s %(version)s")
@@ -42,7 +43,7 @@ def app(context: click.Context) -> None:
 
 
 for _command in (
-    *(tween, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
+    *(tween, postures, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
     *(vary, review, attractor),
 ):
     app.add_command(_command)

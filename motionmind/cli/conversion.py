@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read, read_mapping, write
-from motionmind.cli.options import OUTPUTS, Section, command, option, reading
+from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read_mapping, write
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, reading
 from motionmind.cli.printing import count
+from motionmind.cli.sources import parse_movement, read_movement, read_part
 from motionmind.cli.types import FILE, RATE, Whole
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from motionmind.formats.papers import Form
 
 
-@command("motionmind posture clip.bvh --frame 240 -o A.json")
-@click.argument("clip", type=FILE)
+@command("motionmind posture ballet/adagio --frame 23 -o A.json")
+@click.argument("source")
 @option(
     "-o",
     "--output",
@@ -30,33 +31,48 @@ if TYPE_CHECKING:
     help=f"Write {OUTPUTS}; or .txt.",
 )
 @option(
+    "--clip",
+    "name",
+    section=Section.PART,
+    metavar="NAME",
+    help="Take this clip of a score or a corpus  [default: its only one]",
+)
+@option(
     "--frame",
     section=Section.PART,
     type=Whole(),
     metavar="N",
-    required=True,
-    help="Take frame N, counted from 0, or from the end if negative.",
+    help="Take frame N, counted from 0, or from the end if negative  [default: the only one, or that of SOURCE@N]",
 )
 @reading
-def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source: Any) -> None:
+@HOME
+def posture(source: str, frame: int | None, name: str | None, output: Path, home: Path | None, **options: Any) -> None:
     """Take one posture out of a clip.
+
+    SOURCE is what sheet draws: a file of movement, a score, a corpus, CORPUS/CLIP, or a posture such as
+    ballet/arabesque and clip.bvh@240.
 
     The posture is on human23 if the clip's joints map to it, by known names or by --joints; otherwise on the clip's own
     skeleton, such as human44.
     """
-    from motionmind.retarget.retarget import own_skeleton
+    from motionmind.names.finding import frame_of, select_frame
+    from motionmind.names.spelling import Moment
 
-    check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], [clip])
-    motion = own_skeleton(read(clip, **source), read_mapping(joints))
-    write(output, motion.posture(frame))
+    named = parse_movement(source, home)
+    check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], named.source.paths)
+    if frame is not None and named.moment is not None:
+        raise MotionMindError(f"{source}: names a frame, and so does --frame; give one of them")
+    motion = read_movement(named.source, name, home, **options)
+    at = frame_of(named, motion) if frame is None else select_frame(named.source.word, motion, Moment(frame))
+    write(output, motion.posture(at))
     click.echo(
-        f"{displayed_path(output)}: frame {frame} of {len(motion)}, on "
+        f"{displayed_path(output)}: frame {at} of {len(motion)}, on "
         f"{displayed(motion.skeleton.name)} ({len(motion.skeleton)} joints)"
     )
 
 
 @command("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30")
-@click.argument("file", type=FILE, metavar="IN")
+@click.argument("source", metavar="IN")
 @click.argument("output", type=FILE, metavar="OUT")
 @option(
     "--skeleton",
@@ -87,8 +103,9 @@ def posture(clip: Path, frame: int, output: Path, joints: Path | None, **source:
     help="Choose between the two notations of the papers for .txt.",
 )
 @reading
+@HOME
 def convert(
-    file: Path,
+    source: str,
     output: Path,
     skeleton: str,
     fps: float | None,
@@ -96,13 +113,15 @@ def convert(
     program: str | None,
     form: Form,
     joints: Path | None,
-    **source: Any,
+    home: Path | None,
+    **options: Any,
 ) -> None:
     """Convert movement from one format to another.
 
-    IN may be .bvh, .amc with its .asf, .json, .npz as in AMASS, or .txt in the notation of the papers. OUT may be .bvh,
-    .json, .glb (a skinned body, for Blender and the like), .npz (on SMPL's joints), or .txt, which is on human23 (or
-    human44, if IN is) and holds orientations only. A note lists whatever OUT has no place for.
+    IN may be .bvh, .amc with its .asf, .json, .npz as in AMASS, .txt in the notation of the papers, or a clip or
+    posture of a score or a corpus, as ballet/adagio. OUT may be .bvh, .json, .glb (a skinned body, for Blender and the
+    like), .npz (on SMPL's joints), or .txt, which is on human23 (or human44, if IN is) and holds orientations only. A
+    note lists whatever OUT has no place for.
     """
     from motionmind.formats import lossy_fields, write_motion
     from motionmind.formats.papers import write_papers
@@ -110,12 +129,13 @@ def convert(
     from motionmind.retarget.joint_mapping import is_human44
     from motionmind.retarget.retarget import to_human23
 
-    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz"))], [file])
+    named = parse_movement(source, home)
+    check_outputs([(output, (".bvh", ".json", ".txt", ".glb", ".npz"))], named.source.paths)
     suffix = output.suffix.lower()
     if out_unit and suffix != ".bvh":
         raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
     taker = program_for(program, output) if program else None
-    motion = read(file, **source)
+    motion = read_part(named, None, home, raw=True, **options)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints))
     fps = fps or (taker.rates[suffix] if taker else None)
@@ -127,7 +147,7 @@ def convert(
         write_papers(output, motion, form=form)
     else:
         write_motion(output, motion, unit=out_unit or "cm")
-    note_lossy_fields(output, lossy_fields(motion, output, source=file))
+    note_lossy_fields(output, lossy_fields(motion, output, source=next(iter(named.source.paths), None)))
     click.echo(
         f"{displayed_path(output)}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints "
         f"({displayed(motion.skeleton.name)})"

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import read, read_mapping
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, reading
 from motionmind.cli.printing import count
+from motionmind.cli.sources import parse_movement, read_part
 from motionmind.cli.types import FILE
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
@@ -21,41 +21,39 @@ if TYPE_CHECKING:
 
 
 @command("motionmind measure tween.json --corpus ballet")
-@click.argument("file", type=FILE)
+@click.argument("source")
 @CORPUS
 @option(
     "--report",
     section=Section.INPUT,
     type=FILE,
-    help="Take FILE's path of states from the report that tween --report wrote with it.",
+    help="Take SOURCE's path of states from the report that tween --report wrote with it.",
 )
 @JSON
 @reading
 @HOME
 def measure(
-    file: Path,
+    source: str,
     corpus: str,
     report: Path | None,
     as_json: bool,
-    joints: Path | None,
     home: Path | None,
-    **source: Any,
+    **options: Any,
 ) -> None:
     """Measure movement, and compare it with a corpus.
 
-    FILE is any movement, such as a tween or a recording. Its dynamics are measured at 30 frames per second, its
-    vocabulary in the corpus's states. The range runs from the 5th to the 95th percentile of the corpus's clips, cut to
-    pieces as long as FILE, or to a tenth of the corpus; figures beyond it are marked < or >.
+    SOURCE is any movement: a tween, a recording, CORPUS/CLIP or SCORE/CLIP. Its dynamics are measured at 30 frames per
+    second, its vocabulary in the corpus's states. The range runs from the 5th to the 95th percentile of the corpus's
+    clips, cut to pieces as long as SOURCE, or to a tenth of the corpus; figures beyond it are marked < or >.
     """
     import msgspec
     import numpy as np
 
     from motionmind.metrics.measure import MeasureReport, measure
-    from motionmind.retarget.retarget import own_skeleton
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import read_report
 
-    motion = own_skeleton(read(file, **source), read_mapping(joints))
+    motion = read_part(parse_movement(source, home), None, home, **options)
     engine = Engine.load(corpus, home)
     path = None
     if report is not None:
@@ -71,7 +69,7 @@ def measure(
         return
     seconds = motion.times[-1] - motion.times[0]
     click.echo(
-        f"{displayed_path(file)}: {count(len(motion), 'frame')} in {seconds:.2f} s, "
+        f"{displayed_path(source)}: {count(len(motion), 'frame')} in {seconds:.2f} s, "
         f"beside {displayed(engine.corpus.name)}"
     )
     width = max(map(len, found))

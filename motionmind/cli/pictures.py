@@ -13,7 +13,7 @@ import click
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, Section, command, option, reading
 from motionmind.cli.printing import count
-from motionmind.cli.sources import is_collection, read_movement, read_movements, select_frames
+from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
 from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE, Whole
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
@@ -44,8 +44,8 @@ LAST = option(
 )
 
 
-@command("motionmind sheet corpora/ballet/centre.score --clip adagio -o adagio.png")
-@click.argument("source", type=FILE_OR_FOLDER)
+@command("motionmind sheet ballet/adagio -o adagio.png")
+@click.argument("source")
 @option(
     "-o",
     "--output",
@@ -89,7 +89,7 @@ LAST = option(
 @reading
 @HOME
 def sheet(
-    source: Path,
+    source: str,
     output: Path,
     names: tuple[str, ...],
     every: int | None,
@@ -103,28 +103,26 @@ def sheet(
 ) -> None:
     """Draw the postures of clips side by side.
 
-    SOURCE is a file of movement, a score, a corpus by its name or folder, or CORPUS/CLIP. Scores and corpora hold
-    several clips; --clip takes some.
+    SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
+    ballet/arabesque. Scores and corpora hold several clips; --clip takes some.
 
     Each posture is drawn from the front and from the side, and its feet from above, with its time and its frame's
-    number, which posture --frame takes.
+    number: 23 is SOURCE@23 where a posture is wanted.
     """
     from motionmind.formats import write_atomically
     from motionmind.render.sheet import check_frames, contact_sheet, png
 
-    folder = output if is_collection(source, home) and (output.is_dir() or not output.suffix) else None
+    named = parse_movement(source, home)
+    folder = output if named.source.kind != "file" and (output.is_dir() or not output.suffix) else None
     if not folder:
-        check_outputs([(output, (".png",))], [source])
-    motions = read_movements(source, names, home, **reading_options)
+        check_outputs([(output, (".png",))], named.source.paths)
+    motions = read_movements(named.source, names, home, **reading_options)
     if not folder and len(motions) != 1:
         raise MotionMindError(f"{output}: {source} holds {len(motions)} clips; choose one by --clip, or give a folder")
-    frames = [
-        _select_drawn(select_frames(motion.name if folder else source, len(motion), start, end), every, postures)
-        for motion in motions
-    ]
+    frames = [_select_drawn(select_part(named, motion, start, end), every, postures) for motion in motions]
     for motion, drawn in zip(motions, frames, strict=True):
         check_frames(motion, drawn)
-    paths = _make_files(folder, motions, source) if folder else [output]
+    paths = _make_files(folder, motions, named.source.paths) if folder else [output]
     with all_or_none():
         for path, motion, drawn in zip(paths, motions, frames, strict=True):
             picture = contact_sheet(motion, drawn, columns=columns, side=side)
@@ -134,7 +132,7 @@ def sheet(
 
 
 @command("motionmind render clip.bvh -o clip.html")
-@click.argument("source", type=FILE_OR_FOLDER)
+@click.argument("source")
 @option(
     "-o",
     "--output",
@@ -174,20 +172,22 @@ def sheet(
 @reading
 @HOME
 def render(
-    source: Path, output: Path, name: str | None, start: int, end: int, home: Path | None, **options: Any
+    source: str, output: Path, name: str | None, start: int, end: int, home: Path | None, **options: Any
 ) -> None:
     """Draw movement as a picture, a film, or a page that plays it.
 
-    SOURCE is a file of movement, a score, a corpus by its name or folder, or CORPUS/CLIP. A .png shows one posture, or
+    SOURCE is a file of movement, a score, a corpus by its name or folder, CORPUS/CLIP, or a posture such as
+    ballet/arabesque. A .png shows one posture, or
     a sheet of up to 48 evenly spread ones (the sheet command offers more choice); an .html page plays the movement in
     any browser, from disk, offline. Inserted movement is drawn in violet; a green ball marks a joint that was bridged.
     """
     from motionmind.render.pictures import write_picture
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
-    check_outputs([(output, PICTURES)], [source])
-    whole = read_movement(source, name, home, **options)
-    frames = select_frames(source, len(whole), start, end)
+    named = parse_movement(source, home)
+    check_outputs([(output, PICTURES)], named.source.paths)
+    whole = read_movement(named.source, name, home, **options)
+    frames = select_part(named, whole, start, end)
     motion = whole.slice(frames.start, frames.stop)
     write_picture(output, motion, first=frames.start, **drawing)
     seconds = motion.times[-1] - motion.times[0]
@@ -195,7 +195,7 @@ def render(
     click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
 
 
-def _make_files(folder: Path, motions: Sequence[Motion], source: Path) -> list[Path]:
+def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Path]) -> list[Path]:
     """Return a file for each motion, named after it, in a folder that is made if it does not exist."""
     is_new = not folder.exists()
     try:
@@ -204,7 +204,7 @@ def _make_files(folder: Path, motions: Sequence[Motion], source: Path) -> list[P
         raise MotionMindError(f"{folder}: cannot be made: {error.strerror or error}") from error
     names = (re.sub(r"[^\w.()-]+", "-", motion.name) for motion in motions)
     try:
-        return check_outputs([(folder / f"{name}.png", (".png",)) for name in names], [source])
+        return check_outputs([(folder / f"{name}.png", (".png",)) for name in names], read_from)
     except MotionMindError:
         with suppress(OSError):
             if is_new:

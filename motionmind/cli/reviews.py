@@ -155,7 +155,7 @@ def _smooth(
     variation: Variation, corpus: str, home: Path | None, request: Mapping[str, Any], interruption: Interruption
 ) -> Variation:
     """Judge and smooth the seams by a corpus; note if that changes nothing."""
-    arguments = request_options({key: value for key, value in request.items() if key != "alternatives"})
+    arguments = request_options({key: value for key, value in request.items() if key != "alternatives"}, home)
     engine = load_engine(corpus, home)
     with interruption:
         smoothed = variation.smooth(

@@ -7,18 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, TypeVar, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
 
 from motionmind.cli.options import Section, given_option, option
-from motionmind.cli.postures import read_still
 from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.realise.corrections import Correction
 from motionmind.tween.request import PACES, TweenRequest
+
+if TYPE_CHECKING:
+    from motionmind.body.motion import Posture
+    from motionmind.names.spelling import PostureName
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -54,10 +58,10 @@ SEARCH_OPTIONS = (
         "via",
         "--via",
         _THROUGH,
-        "Pass through the posture in FILE at move N, or at any move; FILE@FRAME@N and FILE@FRAME@ take a frame of a "
-        "clip. Repeat for several, in order.",
+        "Pass through this posture at move N, or at any move; a frame of a clip is CLIP@FRAME@N, or CLIP@FRAME@. "
+        "Repeat for several, in order.",
         str,
-        "FILE[@N]",
+        "POSTURE[@N]",
         multiple=True,
     ),
     SearchOption(
@@ -222,11 +226,12 @@ def searching(function: _Function) -> _Function:
     return function
 
 
-def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
+def request_options(options: Mapping[str, Any], home: Path | None) -> dict[str, Any]:
     """Turn the values of the search options into fields of `TweenRequest`, reading the postures to pass through.
 
     Args:
         options: a value for each field in `SEARCH_OPTIONS`, as the running command got them.
+        home: the folder of the user's corpora; None for the usual one.
 
     Raises:
         MotionMindError: a value cannot be used, or a posture cannot be read.
@@ -234,7 +239,7 @@ def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
     context = click.get_current_context()
     if given_option(context, ["memory"]) and given_option(context, ["node_budget"]):
         raise MotionMindError("--memory and --node-budget both limit the number of nodes; give one of them")
-    stops = [(read_still(posture), move) for posture, move in parse_vias(options["via"])]
+    stops = [(_find_posture(posture, home), move) for posture, move in parse_vias(options["via"], home)]
     return {
         **options,
         "pin": parse_pins(options["pin"]),
@@ -244,6 +249,12 @@ def request_options(options: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def via_files(options: Mapping[str, Any]) -> list[Any]:
-    """Return the paths of the postures to pass through."""
-    return [posture.file for posture, _ in parse_vias(options["via"])]
+def via_files(options: Mapping[str, Any], home: Path | None) -> list[Path]:
+    """Return the files of the postures to pass through."""
+    return [path for posture, _ in parse_vias(options["via"], home) for path in posture.source.paths]
+
+
+def _find_posture(name: PostureName, home: Path | None) -> Posture:
+    from motionmind.names.finding import find_posture
+
+    return find_posture(name, home)

@@ -1,66 +1,103 @@
-"""Find the movement that commands draw or vary: in files of movement, scores and corpora."""
+"""Find the movement that commands draw, measure, convert or vary: in files of movement, scores and corpora."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionmind.cli.files import read, read_mapping
 from motionmind.errors import MotionMindError
+from motionmind.names.spelling import PostureName, Source, parse_posture
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
 
 
-def is_collection(source: Path, home: Path | None) -> bool:
-    """Return whether a source is a score, a corpus's name or folder, or CORPUS/CLIP; otherwise it is a file of one
-    movement, whose suffix gives its format."""
-    from motionmind.corpus.store import list_corpora
+def parse_movement(word: str, home: Path | None) -> PostureName:
+    """Parse the name of movement, or of one posture of it.
 
-    return (
-        source.suffix.lower() in (".score", "") or source.is_dir() or split_clip(source, home)[0] in list_corpora(home)
-    )
+    Raises:
+        MotionMindError: the posture is to be moving, or there is no such movement, though its word could be a corpus's.
+    """
+    from motionmind.names.finding import check_exists
 
-
-def split_clip(source: Path, home: Path | None) -> tuple[str, str | None]:
-    """Split CORPUS/CLIP into the corpus's name and the clip's; return any other source as it is, with None."""
-    from motionmind.corpus.store import list_corpora
-
-    name, *clip = source.parts or (str(source),)
-    if clip and name in list_corpora(home) and not source.exists():
-        return name, "/".join(clip)
-    return str(source), None
+    named = parse_posture(word, home)
+    check_exists(named.source, home)
+    if named.is_moving:
+        raise MotionMindError(f"{word}: ~ is for the ends of tween, which may be moving; leave it out")
+    return named
 
 
-def read_movements(source: Path, names: Sequence[str], home: Path | None, **options: Any) -> list[Motion]:
+def read_movements(
+    source: Source, names: Sequence[str], home: Path | None, *, raw: bool = False, **options: Any
+) -> list[Motion]:
     """Read the movement of a file, or clips of a score or a corpus.
 
     Args:
-        source: a file of movement, a score, a corpus's name or folder, or CORPUS/CLIP.
+        source: the source.
         names: the clips to read; empty for all.
         home: the folder of the user's corpora; None for the usual one.
+        raw: whether a file's movement stays on its own joints; else it is brought to human23 where they map to it.
         options: values of the options that `options.reading` adds; they are for files of movement alone.
 
     Raises:
         MotionMindError: the source cannot be read, there is no such clip, or an option is not for this source.
     """
-    has_clips = is_collection(source, home)
+    from motionmind.names.finding import find_motion, open_collection
+
+    has_clips = source.kind != "file"
     if names and not has_clips:
-        raise MotionMindError(f"{source}: --clip chooses from a score or a corpus")
+        raise MotionMindError(f"{source.word}: --clip chooses from a score or a corpus")
+    if names and source.name:
+        raise MotionMindError(f"{source.word}: names a clip, and so does --clip; give one of them")
     for name, value in options.items():
         if has_clips and value is not None:
-            raise MotionMindError(f"{source}: --{name.replace('_', '-')} is for a file of movement, which this is not")
-    return _read_clips(source, names, home) if has_clips else [_read_file(source, **options)]
+            option = name.replace("_", "-")
+            raise MotionMindError(f"{source.word}: --{option} is for a file of movement, which this is not")
+    if has_clips and not source.name:
+        return open_collection(source, home).choose(names)
+    read_file = partial(read if raw else _read_file, **options)
+    return [find_motion(source, home, read=read_file)]
 
 
-def read_movement(source: Path, name: str | None, home: Path | None, **options: Any) -> Motion:
+def read_movement(source: Source, name: str | None, home: Path | None, **options: Any) -> Motion:
     """Read the only movement of a source, or the clip of this name; arguments and errors as of `read_movements`."""
     found = read_movements(source, (name,) if name else (), home, **options)
     if len(found) != 1:
-        raise MotionMindError(f"{source}: holds {len(found)} clips; choose one by --clip")
+        raise MotionMindError(f"{source.word}: holds {len(found)} clips; choose one by --clip")
     return found[0]
+
+
+def read_part(named: PostureName, name: str | None, home: Path | None, **options: Any) -> Motion:
+    """Read the movement of a name, or the one frame that it gives, as `read_movement`."""
+    motion = read_movement(named.source, name, home, **options)
+    frames = select_part(named, motion, 0, -1)
+    return motion.slice(frames.start, frames.stop)
+
+
+def select_part(named: PostureName, motion: Motion, start: int, end: int) -> range:
+    """Return the frames of a motion from `start` to `end`, or the one that its name gives.
+
+    Args:
+        named: the name.
+        motion: the motion of that name, or one of several.
+        start: the first frame; 0 for all from the first on.
+        end: the last frame, included, and negative if counted from the end; -1 for all to the last.
+
+    Raises:
+        MotionMindError: there is no such frame, `end` lies before `start`, or both the name and they say which frames.
+    """
+    from motionmind.names.finding import select_frame, select_frames
+
+    word = motion.name if named.source.kind != "file" and not named.source.name else named.source.word
+    if named.moment is None:
+        return select_frames(word, len(motion), start, end)
+    if (start, end) != (0, -1):
+        raise MotionMindError(f"{named.word}: names a frame, and so do --from and --to; give one of them")
+    frame = select_frame(word, motion, named.moment)
+    return range(frame, frame + 1)
 
 
 def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:
@@ -68,59 +105,3 @@ def _read_file(path: Path, joints: Path | None, **source: Any) -> Motion:
     from motionmind.retarget.retarget import own_skeleton
 
     return own_skeleton(read(path, **source), read_mapping(joints))
-
-
-def _read_clips(source: Path, wanted: Sequence[str], home: Path | None) -> list[Motion]:
-    """Read the wanted clips of a score or a corpus, or all."""
-    if source.suffix.lower() == ".score":
-        from motionmind.notation.compose import motions
-        from motionmind.notation.read import read_score
-
-        score = read_score(source)
-        written = {clip.name: clip for clip in score.clips}
-        return motions(score, [written[name] for name in _choose(source, list(written), wanted)])
-    from motionmind.learned.model import LearnedCorpus
-
-    name, clip = split_clip(source, home)
-    if clip is not None:
-        if wanted:
-            raise MotionMindError(f"{source}: names a clip, and so does --clip; give one of them")
-        wanted = [clip]
-    corpus = LearnedCorpus.load(name, home).corpus
-    clips = {clip.label: clip for clip in corpus.clips}
-    return [replace(corpus.motion(clips[label]), name=label) for label in _choose(source, list(clips), wanted)]
-
-
-def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
-    """Return the frames of a clip from `start` to `end`, both included and negative if counted from the end.
-
-    Args:
-        clip: the clip's name, for messages.
-        length: the number of its frames.
-        start: the first frame.
-        end: the last frame.
-
-    Raises:
-        MotionMindError: there is no such frame, or `end` lies before `start`.
-    """
-    first, last = (frame + length if frame < 0 else frame for frame in (start, end))
-    for frame, given in ((first, start), (last, end)):
-        if not 0 <= frame < length:
-            raise MotionMindError(f"{clip}: frames are 0 to {length - 1}, there is no frame {given}")
-    if last < first:
-        raise MotionMindError(f"{clip}: the last frame, {end}, lies before the first, {start}")
-    return range(first, last + 1)
-
-
-def _choose(source: Path, names: Sequence[str], wanted: Sequence[str]) -> Sequence[str]:
-    """Return the wanted names without repetitions, or all; MotionMindError if there is no such name."""
-    from motionmind.errors import did_you_mean, enumerated
-
-    if not names:
-        raise MotionMindError(f"{source}: holds no clips")
-    for name in wanted:
-        if name not in names:
-            raise MotionMindError(
-                f"{source}: no clip {name!r}{did_you_mean(name, names)}; there are {enumerated(names, 60)}"
-            )
-    return list(dict.fromkeys(wanted)) or names

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
-from motionmind.cli.options import CORPUS, HOME, OUTPUTS, Section, command, option
-from motionmind.cli.postures import read_end
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, option
 from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import FILE, Whole
-from motionmind.cli.words import parse_frames, parse_posture
-from motionmind.errors import NoPathError
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError, NoPathError
 from motionmind.files import all_or_none, sha256_of
+from motionmind.names.spelling import PostureName, parse_frames, parse_posture
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -34,13 +34,15 @@ MOST_ALTERNATIVES = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 
 
-@command(
-    "motionmind tween corpora/ballet/postures/arabesque.json corpora/ballet/postures/fifth.json "
-    "--corpus ballet -o tween.bvh"
-)
+@command("motionmind tween ballet/arabesque ballet/fifth -o tween.bvh")
 @click.argument("a")
 @click.argument("b")
-@CORPUS
+@option(
+    "--corpus",
+    section=Section.CORPORA,
+    metavar="NAME",
+    help="Take this corpus, by name or folder  [default: that of A and B, if they are named postures of one]",
+)
 @option("-o", "--output", section=Section.OUTPUT, type=FILE, help=f"Write {OUTPUTS}.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option("--problem", section=Section.OUTPUT, type=FILE, help="Write the problem that was solved: .cfn, for toulbar2.")
@@ -74,7 +76,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 def tween(
     a: str,
     b: str,
-    corpus: str,
+    corpus: str | None,
     output: Path | None,
     report: Path | None,
     problem: Path | None,
@@ -87,7 +89,8 @@ def tween(
 ) -> None:
     """Find the best movement from A to B, and prove how good it is.
 
-    A and B are files of one posture, or frames of clips, counted from 0: clip.bvh@240. The body may have any velocity
+    A and B are postures of corpora, as ballet/arabesque or ballet/adagio@23 (postures lists them), files of one
+    posture, or frames of clips, as clip.bvh@240, counted from 0, and clip.bvh@2.0s. The body may have any velocity
     there, unless --before and --after give it, or a ~: at clip.bvh@240~ it has the clip's.
 
     Ctrl-C ends the search: the best movement found so far is written, with what is proven of it, and the exit code is
@@ -97,17 +100,19 @@ def tween(
         raise click.UsageError("--problem writes a search of joints that move on their own; leave out --posturewise")
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
+    from motionmind.cli.postures import read_end
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import plain
 
-    named = parse_posture(a), parse_posture(b)
-    around = tuple(parse_frames(word) if word else None for word in (before, after))
+    named = parse_posture(a, home), parse_posture(b, home)
+    around = tuple(parse_frames(word, home) if word else None for word in (before, after))
     outputs = _Outputs(output, report, problem, alternatives)
-    outputs.check([*(one.file for one in (*named, *around) if one), *via_files(options)])
-    request = request_options(options) | {"what_if": what_if}
-    engine = Engine.load(corpus, home)
-    start, request["before"] = read_end(named[0], around[0], "before")
-    end, request["after"] = read_end(named[1], around[1], "after")
+    read_from = [path for one in (*named, *around) if one for path in one.source.paths]
+    outputs.check([*read_from, *via_files(options, home)])
+    request = request_options(options, home) | {"what_if": what_if}
+    engine = Engine.load(corpus or _corpus_of(named, home), home)
+    start, request["before"] = read_end(named[0], around[0], "before", home)
+    end, request["after"] = read_end(named[1], around[1], "after", home)
     announce_compilation()
     with _diagnosing(outputs), Interruption() as interruption:
         results = _find_tweens(engine, (start, end), request, outputs.count, interruption)
@@ -121,6 +126,22 @@ def tween(
         print_alternatives(results, files)
     if interruption.is_requested:
         click.get_current_context().exit(INTERRUPTED)
+
+
+def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
+    """Return the corpus that names A, B or both; an error if there is none, or they are of two."""
+    from motionmind.names.finding import find_motion
+
+    corpora = [end.source.place for end in ends if end.source.kind == "corpus"]
+    if not corpora:
+        for end in ends:
+            find_motion(end.source, home)  # or says that there is no such file
+        context = click.get_current_context()
+        raise click.UsageError("Missing option '--corpus': no corpus names A or B.", context)
+    if len(set(corpora)) > 1:
+        a, b = map(displayed, corpora)
+        raise MotionMindError(f"A is a posture of {a} and B of {b}: say by --corpus how to move between them")
+    return corpora[0]
 
 
 def _find_tweens(

@@ -20,9 +20,9 @@ from motionmind.cli.printing import (
     print_written,
 )
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
-from motionmind.cli.sources import is_collection, read_movement, select_frames, split_clip
+from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, NATURAL, POSITIVE, RATE, Point, Whole
+from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Point, Whole
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
 from motionmind.files import all_or_none, sha256_of
@@ -30,6 +30,7 @@ from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.corpus.corpus import Facing
+    from motionmind.names.spelling import PostureName
     from motionmind.tween.engine import Engine
     from motionmind.variation.piece import Piece
     from motionmind.variation.variation import Variation
@@ -39,7 +40,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
 @command("motionmind vary macarena --attractor rossler -o variation.json")
-@click.argument("source", metavar="PIECE", type=FILE_OR_FOLDER)
+@click.argument("source", metavar="PIECE")
 @option(
     "-o",
     "--output",
@@ -162,7 +163,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 def vary(
     context: click.Context,
     /,
-    source: Path,
+    source: str,
     output: Path,
     report: Path | None,
     as_json: bool,
@@ -187,12 +188,13 @@ def vary(
         report, as_json = None, True
     files = [output, *([report] if report else [])]
     suffixes: tuple[tuple[str, ...], ...] = (MOVEMENT + PICTURES, ())
-    check_outputs(list(zip(files, suffixes, strict=False)), [source, *via_files(options)])
+    named = parse_movement(source, home)
+    check_outputs(list(zip(files, suffixes, strict=False)), [*named.source.paths, *via_files(options, home)])
     flow = flow_of(attractor, **parse_parameters(parameter))
-    request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS})
+    request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
     trajectory = {key: options.pop(key) for key in ("start", "skip", "step", "transient", "length", "alternatives")}
     nudge = options.pop("nudge")
-    piece, engine = _read_piece(context, source, corpus, home, **options)
+    piece, engine = _read_piece(context, named, corpus, home, **options)
     with Interruption() as interruption:
         variation = make_variation(
             piece,
@@ -260,7 +262,7 @@ def print_variation(variation: Variation, as_json: bool) -> None:
 
 def _read_piece(
     context: click.Context,
-    source: Path,
+    named: PostureName,
     corpus: str | None,
     home: Path | None,
     *,
@@ -273,24 +275,19 @@ def _read_piece(
     """Read the piece to vary, and what was learned from the corpus that judges it, if there is one."""
     from motionmind.variation.piece import Piece
 
+    source = named.source
     motion = read_movement(source, clip, home, **reading_options)
-    own = _corpus_of(source, home)
+    own = source.place if source.kind == "corpus" else None
     judge = corpus or own
     unused = given_option(context, ["alternatives", *(row.field for row in SEARCH_OPTIONS if row.field != "fps")])
     if unused and not judge:
         raise click.UsageError(f"{unused} is for --corpus, which is not given", context)
     engine = load_engine(judge, home) if judge else None
-    if rate is None and engine and not is_collection(source, home):
+    if rate is None and engine and source.kind == "file":
         rate = engine.corpus.rate
-    frames = select_frames(source, len(motion), begin, end)
+    frames = select_part(named, motion, begin, end)
     facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
     return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine
-
-
-def _corpus_of(source: Path, home: Path | None) -> str | None:
-    """Return the name or folder of the corpus that a source is, or is a clip of; None for scores and other files."""
-    is_in_corpus = is_collection(source, home) and source.suffix.lower() != ".score"
-    return split_clip(source, home)[0] if is_in_corpus else None
 
 
 def _read_facing(corpus: str, home: Path | None) -> Facing:

@@ -2,39 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from motionmind.errors import MotionMindError
-
-_FRAME = r"-?\d{1,9}"  # a number with more digits is a slip of the keyboard
-
-
-class NamedPosture(NamedTuple):
-    """A posture as a command names it.
-
-    Attributes:
-        word: its name, for messages.
-        file: the file that holds it.
-        frame: its frame, counted from 0, or from the end if negative; None if the file has only one.
-        is_moving: whether the movement around it counts, too.
-    """
-
-    word: str
-    file: Path
-    frame: int | None
-    is_moving: bool
-
-
-class NamedFrames(NamedTuple):
-    """Frames as a command names them: a file, the first and the last of its frames, negative if from the end."""
-
-    file: Path
-    first: int
-    last: int
+from motionmind.names.spelling import PostureName, is_file, parse_posture
 
 
 def parse_tolerances(words: Sequence[str], default: float) -> tuple[float, dict[str, float]]:
@@ -154,58 +127,30 @@ def parse_avoided(words: Sequence[str]) -> list[tuple[str, int | str]]:
     return avoided
 
 
-def parse_posture(word: str) -> NamedPosture:
-    """Parse a posture such as "A.json", "clip.bvh@240", or "clip.bvh@240~", with the movement around it.
-
-    A file that has the whole name goes first, since a file's name may hold @, too.
-    """
-    found = re.fullmatch(rf"(.+?)(?:@({_FRAME}))?(~?)", word, re.ASCII | re.DOTALL)
-    if found is None or _exists(word):
-        return NamedPosture(word, Path(word), None, is_moving=False)
-    file, frame, tilde = found.groups()
-    return NamedPosture(word, Path(file), None if frame is None else int(frame), bool(tilde))
-
-
-def parse_frames(word: str) -> NamedFrames:
-    """Parse frames such as "clip.bvh@230..240", both included, or "clip.bvh", all of them.
-
-    Raises:
-        MotionMindError: the word names neither a file nor frames of one.
-    """
-    found = re.fullmatch(rf"(.+)@({_FRAME})\.\.({_FRAME})", word, re.ASCII | re.DOTALL)
-    if found and not _exists(word):
-        return NamedFrames(Path(found[1]), int(found[2]), int(found[3]))
-    if "@" in Path(word).name and not _exists(word):
-        raise MotionMindError(f"{word}: give a file, or frames of one such as clip.bvh@230..240")
-    return NamedFrames(Path(word), 0, -1)
-
-
-def parse_vias(words: Sequence[str]) -> list[tuple[NamedPosture, int | None]]:
+def parse_vias(words: Sequence[str], home: Path | None = None) -> list[tuple[PostureName, int | None]]:
     """Parse postures to pass through: "C.json", at any move, "C.json@3", at move 3; "clip.bvh@150@3" and
     "clip.bvh@150@" are frame 150 at move 3 and at any.
 
     Args:
         words: as given to --via.
+        home: the folder of the user's corpora; None for the usual one.
 
     Returns:
         Each posture and its move.
 
     Raises:
-        MotionMindError: a frame is given without an @ for the move, or a posture is to move.
+        MotionMindError: a frame's number is given without an @ for the move, or a posture is to move.
     """
-    vias: list[tuple[NamedPosture, int | None]] = []
+    vias: list[tuple[PostureName, int | None]] = []
     for word in words:
         name, _, move = word.rpartition("@")
-        has_place = bool(name and re.fullmatch(r"\d{0,9}", move, re.ASCII)) and not _exists(word)
-        posture = parse_posture(name if has_place else word)
-        if posture.is_moving or (posture.frame is not None and not has_place):
+        has_place = bool(name and re.fullmatch(r"\d{0,9}", move, re.ASCII)) and not is_file(word)
+        posture = parse_posture(name if has_place else word, home)
+        is_ambiguous = posture.moment is not None and posture.moment.seconds is None and not has_place
+        if posture.is_moving or is_ambiguous:
             raise MotionMindError(
                 f"--via {word}: give a posture and its move, as C.json@3 or clip.bvh@150@3, or clip.bvh@150@ for any "
                 "move; it is passed without a velocity of its own"
             )
         vias.append((posture, int(move) if has_place and move else None))
     return vias
-
-
-def _exists(word: str) -> bool:
-    return os.path.exists(word)  # noqa: PTH110 - Path.exists fails for names that are too long for any file

@@ -100,11 +100,15 @@ def played(score: Score, clips: Sequence[Clip] | None = None) -> list[tuple[list
 
 
 def posture(score: Score, name: str) -> Posture:
-    """Compose a posture that a score names; FormatError if there is none, or the body cannot take it."""
+    """Compose a posture that a score names, or one that it includes.
+
+    Raises:
+        FormatError: there is none, or the body cannot take it.
+    """
     if name not in score.postures:
         hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
         raise FormatError(f"no posture {name!r}{hint}", path=score.path)
-    row = posture_row(score, score.postures[name])
+    row = posture_row(score.postures[name])
     return _join_moves(score.body, name, [row], _place_distinct(score.body, [row])).posture(0)
 
 

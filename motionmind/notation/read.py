@@ -188,7 +188,9 @@ def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
         name, equals, text = (part.strip() for part in rest.partition("="))
         if not equals:
             raise where.error(f"{rest!r}: write posture NAME = {' | '.join(score.body.layers)}")
-        score.postures[_check_name(name, score.postures, where)] = Line(where, text)
+        own = [known for known, found in score.postures.items() if found.score is score]
+        _check_name(name, own, where)
+        score.postures[name] = Phrase(name, score, (Line(where, text),), where)
     elif word in ("phrase", "clip"):
         _add_phrase(score, word, rest, inner, where)
 
@@ -228,6 +230,7 @@ def _include(score: Score, where: Where, name: str, other: Score) -> None:
         score.positions.setdefault(layer, {}).update(positions)
     score.facings.update(other.facings)
     score.phrases.update(other.phrases)
+    score.postures.update(other.postures)
     score.included.update(other.included)
 
 

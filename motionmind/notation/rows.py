@@ -115,9 +115,10 @@ def check_words(phrase: Phrase, work: Work) -> None:
             _call(phrase, line, phrase.score.tempo, 0, work)
 
 
-def posture_row(score: Score, line: Line) -> Row:
-    """Return the row of a single posture, written without its first cell; FormatError if it makes no sense."""
-    return _row(score, replace(line, text=f"start | {line.text}"), None, 1.0, Work())
+def posture_row(posture: Phrase) -> Row:
+    """Return the row of a single posture, whose line lacks the first cell; FormatError if it makes no sense."""
+    (line,) = posture.lines
+    return _row(posture.score, replace(line, text=f"start | {line.text}"), None, 1.0, Work())
 
 
 def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, work: Work) -> _Player:

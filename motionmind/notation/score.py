@@ -101,7 +101,7 @@ class Score:
         positions: the vocabulary of each layer, by name.
         facings: degrees to the left of the audience, by name.
         phrases: phrases and clips by name, in order.
-        postures: single postures by name.
+        postures: single postures by name, each a phrase of one line; those of scores that it includes, too.
         included: other scores by the prefix of their words here.
     """
 
@@ -112,7 +112,7 @@ class Score:
     positions: dict[str, dict[str, Position]] = field(default_factory=dict)
     facings: dict[str, float] = field(default_factory=dict)
     phrases: dict[str, Phrase] = field(default_factory=dict)
-    postures: dict[str, Line] = field(default_factory=dict)
+    postures: dict[str, Phrase] = field(default_factory=dict)
     included: dict[str, Score] = field(default_factory=dict)
 
     @property

@@ -44,6 +44,7 @@ _PIXELS = 60e6  # pixels of a sheet, at most: viewers refuse larger pictures
 _NARROW = 100.0  # least width of the side view, pixels, for the words under it
 _TALL = 200.0  # height of a body, pixels
 _LARGEST = 480.0  # greatest width or height of a view, pixels, where a body leaps or lies
+_LONGEST = 16  # characters of a caption that fit the narrowest view
 _CAPTION, _LINE = 24, 17  # heights of a caption and of a line of the legend, pixels
 _Phrase = tuple[float, str, Colour]  # x in pixels, words, colour
 _STANDS = 0.03  # a foot lower than this stands on the floor, by the body's height
@@ -57,6 +58,7 @@ def contact_sheet(
     columns: int | None = None,
     side: Side = "right",
     first: int = 0,
+    captions: Sequence[str] | None = None,
 ) -> Image.Image:
     """Draw postures of a motion side by side, in rows, each with its frame number and time.
 
@@ -71,13 +73,14 @@ def contact_sheet(
         columns: postures a row; by default the sheet has about a screen's shape.
         side: the side of the stage for the side view, "right" or "left" as of the performer facing the audience.
         first: number of the motion's first frame in the longer motion that it is a part of.
+        captions: a caption for each frame to draw, in place of its number and its time.
 
     Returns:
         The picture, RGB; `picture.save(path)` writes it.
 
     Raises:
-        MotionMindError: there are no frames to draw, more than 400, or one that the motion does not have; or the side
-            or the number of columns is invalid.
+        MotionMindError: there are no frames to draw, more than 400, or one that the motion does not have; there are
+            more or fewer captions than frames; or the side or the number of columns is invalid.
 
     >>> import numpy as np
     >>> from motionmind import Posture, contact_sheet, human23
@@ -90,7 +93,9 @@ def contact_sheet(
         raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")
     chosen = list(range(len(motion))) if frames is None else list(frames)
     check_frames(motion, chosen)
-    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, first)
+    if captions is not None and len(captions) != len(chosen):
+        raise MotionMindError(f"a sheet of {len(chosen)} postures has as many captions, not {len(captions)}")
+    sheet = _Sheet(motion, chosen, STAGE_RIGHT if side == "right" else STAGE_LEFT, first, captions)
     return sheet.picture(columns)
 
 
@@ -135,8 +140,14 @@ def check_frames(motion: Motion, frames: Sequence[int]) -> None:
 class _Sheet:
     """The postures to draw, placed in the world, and the windows through which all of them are seen."""
 
-    def __init__(self, motion: Motion, frames: list[int], side: View, first: int = 0) -> None:
-        self.motion, self.frames, self.first = motion, frames, first
+    def __init__(
+        self, motion: Motion, frames: list[int], side: View, first: int = 0, captions: Sequence[str] | None = None
+    ) -> None:
+        self.motion, self.frames = motion, frames
+        # Of each posture, what stands on the left and on the right.
+        self.notes = [(f"{first + frame}", f"{motion.times[frame]:.2f} s") for frame in frames]
+        if captions is not None:
+            self.notes = [(displayed(caption, _LONGEST), "") for caption in captions]
         self.body: BodyShape = shape_of(motion.skeleton)
         root = motion.root[frames]
         self.cones, self.balls = self.body.solids(motion.rotations[frames], root)
@@ -195,10 +206,11 @@ class _Sheet:
             pen.rectangle((corner[0], y, x, y + self.plan.height), SHEET_GROUND)
             sheet.paste(self._above(at, self.plan), (corner[0], y))
         x = corner[0] + self.windows[0].width
-        frame = self.frames[at]
-        pen.text((x + 4, y + 3), f"{self.first + frame}", TEXT, ImageFont.load_default(15))
-        right = x + self.windows[1].width - 5
-        pen.text((right, y + 6), f"{self.motion.times[frame]:.2f} s", SHEET_PALE, _small(), anchor="ra")
+        caption, time = self.notes[at]
+        large = ImageFont.load_default(15)
+        is_long = large.getlength(caption) > self.windows[1].width - 9
+        pen.text((x + 4, y + 3), caption, TEXT, _small() if is_long else large)
+        pen.text((x + self.windows[1].width - 5, y + 6), time, SHEET_PALE, _small(), anchor="ra")
 
     def _view(self, at: int, window: Window) -> Image.Image:
         """Draw one posture from the front or from the side, on the floor."""

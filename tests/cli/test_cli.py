@@ -331,7 +331,7 @@ def test_what_cannot_be_read_is_listed_as_such(run: Run, tmp_path: Path) -> None
 def test_posture_takes_one_frame(run: Run) -> None:
     write_motion("walk.bvh", clip())
     ran = run("posture", "walk.bvh", "--frame", -2, "-o", "A.json")
-    assert ran.out == f"A.json: frame -2 of {len(clip())}, on walk (23 joints)\n"
+    assert ran.out == f"A.json: frame {len(clip()) - 2} of {len(clip())}, on walk (23 joints)\n"
     assert np.allclose(rot.angle(read_posture("A.json").rotations, clip().rotations[-2]), 0.0, atol=1e-6)
 
 
@@ -388,11 +388,11 @@ BAD = [
     ("tween missing.json B.json --corpus ballet", r"missing\.json: rotations: no left_hip"),
     ("tween A.json binary.json --corpus ballet", r"binary\.json:1: not valid JSON"),
     ("tween A.json empty.bvh --corpus ballet", r"empty\.bvh:1: not a BVH file"),
-    ("tween A.json folder --corpus ballet", r"folder: suffix '' is unknown"),
+    ("tween A.json folder --corpus ballet", r"folder: is a folder, and no corpus"),
     ("tween A.json nowhere.json --corpus ballet", r"nowhere\.json: cannot be read: there is no such file"),
     ("tween A.json clip.bvh --corpus ballet", r"clip\.bvh: \d+ frames, where one posture was expected"),
     ("tween stranger.bvh B.json --corpus ballet", r"posture A is on another skeleton than corpus 'ballet': "),
-    ("posture clip.bvh --frame 9999 -o t.json", r"clip has frames 0 to \d+, no frame 9999"),
+    ("posture clip.bvh --frame 9999 -o t.json", r"clip\.bvh: frames are 0 to \d+, there is no frame 9999"),
     ("posture empty.bvh --frame 0 -o t.json", r"empty\.bvh:1: not a BVH file"),
     ("convert cut.bvh t.json", r"cut\.bvh:\d+: "),
     ("convert binary.bvh t.json", r"binary\.bvh:1: not a BVH file"),
@@ -449,7 +449,7 @@ BAD = [
     (f"{TWEEN} --weights heavy", r"'--weights': 'heavy' is not one of 'conditional', 'printed'"),
     (f"{TWEEN} --foo", r"No such option"),
     ("tween A.json", r"Missing argument 'B'\. \(motionmind tween --help shows how\)"),
-    ("tween A.json B.json", r"Missing option '--corpus'"),
+    ("tween A.json B.json", r"Missing option '--corpus': no corpus names A or B"),
     ("dance", r"No such command 'dance'"),
 ]
 

@@ -58,7 +58,17 @@ def is_advanced(option: click.Option) -> bool:
 
 def test_there_are_the_commands_that_the_documents_name() -> None:
     assert {" ".join(path) for path in COMMANDS} == {
-        *("tween", "posture", "convert", "corpus", "corpus build", "corpus list", "corpus info", "corpus check"),
+        *(
+            "tween",
+            "postures",
+            "posture",
+            "convert",
+            "corpus",
+            "corpus build",
+            "corpus list",
+            "corpus info",
+            "corpus check",
+        ),
         *("compose", "library", "sheet", "render", "explain", "graph", "measure", "vary", "review", "attractor"),
     }
 
@@ -111,7 +121,7 @@ def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 18
+    assert len(EXAMPLES) == 19
     for line in EXAMPLES:
         program, *words = shlex.split(line)
         assert program == "motionmind"

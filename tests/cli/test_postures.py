@@ -1,4 +1,4 @@
-"""Postures and frames that the command line names: FILE, FILE@FRAME, FILE@FRAME~, FILE@FIRST..LAST."""
+"""Postures and frames that the command line names, by themselves and as what movement passes through."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ import numpy as np
 import pytest
 from bundled_clips import BALLET, ballet_clip
 from command_line import Run
+from PIL import Image
 
 from motionmind.body.motion import Motion
-from motionmind.cli.postures import read_end, read_still
-from motionmind.cli.words import NamedFrames, parse_frames, parse_posture, parse_vias
+from motionmind.cli.postures import read_end
+from motionmind.cli.words import parse_vias
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, write_motion, write_posture
 from motionmind.geometry import rotations as rot
+from motionmind.names.finding import find_posture
+from motionmind.names.spelling import Moment, parse_frames, parse_posture
 
 FIFTH = BALLET / "postures" / "fifth.json"
 
@@ -36,38 +39,15 @@ def tween(run: Run, *words: object) -> Any:
     return run("tween", *words, "--corpus", "ballet", "--report", "-")
 
 
-# --- what is named ----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("word", "expected"),
-    [
-        ("A.json", ("A.json", None, False)),
-        ("clip.bvh@240", ("clip.bvh", 240, False)),
-        ("clip.bvh@-1", ("clip.bvh", -1, False)),
-        ("clip.bvh@0~", ("clip.bvh", 0, True)),
-        ("b@home/clip.bvh@7", ("b@home/clip.bvh", 7, False)),
-        ("b@home/A.json", ("b@home/A.json", None, False)),
-        ("clip.bvh@3@4", ("clip.bvh@3", 4, False)),
-        ("A.json~", ("A.json", None, True)),
-        ("@3", ("@3", None, False)),
-    ],
-)
-def test_a_posture_is_a_file_or_a_frame_of_one(word: str, expected: tuple[str, int | None, bool]) -> None:
-    found = parse_posture(word)
-    assert (str(found.file), found.frame, found.is_moving) == expected
+# --- what is named; what names mean is in tests/names -----------------------------------------------------------------
 
 
 def test_a_file_of_the_whole_name_goes_first() -> None:
-    for name in ("take@3.bvh", "jump.bvh@3", "jump.bvh@1..4", "A.json~"):
+    for name in ("C.json@3", "clip.bvh@3@3"):
+        assert parse_vias([name])[0][0].source.place == name.partition("@")[0]
         Path(name).touch()
-    assert parse_posture("jump.bvh@3").file == Path("jump.bvh@3")
-    assert parse_posture("A.json~").file == Path("A.json~")
-    assert parse_posture("take@3.bvh@8") == ("take@3.bvh@8", Path("take@3.bvh"), 8, False)
-    assert parse_frames("jump.bvh@1..4") == NamedFrames(Path("jump.bvh@1..4"), 0, -1)
-    assert parse_frames("take@3.bvh") == NamedFrames(Path("take@3.bvh"), 0, -1)
-    assert parse_vias(["jump.bvh@3"])[0][0].file == Path("jump.bvh@3")
-    assert parse_vias(["jump.bvh@3@3"]) == [(parse_posture("jump.bvh@3"), 3)]
+        ((posture, move),) = parse_vias([name])
+        assert (posture.source.place, posture.moment, move) == (name, None, None)
 
 
 @pytest.mark.parametrize(
@@ -79,26 +59,25 @@ def test_a_file_of_the_whole_name_goes_first() -> None:
         ("clip.bvh@150@3", "clip.bvh", 150, 3),
         ("clip.bvh@150@", "clip.bvh", 150, None),
         ("clip.bvh@-1@2", "clip.bvh", -1, 2),
+        ("ballet/passe@3", "ballet", None, 3),
+        ("ballet/adagio@23@3", "ballet", 23, 3),
     ],
 )
 def test_what_is_passed_names_its_move_last(word: str, file: str, frame: int | None, move: int | None) -> None:
     ((posture, at),) = parse_vias([word])
-    assert (str(posture.file), posture.frame, at) == (file, frame, move)
+    assert (posture.source.place, posture.moment and posture.moment.frame, at) == (file, frame, move)
+
+
+def test_a_second_is_told_from_a_move() -> None:
+    for word, move in (("clip.bvh@1.5s", None), ("clip.bvh@1.5s@", None), ("clip.bvh@1.5s@3", 3)):
+        ((posture, at),) = parse_vias([word])
+        assert (posture.moment, at) == (Moment(seconds=1.5), move)
 
 
 @pytest.mark.parametrize("word", ["clip.bvh@150~", "clip.bvh@150~@3", "clip.bvh@-1", "C.json~"])
 def test_what_is_passed_is_told_from_a_frame_and_stands_still(word: str) -> None:
     with pytest.raises(MotionMindError, match=r"give a posture and its move, as C.json@3 or clip.bvh@150@3"):
         parse_vias([word])
-
-
-def test_frames_are_a_range_or_a_whole_file() -> None:
-    assert parse_frames("clip.bvh@230..240") == NamedFrames(Path("clip.bvh"), 230, 240)
-    assert parse_frames("clip.bvh@-11..-1") == NamedFrames(Path("clip.bvh"), -11, -1)
-    assert parse_frames("lead.json") == NamedFrames(Path("lead.json"), 0, -1)
-    for word in ("clip.bvh@230", "clip.bvh@230..", "clip.bvh@240~"):
-        with pytest.raises(MotionMindError, match=r"give a file, or frames of one such as clip.bvh@230..240"):
-            parse_frames(word)
 
 
 # --- what is read -----------------------------------------------------------------------------------------------------
@@ -109,7 +88,7 @@ def test_a_frame_of_every_format_is_the_frame_with_the_movement_around_it(name: 
     write_motion(name, clip())
     whole = read_motion(name)
     for frame in (0, 7, -2):
-        found = read_still(parse_posture(f"{name}@{frame}"))
+        found = find_posture(parse_posture(f"{name}@{frame}"))
         np.testing.assert_array_equal(found.rotations, whole.posture(frame).rotations)
         np.testing.assert_array_equal(found.root, whole.posture(frame).root)
     a, before = read_end(parse_posture(f"{name}@9~"), None, "before")
@@ -173,14 +152,18 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
     [
         (["clip.bvh@99", "B.json"], r"clip\.bvh: frames are 0 to 36, there is no frame 99"),
         (["clip.bvh@-99~", "B.json"], r"clip\.bvh: frames are 0 to 36, there is no frame -99"),
-        (["clip.bvh", "B.json"], r"clip\.bvh: 37 frames, where one posture was expected; say which frame"),
+        (["clip.bvh", "B.json"], r"clip\.bvh: 37 frames, .* expected; say which, from clip\.bvh@0 to clip\.bvh@36"),
+        (["clip.bvh@9.9s", "B.json"], r"clip\.bvh: its frames are from 0\.00 to 1\.20 s, there is none at 9\.9 s"),
         (["clip.bvh@0~", "B.json"], r"clip\.bvh@0~: nothing comes before frame 0 of clip\.bvh; leave out ~"),
         (["B.json", "clip.bvh@-1~"], r"clip\.bvh@-1~: nothing comes after frame 36 of clip\.bvh; leave out ~"),
         (["B.json~", "clip.bvh@3"], r"B\.json~: B\.json holds one posture, no movement around it; leave out ~"),
         (["B.json@0~", "clip.bvh@3"], r"B\.json@0~: B\.json holds one posture, no movement around it; leave out ~"),
         (["clip.bvh~", "B.json"], r"clip\.bvh~: say which frame, from 0 to 36, as clip\.bvh@0~"),
         (["no.bvh@3", "B.json"], r"no\.bvh: cannot be read: there is no such file or folder"),
-        (["clip.bvh@3x", "B.json"], r"suffix '\.bvh@3x' is unknown"),
+        (
+            ["clip.bvh@3x", "B.json"],
+            r"clip\.bvh@3x: there is no such file; frames are spelled clip\.bvh@240 or clip\.bvh@2\.0s",
+        ),
         (["clip.bvh@9~", "B.json", "--before", "clip.bvh@3..9"], r"clip\.bvh@9~: ~ takes .* and so does --before"),
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..99"], r"clip\.bvh: frames are 0 to 36, .* no frame 99"),
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..3"], r"the last frame, 3, lies before the first, 9"),
@@ -190,9 +173,9 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..9"], r"has one frame, which shows no velocity"),
         (["clip.bvh@0", "B.json", "--via", "clip.bvh@15"], r"clip\.bvh: 37 frames, where one posture was expected"),
         (["clip.bvh@0", "B.json", "--via", "clip.bvh@15~"], r"--via clip\.bvh@15~: give a posture and its move"),
-        (["clip.bvh@" + "9" * 5000, "B.json"], r"cannot be used|suffix"),
-        (["clip.bvh@3", "B.json", "--via", "B.json@" + "9" * 5000], r"cannot be used|suffix"),
-        (["A" * 5000 + "@3", "B.json"], r"cannot be used|cannot be read"),
+        (["clip.bvh@" + "9" * 5000, "B.json"], r"cannot be used|no such file"),
+        (["clip.bvh@3", "B.json", "--via", "B.json@" + "9" * 5000], r"cannot be used|no such file"),
+        (["A" * 5000 + "@3", "B.json"], r"cannot be used|no such file"),
     ],
 )
 def test_what_cannot_be_is_said_in_one_line(run: Run, words: Sequence[str], message: str) -> None:
@@ -222,3 +205,93 @@ def test_a_clip_on_another_rig_is_retargeted_with_its_movement(run: Run) -> None
     shifted = replace(clip(), root=clip().root + np.array([1.0, 0.0, 0.0]))
     write_motion("clip.bvh", replace(shifted, skeleton=replace(body, offsets=body.offsets * 1.1)))
     assert tween(run, "clip.bvh@10~", "clip.bvh@30~").code == 0
+
+
+# --- by name ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
+    named = run("tween", "ballet/arabesque", "ballet/fifth", "--report", "-").json
+    files = tween(run, BALLET / "postures" / "arabesque.json", FIFTH).json
+    assert named["path"] == files["path"]
+    for words in (("karate/yoi", FIFTH), (FIFTH, "karate/yoi")):
+        ran = run("tween", *words, "-o", "out.json", "--moves", 2)
+        assert ran.code in (0, 3), ran.err  # of karate, for nothing says otherwise
+    mixed = run("tween", "karate/yoi", "ballet/fifth", "-o", "out.json")
+    assert mixed.code == 2
+    assert "A is a posture of karate and B of ballet: say by --corpus" in mixed.err
+    assert tween(run, "karate/yoi", "ballet/fifth").code == 0
+    alone = run("tween", FIFTH, FIFTH)
+    assert alone.code == 2
+    assert "Missing option '--corpus': no corpus names A or B" in alone.err
+
+
+def test_clips_of_a_corpus_of_ones_own_are_named_too(run: Run) -> None:
+    write_motion("walk.bvh", clip(fps=10.0))
+    assert run("corpus", "build", "mine", "walk.bvh", "--rate", 10).code == 0
+    report = run("tween", "mine/walk@2~", "mine/walk@1.0s", "--via", "mine/walk@5@", "--report", "-").json
+    assert report["asked"]["before"] == pytest.approx(0.2, abs=1e-4)
+    assert report["asked"]["via"] == [None]
+    found = run("tween", "mine/walk@2", "mine/wakl@3")
+    assert found.code == 2
+    assert "mine: no posture or clip 'wakl'; did you mean walk?" in found.err
+
+
+@pytest.mark.parametrize(
+    ("words", "frame"),
+    [
+        (["ballet/jump@3"], 3),
+        (["ballet/jump", "--frame", -1], 6),
+        (["ballet", "--clip", "jump", "--frame", 3], 3),
+        ([BALLET / "allegro.score", "--clip", "jump", "--frame", 3], 3),
+        ([f"{BALLET / 'allegro.score'}/jump@0.6s"], 3),
+        (["jump.json@3"], 3),
+        (["jump.json", "--frame", 3], 3),
+    ],
+)
+def test_posture_takes_what_sheet_numbers(run: Run, words: Sequence[object], frame: int) -> None:
+    write_motion("jump.json", ballet_clip("jump"))
+    ran = run("posture", *words, "-o", "A.json")
+    assert ran.out == f"A.json: frame {frame} of 7, on human23 (23 joints)\n", ran.err
+    assert rot.angle(find_posture("A.json").rotations, ballet_clip("jump").rotations[frame]).max() < 1e-6
+
+
+def test_a_posture_by_name_is_drawn_measured_and_converted(run: Run) -> None:
+    assert run("sheet", "ballet/arabesque", "-o", "sheet.png").out.startswith("sheet.png: 1 posture of 1, ")
+    assert run("sheet", "ballet/adagio@23", "-o", "one.png").out.startswith("one.png: 1 posture of 68, ")
+    assert run("render", "ballet/arabesque", "-o", "one.svg").code == 0
+    assert run("convert", "ballet/jump", "jump.json").code == 0
+    assert len(read_motion("jump.json")) == 7
+    assert run("measure", "ballet/jump", "--corpus", "ballet").out.startswith("ballet/jump: 7 frames in 1.20 s")
+    for words, message in (
+        (["sheet", "ballet/adagio@23", "--from", 3, "-o", "x.png"], "names a frame, and so do --from and --to"),
+        (["posture", "ballet/adagio@23", "--frame", 3, "-o", "x.json"], "names a frame, and so does --frame"),
+        (["posture", "ballet/adagio", "-o", "x.json"], "say which, from ballet/adagio@0 to ballet/adagio@67"),
+        (["render", "ballet/adagio@23~", "-o", "x.png"], "~ is for the ends of tween"),
+        (["sheet", "ballet/jump", "--clip", "jump", "-o", "x.png"], "names a clip, and so does --clip"),
+    ):
+        ran = run(*words)
+        assert (ran.code, ran.out) == (2, "")
+        assert message in ran.err
+
+
+def test_postures_lists_what_other_commands_take_and_draws_it(run: Run) -> None:
+    ran = run("postures", "karate", "-o", "karate.png")
+    lines = [line.split()[0] for line in ran.out.splitlines() if line.startswith("  ")]
+    assert len(lines) == 11 + 4
+    listed = run("postures", "karate", "--json").json
+    assert lines == [*listed["postures"], *(one["name"] for one in listed["clips"])]
+    for name in (*listed["postures"], *(f"{one['name']}@{one['postures'] - 1}" for one in listed["clips"])):
+        find_posture(name)
+    with Image.open("karate.png") as picture:
+        assert picture.width > 600
+    for words, message in (
+        (["A.json"], "give a corpus or a score"),
+        (["karate/yoi"], "give karate alone"),
+        (["karte"], "did you mean karate?"),
+        (["hands", "-o", "hands.png"], "hands: names no postures; motionmind sheet draws those of its clips"),
+        (["karate", "-o", "karate.bvh"], "the name must end in one of .png"),
+    ):
+        ran = run("postures", *words)
+        assert (ran.code, ran.out) == (2, "")
+        assert message in ran.err

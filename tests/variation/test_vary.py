@@ -727,7 +727,7 @@ def test_what_the_documents_show_runs(run: Run) -> None:
     [
         (("nowhere.bvh",), "nowhere.bvh: cannot be read: there is no such file"),
         (("karate",), "karate: holds 4 clips; choose one by --clip"),
-        (("karate/nothing",), "no clip 'nothing'"),
+        (("karate/nothing",), "karate: no posture or clip 'nothing'; there are yoi, "),
         (("karate/heian-shodan", "--clip", "heian-shodan"), "names a clip, and so does --clip"),
         (("macarena", "--attractor", "moon"), "no flow 'moon'"),
         (("macarena", "--parameter", "rho"), "--parameter rho: give NAME=VALUE"),

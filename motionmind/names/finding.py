@@ -1,0 +1,289 @@
+"""Finds what names of movement and postures name (`motionmind.names.spelling`)."""
+
+from __future__ import annotations
+
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from motionmind.body.motion import Motion, Posture
+from motionmind.corpus import store
+from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.errors import MotionMindError, did_you_mean, enumerated
+from motionmind.formats import read_motion
+from motionmind.learned import persistence
+from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
+from motionmind.notation import compose
+from motionmind.notation.read import read_score
+from motionmind.notation.score import Score
+
+_MOST = 60  # names in a message
+_SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # as names of files end
+
+
+class Collection(ABC):
+    """Clips and postures that have names: a score's or a corpus's.
+
+    Attributes:
+        word: its path or name, for messages.
+    """
+
+    def __init__(self, word: str) -> None:
+        self.word = word
+
+    @property
+    @abstractmethod
+    def postures(self) -> Sequence[str]:
+        """Names of the postures, in order."""
+
+    @property
+    @abstractmethod
+    def clips(self) -> Mapping[str, str]:
+        """The clips in order: the name of each, and what it is about."""
+
+    @abstractmethod
+    def posture(self, name: str) -> Posture:
+        """Return one of the postures."""
+
+    @abstractmethod
+    def motions(self, names: Sequence[str]) -> list[Motion]:
+        """Return some of the clips."""
+
+    def choose(self, wanted: Sequence[str] = ()) -> list[Motion]:
+        """Return the clips with these names, each once, or all; MotionMindError if one is not there."""
+        if not self.clips:
+            raise MotionMindError(f"{self.word}: holds no clips")
+        for name in wanted:
+            if name not in self.clips:
+                raise MotionMindError(f"{self.word}: no clip {name!r}{_hint(name, list(self.clips))}")
+        return self.motions(list(dict.fromkeys(wanted)) or list(self.clips))
+
+    def find(self, name: str, *, as_clip: bool) -> Motion:
+        """Return a posture, as a motion of one frame, or a clip: the clip if it `as_clip` goes first, and both exist.
+
+        Raises:
+            MotionMindError: neither has this name.
+        """
+        for is_clip in (as_clip, not as_clip):
+            if is_clip and name in self.clips:
+                return self.motions([name])[0]
+            if not is_clip and name in self.postures:
+                return replace(self.posture(name).as_motion(), name=name)
+        known = [*self.postures, *self.clips]
+        raise MotionMindError(f"{self.word}: no posture or clip {name!r}{_hint(name, known)}")
+
+
+class _ScoreCollection(Collection):
+    """A score's clips and postures, and the postures of scores that it includes."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(path)
+        self._score = read_score(path)
+        self._clips = {clip.name: clip for clip in self._score.clips}
+
+    @property
+    def postures(self) -> Sequence[str]:
+        return list(self._score.postures)
+
+    @property
+    def clips(self) -> Mapping[str, str]:
+        return {name: clip.about for name, clip in self._clips.items()}
+
+    def posture(self, name: str) -> Posture:
+        return compose.posture(self._score, name)
+
+    def motions(self, names: Sequence[str]) -> list[Motion]:
+        return compose.motions(self._score, [self._clips[name] for name in names])
+
+
+class _CorpusCollection(Collection):
+    """A corpus's clips; one that people wrote has the postures that its scores name, too."""
+
+    def __init__(self, name: str, home: Path | None) -> None:
+        super().__init__(name)
+        self._home = home
+        self._folder = store.locate(name, home)
+
+    @cached_property
+    def _scores(self) -> dict[str, Score]:
+        """The score that names each posture, the first if several do."""
+        manifest = store.read_manifest(self._folder)
+        if manifest["format"] == store.BUILT:
+            return {}
+        written = parse_manifest(manifest, SourceManifest, self._folder / store.MANIFEST)
+        found: dict[str, Score] = {}
+        for score in (read_score(self._folder / name) for name in written.scores):
+            found = dict.fromkeys(score.postures, score) | found
+        return found
+
+    @cached_property
+    def _corpus(self) -> Corpus:
+        return persistence.load(self.word, self._home).corpus
+
+    @cached_property
+    def _clips(self) -> dict[str, Clip]:
+        return {clip.label: clip for clip in self._corpus.clips}
+
+    @property
+    def postures(self) -> Sequence[str]:
+        return list(self._scores)
+
+    @property
+    def clips(self) -> Mapping[str, str]:
+        return {label: clip.about for label, clip in self._clips.items()}
+
+    def posture(self, name: str) -> Posture:
+        return compose.posture(self._scores[name], name)
+
+    def motions(self, names: Sequence[str]) -> list[Motion]:
+        return [replace(self._corpus.motion(self._clips[name]), name=name) for name in names]
+
+
+def open_collection(source: Source, home: Path | None = None) -> Collection:
+    """Open the score or corpus of a source.
+
+    Raises:
+        MotionMindError: it cannot be read.
+    """
+    return _ScoreCollection(source.place) if source.kind == "score" else _CorpusCollection(source.place, home)
+
+
+def find_motion(
+    source: Source,
+    home: Path | None = None,
+    *,
+    as_clip: bool = True,
+    read: Callable[[Path], Motion] = read_motion,
+) -> Motion:
+    """Find the movement that a source names; a posture is a motion of one frame.
+
+    Args:
+        source: the source.
+        home: the folder of the user's corpora; None for the usual one.
+        as_clip: whether a clip goes before a posture of the same name.
+        read: reads a file.
+
+    Raises:
+        MotionMindError: there is no such movement, or a score or corpus of several clips names none.
+    """
+    if source.kind == "file":
+        check_exists(source, home)
+        return read(Path(source.place))
+    collection = open_collection(source, home)
+    if source.name:
+        return collection.find(source.name, as_clip=as_clip)
+    if len(collection.clips) != 1:
+        raise MotionMindError(f"{source.word}: holds {len(collection.clips)} clips{_example(source, collection)}")
+    return collection.choose()[0]
+
+
+def find_posture(name: PostureName | str, home: Path | None = None) -> Posture:
+    """Find the posture of a name, such as "ballet/arabesque".
+
+    Args:
+        name: the name, or its spelling.
+        home: the folder of the user's corpora; None for the usual one.
+
+    Raises:
+        MotionMindError: there is no such posture; the message says what there is.
+    """
+    named = parse_posture(name, home) if isinstance(name, str) else name
+    motion = find_motion(named.source, home, as_clip=named.moment is not None)
+    return motion.posture(frame_of(named, motion))
+
+
+def check_exists(source: Source, home: Path | None = None) -> None:
+    """Raise MotionMindError if a source is nowhere, and not spelled like a file; the message guesses what is meant."""
+    word = source.word
+    if source.kind != "file" or is_file(word) or _SUFFIX.fullmatch(Path(word).suffix):
+        return  # those who read files say what is wrong with one
+    if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
+        raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
+    first, slash, _ = word.partition("/")
+    corpora = list(store.list_corpora(home))
+    if slash:
+        raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{_hint(first, corpora)}")
+    if "@" in word:
+        raise MotionMindError(f"{word}: there is no such file; frames are spelled clip.bvh@240 or clip.bvh@2.0s")
+    hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, _MOST)}, a posture of one is CORPUS/NAME"
+    raise MotionMindError(f"{word}: there is no such file or corpus{hint}")
+
+
+def frame_of(name: PostureName, motion: Motion) -> int:
+    """Return the number of a posture's frame in its movement.
+
+    Raises:
+        MotionMindError: there is no such frame, or there are several and the name does not say which.
+    """
+    if name.moment is not None:
+        return select_frame(name.source.word, motion, name.moment)
+    if len(motion) > 1:
+        word = name.source.word
+        raise MotionMindError(
+            f"{word}: {len(motion)} frames, where one posture was expected; say which, from {word}@0 to "
+            f"{word}@{len(motion) - 1}"
+        )
+    return 0
+
+
+def select_frame(word: str, motion: Motion, moment: Moment) -> int:
+    """Return the number of a frame of a motion; MotionMindError, which names the motion `word`, if it has no such."""
+    if moment.seconds is None:
+        return select_frames(word, len(motion), moment.frame, moment.frame)[0]
+    times, seconds = motion.times, moment.seconds
+    rounding = 0.5 * (times[-1] - times[0]) / max(len(times) - 1, 1) + 1e-6
+    if not times[0] - rounding <= seconds <= times[-1] + rounding:
+        raise MotionMindError(
+            f"{word}: its frames are from {times[0]:.2f} to {times[-1]:.2f} s, there is none at {seconds:g} s"
+        )
+    return int(np.abs(times - seconds).argmin())
+
+
+def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
+    """Return the frames of a clip from `start` to `end`, both included and negative if counted from the end.
+
+    Args:
+        clip: the clip's name, for messages.
+        length: the number of its frames.
+        start: the first frame.
+        end: the last frame.
+
+    Raises:
+        MotionMindError: there is no such frame, or `end` lies before `start`.
+    """
+    first, last = (frame + length if frame < 0 else frame for frame in (start, end))
+    for frame, given in ((first, start), (last, end)):
+        if not 0 <= frame < length:
+            raise MotionMindError(f"{clip}: frames are 0 to {length - 1}, there is no frame {given}")
+    if last < first:
+        raise MotionMindError(f"{clip}: the last frame, {end}, lies before the first, {start}")
+    return range(first, last + 1)
+
+
+def _example(source: Source, collection: Collection) -> str:
+    """Say how to name a posture or a clip of a collection, if it holds any."""
+    example = next(iter((*collection.postures, *collection.clips)), None)
+    return f"; name a posture or a clip, such as {source.place}/{example}" if example else ""
+
+
+def _elsewhere(name: str, home: Path | None) -> str:
+    """Return "; did you mean CORPUS/NAME?" for a corpus that names this posture, or that is called nearly so; or ""."""
+    corpora = store.list_corpora(home)
+    for corpus in corpora:
+        try:
+            if name in _CorpusCollection(corpus, home).postures:
+                return f"; did you mean {corpus}/{name}?"
+        except MotionMindError:  # a corpus that is damaged has no say here
+            continue
+    return did_you_mean(name, corpora)
+
+
+def _hint(name: str, known: Sequence[str]) -> str:
+    return did_you_mean(name, known) or f"; there are {enumerated(known, _MOST) or 'none'}"

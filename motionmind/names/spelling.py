@@ -1,0 +1,155 @@
+"""Names of movement and postures, as words spell them.
+
+    arabesque.json           the only posture of a file
+    clip.bvh@240             frame 240 of a file, counted from 0; @-1 is the last
+    clip.bvh@2.0s            the frame nearest to 2.0 s
+    centre.score/tendu       a posture that a score names
+    centre.score/adagio@23   a frame of one of its clips
+    ballet/arabesque         a posture that a corpus names
+    ballet/adagio@23         a posture of one of its clips
+
+A file that has the whole name goes first, since a file's name may hold @ and ~, too; then a corpus, by its name or its
+folder. Nothing is read here but which files and corpora there are.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from motionmind.errors import MotionMindError
+
+_MOMENT = r"-?\d{1,9}|\d{1,9}(?:\.\d{1,9})?s"  # a number with more digits is a slip of the keyboard
+_POSTURE = re.compile(rf"(.+?)(?:@({_MOMENT}))?(~?)", re.ASCII | re.DOTALL)
+_FRAMES = re.compile(rf"(.+)@({_MOMENT})\.\.({_MOMENT})", re.ASCII | re.DOTALL)
+_SCORE = re.compile(r"(.+?\.score)(?:/(.+))?", re.IGNORECASE | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where movement comes from.
+
+    Attributes:
+        word: its spelling.
+        kind: whether that is a file of one movement, a score, or a corpus. What is nowhere counts as a file.
+        place: the path of the file or score; the name or the folder of the corpus.
+        name: the posture or clip of the score or corpus; "" if none is named.
+    """
+
+    word: str
+    kind: Literal["file", "score", "corpus"]
+    place: str
+    name: str = ""
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The file that is read, if it is one: nothing is written into a corpus's folder by its name."""
+        return () if self.kind == "corpus" else (Path(self.place),)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A frame of a movement.
+
+    Attributes:
+        frame: its number, from 0, or from the end if negative.
+        seconds: the time that it is nearest to; None if its number is given.
+    """
+
+    frame: int = 0
+    seconds: float | None = None
+
+    @classmethod
+    def of(cls, word: str) -> Moment:
+        """Parse "240", "-1" or "2.0s"."""
+        return cls(seconds=float(word[:-1])) if word.endswith("s") else cls(int(word))
+
+
+@dataclass(frozen=True)
+class PostureName:
+    """The name of a posture.
+
+    Attributes:
+        word: its spelling.
+        source: the movement that it is in.
+        moment: its frame there; None if the movement has only one.
+        is_moving: whether the movement around it counts, too, as a ~ says.
+    """
+
+    word: str
+    source: Source
+    moment: Moment | None = None
+    is_moving: bool = False
+
+
+@dataclass(frozen=True)
+class FramesName:
+    """The name of consecutive frames: their movement, the first and the last of them."""
+
+    source: Source
+    first: Moment
+    last: Moment
+
+
+def parse_source(word: str, home: Path | None = None) -> Source:
+    """Parse the name of a movement: a file, a score, a corpus, SCORE/NAME or CORPUS/NAME.
+
+    Args:
+        word: the name.
+        home: the folder of the user's corpora; None for the usual one.
+    """
+    # Imported here, for files of movement need no corpora.
+    from motionmind.corpus.store import MANIFEST, list_corpora
+
+    score = _SCORE.fullmatch(word)
+    if is_file(word) and not (score and score[2] is None):
+        return Source(word, "file", word)
+    if score:
+        return Source(word, "score", score[1], score[2] or "")
+    corpus, _, name = word.partition("/")
+    if corpus in list_corpora(home):
+        return Source(word, "corpus", corpus, name)
+    parts = word.split("/")
+    for length in range(len(parts), 0, -1):
+        if length < len(parts) and os.path.isdir(word):  # noqa: PTH112 - as in `is_file`
+            break  # a folder in a corpus's, and none of its names
+        folder = "/".join(parts[:length])
+        if folder and os.path.isfile(f"{folder}/{MANIFEST}"):  # noqa: PTH113 - as in `is_file`
+            return Source(word, "corpus", folder, "/".join(parts[length:]))
+    return Source(word, "file", word)
+
+
+def parse_posture(word: str, home: Path | None = None) -> PostureName:
+    """Parse the name of a posture; arguments as of `parse_source`."""
+    found = _POSTURE.fullmatch(word)
+    if found is None or is_file(word):
+        return PostureName(word, parse_source(word, home))
+    place, moment, tilde = found.groups()
+    return PostureName(word, parse_source(place, home), None if moment is None else Moment.of(moment), bool(tilde))
+
+
+def parse_frames(word: str, home: Path | None = None) -> FramesName:
+    """Parse frames such as "clip.bvh@230..240", both included, or "clip.bvh", all of them.
+
+    Args:
+        word: the name.
+        home: the folder of the user's corpora; None for the usual one.
+
+    Raises:
+        MotionMindError: the word names neither a movement nor frames of one.
+    """
+    found = _FRAMES.fullmatch(word)
+    if found and not is_file(word):
+        return FramesName(parse_source(found[1], home), Moment.of(found[2]), Moment.of(found[3]))
+    if "@" in Path(word).name and not is_file(word):
+        raise MotionMindError(f"{word}: give a file, or frames of one such as clip.bvh@230..240")
+    return FramesName(parse_source(word, home), Moment(0), Moment(-1))
+
+
+def is_file(word: str) -> bool:
+    """Return whether there is a file, a pipe or the like with this name, and no folder."""
+    # Path.exists fails for names that are too long for any file.
+    return os.path.exists(word) and not os.path.isdir(word)  # noqa: PTH110, PTH112
