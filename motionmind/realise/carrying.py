@@ -22,7 +22,7 @@ from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_stayin
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, fade_at_ends, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
-from motionmind.realise.knees import cover, smoothed
+from motionmind.realise.knees import bend_of, cover, smoothed
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
 from motionmind.realise.legs import SOFT
 
@@ -32,6 +32,8 @@ DETAIL = 0.2  # seconds within which the root smooths the fine detail that it ca
 REACH = 0.002  # metres by which a leg is too short
 LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
 PLACE = 0.08  # metres that a standing leg leans more than the movement has it
+KNEE = 0.1  # radians that a standing leg's knee bends more or less than the movement has it; chosen on cmu-05
+STRAIGHT = 0.15  # radians: a knee that is straighter counts as bent so far, for it turns a leg's length into any bend
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
 PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
@@ -146,6 +148,7 @@ def carry(
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
             rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
+            rows += _knee_rows(skeleton, own.places, shape, bearing, floor, start, feet)
             if balances:
                 points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
                 centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
@@ -357,21 +360,63 @@ def _reach_rows(
     rows, every = [], np.arange(len(root))
     within = np.minimum(np.minimum(every, every[::-1]) / (SETTLES * fps), 1.0)
     for number, foot in enumerate(feet):
-        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
-        aim = end - hip
-        aim[:, [0, 2]] += bearing.targets[:, number]
-        aim[:, 1] += floor - shape.low[:, number]
+        own, leg = _legs(skeleton, places, shape, bearing, floor, root, number, foot)
         leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
         length = foot.length(skeleton)
-        straight = rot.norm(end - hip) / length
+        straight = rot.norm(own) / length
         longest = length * np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
-        leg = aim - root
         far = rot.norm(leg)
         along = leg / np.maximum(far, 1e-9)[:, None]
         short = (far > longest + 1e-6) & bearing.stands[:, number]
-        target = np.sum(along * aim, axis=-1) - longest
+        target = np.sum(along * root, axis=-1) + far - longest
         rows.append(position_rows(every, along, target, np.where(short, (within / REACH) ** 2, 0.0)))
     return rows
+
+
+def _knee_rows(
+    skeleton: Skeleton,
+    places: Floats,
+    shape: Shape,
+    bearing: Bearing,
+    floor: Floats,
+    root: Floats,
+    feet: list[Foot],
+) -> list[Rows]:
+    """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `_reach_rows`.
+
+    A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
+    then, as a body goes over a leg that it stands on.
+    """
+    rows, every = [], np.arange(len(root))
+    for number, foot in enumerate(feet):
+        own, leg = _legs(skeleton, places, shape, bearing, floor, root, number, foot)
+        thigh, shank = foot.bones(skeleton)
+        was, far = rot.norm(own), rot.norm(leg)
+        bends = np.maximum(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
+        lever = far / (thigh * shank * np.sin(bends))  # radians that the knee bends a metre of the leg's length
+        along = lever[:, None] * leg / np.maximum(far, 1e-9)[:, None]
+        target = np.sum(along * root, axis=-1) + lever * (far - was)
+        rows.append(position_rows(every, along, target, bearing.loads[:, number] * KNEE**-2.0))
+    return rows
+
+
+def _legs(
+    skeleton: Skeleton,
+    places: Floats,
+    shape: Shape,
+    bearing: Bearing,
+    floor: Floats,
+    root: Floats,
+    number: int,
+    foot: Foot,
+) -> tuple[Floats, Floats]:
+    """Return a leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place."""
+    hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
+    own = end - hip
+    leg = own - root
+    leg[:, [0, 2]] += bearing.targets[:, number]
+    leg[:, 1] += floor - shape.low[:, number]
+    return own, leg
 
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:

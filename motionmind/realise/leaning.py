@@ -1,8 +1,9 @@
 """Leaning: a body whose limbs are in their places shifts its weight over what bears it, and its feet stay.
 
 The root is carried in balance before limbs are kept apart and legs reach for their places, and both move the mass and
-the feet that it is to be over. What they leave is made up for here: the hips move level, as little and as smoothly as
-will do, and the legs keep the feet where they are. A body that walks is not held up.
+the feet that it is to be over. What they leave is made up for here, where one limb bears alone and the body is hardly
+accelerated: the hips move level, as little and as smoothly as will do, and the legs keep the feet where they are. A
+body that moves may fall from foot to foot.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
+from motionmind.body.plausibility import CALM
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import NEAR, find_support, size_of
 from motionmind.geometry import rotations as rot
@@ -40,7 +42,8 @@ def shift_weight(
 ) -> tuple[Floats, Floats]:
     """Return rotations [N, J, 4] and positions of the root [N, 3], metres, that have the weight over what bears it.
 
-    Nothing changes where the weight is over it, where it is not known, where a leg must not change, and in a walk.
+    Nothing changes where the weight is over it, where it is not known, where a leg must not change, and in a walk. Only
+    what one limb bears, and nothing accelerates, is to be over it.
 
     Args:
         skeleton: the body.
@@ -63,13 +66,18 @@ def shift_weight(
     low = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
     touches = low & support.bears[:, limb_of_points(skeleton)[joints]]
     points, mass, allowed = places[..., [0, 2]] / size, support.mass[:, [0, 2]] / size, overhang / size
-    if not is_beyond(points, touches, mass, allowed)[~given].any():
+    calm = support.bears.sum(axis=1) == 1
+    calm[1:-1] &= np.linalg.norm(np.diff(mass, 2, axis=0), axis=1) * fps**2 < CALM
+    if not (is_beyond(points, touches, mass, allowed) & calm & ~given).any():
         return rotations, root
     height = (support.mass[:, 1] - places[..., 1].min(axis=1)) / size
     shift = np.zeros_like(root)
     for _ in range(ROUNDS):
         now = mass + shift[:, [0, 2]]
-        rows = balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
+        rows = [
+            row._replace(weights=row.weights * calm[1:-1])
+            for row in balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
+        ]
         for axis in range(3):
             along, none = np.tile(np.eye(3)[axis], (len(root), 1)), np.zeros(len(root))
             rows.append(position_rows(np.arange(len(root)), along, none, none + SHIFTS**-2.0))

@@ -35,7 +35,8 @@ from motionmind.realise.timeline import Timeline, stretch, timeline
 FIRMLY, FREELY = 0.95, 3.0
 # Power of the trust in walks by which their detail is trusted: roughness is less particular than movement.
 LINGERS = 0.1
-_ROUNDING = 1e-9  # radians: a joint that moves by no more, such as fingers that were not recorded, does not move
+_SAME = 1e-9  # radians: two orientations no farther apart are the same but for rounding
+_UNSEEN = 2e-3  # radians: a joint that comes back to where it began, and goes no farther, does not move
 
 
 def realise(
@@ -253,16 +254,19 @@ def _bend_to_states(
 def _detail(walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage) -> tuple[Floats, Ints]:
     """Return the corpus's fine detail of a walk, rotation vectors [N, J, 3], and the moves that it comes from.
 
-    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and the whole body
-    less of it where it moves much slower than the moves that it comes from.
+    Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and less or more of it
+    where the body moves slower than in the moves that it comes from (`share_of_detail`).
     """
     between, joints = corpus.detail.shape[1], walk.poses.shape[1]
     if not between:
         return np.zeros((len(clock.frames), joints, 3)), np.zeros(0, dtype=np.int64)
     orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
     moves = likest_moves(corpus.moves, orientations, poses)
-    share = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
-    scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
+    stepping, others = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
+    share = np.repeat(others[:, None], joints, axis=1)
+    for leg, knee in find_legs(corpus.skeleton)[1]:
+        share[:, leg[: knee + 2]] = stepping[:, None]
+    scale = np.repeat(share * walk.trust[::2] ** LINGERS, between + 1, axis=0)
     times, detail = subdivide_times(at, between), detail_of(corpus, moves)
     detail = detail * np.concatenate([scale, scale[-1:]])[..., None]
     return natural_spline(times, detail, clock.frames), moves
@@ -327,7 +331,9 @@ def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> 
     first, *_, last = postures.values()
     given = np.stack([posture.rotations for posture in postures.values()])
     out = within_limits(first.skeleton, rot.normalise(rotations), given, loose)
-    still = rot.angle(out, first.rotations).max(axis=0) < _ROUNDING
+    # Such as fingers that were not recorded: walks may know other values of them.
+    still = rot.angle(given, first.rotations).max(axis=0) < _SAME
+    still &= rot.angle(out, first.rotations).max(axis=0) < _UNSEEN
     out[:, still] = first.rotations[still]
     out[0], out[-1] = first.rotations, last.rotations
     return out
