@@ -80,9 +80,10 @@ def share_of_detail(
 ) -> tuple[Floats, Floats]:
     """Return how much of the detail of copied moves a movement gets in each of its own: [T] and [T].
 
-    The first is for the joints that take steps, hips to ankles. They get all of it where the movement is at least a LIVELIER-th as fast as the move that is copied, and in
-    proportion to its speed where it is slower. The second is for all others, which get more, by MISSES times the share of
-    the speed that is missing. Speeds are the turns from end to end, root mean square over the joints, a second.
+    The first is for the joints that take steps, hips to ankles. They get all of it where the movement is at least a
+    LIVELIER-th as fast as the move that is copied, and in proportion to its speed where it is slower. The second is for
+    all others, which get more, by MISSES times the share of the speed that is missing. Speeds are the turns from end to
+    end, root mean square over the joints, a second.
 
     Args:
         moves: the corpus's moves.

@@ -14,7 +14,6 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
-from motionmind.body.plausibility import CALM
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import NEAR, find_support, size_of
 from motionmind.geometry import rotations as rot
@@ -25,6 +24,7 @@ from motionmind.realise.legs import SOFT, find_legs
 
 PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement
 SHIFTS = 0.2  # metres that they shift
+STILL = 0.5  # metres a second squared: level acceleration up to which they do; chosen on ballet and cmu-135
 LESS = 1.0, 0.7, 0.4  # shares of that shift: the first for which no leg has to hurry
 ROUNDS = 4  # of finding the support's nearest points, and the shift
 
@@ -67,7 +67,7 @@ def shift_weight(
     touches = low & support.bears[:, limb_of_points(skeleton)[joints]]
     points, mass, allowed = places[..., [0, 2]] / size, support.mass[:, [0, 2]] / size, overhang / size
     calm = support.bears.sum(axis=1) == 1
-    calm[1:-1] &= np.linalg.norm(np.diff(mass, 2, axis=0), axis=1) * fps**2 < CALM
+    calm[1:-1] &= np.linalg.norm(np.diff(mass, 2, axis=0), axis=1) * fps**2 < STILL
     if not (is_beyond(points, touches, mass, allowed) & calm & ~given).any():
         return rotations, root
     height = (support.mass[:, 1] - places[..., 1].min(axis=1)) / size
