@@ -16,7 +16,7 @@ from motionmind.render import PICTURES
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
 
-MOVEMENT = (".json", ".bvh", ".glb", ".npz")
+MOVEMENT = (".json", ".bvh", ".glb", ".npz", ".vrma")
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:

@@ -13,7 +13,7 @@ from motionmind.cli.types import EXISTING_FILE, FILE, FOLDER, RATE
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-OUTPUTS = "movement (.json, .bvh, .glb, .npz), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
+OUTPUTS = "movement (.json, .bvh, .glb, .npz, .vrma), a picture or film (.png, .gif, .mp4, .svg), or a page (.html)"
 _SHOW_ALL = "motionmind.cli.options.show_all"  # key of a context's `meta`
 
 
@@ -197,7 +197,7 @@ def reading(function: _Function) -> _Function:
             section=Section.INPUT,
             metavar="UNIT",
             help="Set BVH's unit of length: m, cm, mm, dm, in, ft, cmu, or metres per unit  "
-            "[default: guessed from the body's height]",
+            "[default: guessed from the body's height; metres for glTF]",
         ),
         option(
             "--joints",

@@ -7,7 +7,9 @@
 | `.amc` | motion, with the `.asf` beside it | |
 | `.npz` | motion on SMPL's joints (AMASS) | motion of people, posture as one frame |
 | `.txt` | the notation of the papers | the notation of the papers |
-| `.glb` | | motion, posture without animation |
+| `.glb` | motion, or posture without animation | the same |
+| `.gltf`, `.vrm` | as `.glb` | |
+| `.vrma` | as `.glb` | motion of people |
 
 `lossy_fields` names what a format cannot hold.
 """
@@ -27,8 +29,9 @@ __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "w
 
 __getattr__ = renamed(__name__, {"lost": "lossy_fields"})
 
-_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz")
-_WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz")
+_GLTF = (".glb", ".gltf", ".vrm", ".vrma")
+_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", *_GLTF)
+_WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")
 
 
 def read_motion(
@@ -43,7 +46,8 @@ def read_motion(
 
     Args:
         path: the file; its suffix determines the format.
-        unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Other formats define their own.
+        unit: BVH's unit of length (`read_bvh`); None guesses it from the skeleton. Also glTF's, if it is not the metre.
+            Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
         fps: frames per second: of AMC (default 120) and the papers' notation (default 1), which do not record them, and
             of BVH and `.npz` in place of those that the file states. JSON's frames have times of their own.
@@ -63,24 +67,34 @@ def read_motion(
     >>> len(read_motion("rest.bvh"))
     1
     """
-    suffix = _suffix(path, _READABLE, "read")
     # Formats are imported here, so a program loads only those it uses.
-    if suffix == ".bvh":
-        from motionmind.formats.bvh import read_bvh
+    match _suffix(path, _READABLE, "read"):
+        case ".bvh":
+            from motionmind.formats.bvh import read_bvh
 
-        return read_bvh(path, unit=unit, fps=fps)
-    if suffix == ".amc":
-        from motionmind.formats.asf_amc import read_amc
+            return read_bvh(path, unit=unit, fps=fps)
+        case ".amc":
+            from motionmind.formats.asf_amc import read_amc
 
-        return read_amc(path, asf) if fps is None else read_amc(path, asf, fps=fps)
-    if suffix == ".txt":
-        from motionmind.formats.papers import read_papers
+            return read_amc(path, asf) if fps is None else read_amc(path, asf, fps=fps)
+        case ".txt":
+            from motionmind.formats.papers import read_papers
 
-        return read_papers(path, skeleton=skeleton) if fps is None else read_papers(path, skeleton=skeleton, rate=fps)
-    if suffix == ".npz":
-        from motionmind.formats.npz import read_npz
+            return read_papers(path, skeleton=skeleton, rate=1.0 if fps is None else fps)
+        case ".npz":
+            from motionmind.formats.npz import read_npz
 
-        return read_npz(path, fps=fps)
+            return read_npz(path, fps=fps)
+        case ".json":
+            return _read_json(path)
+        case _:
+            from motionmind.formats.gltf import read_gltf
+
+            return read_gltf(path, unit=unit)
+
+
+def _read_json(path: FilePath) -> Motion:
+    """Read a motion, or a posture as one, from JSON."""
     from motionmind.files import read_bytes
     from motionmind.formats import _json
 
@@ -141,7 +155,8 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
     For BVH, a log entry says what to set in Blender's import (logger "motionmind.formats.programs", level INFO).
 
     Args:
-        path: the file: `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body) or `.npz` (AMASS).
+        path: the file: `.json`, `.bvh`, `.txt` (the papers' notation), `.glb` (glTF, a skinned body), `.vrma` (VRM
+            animation) or `.npz` (AMASS).
         motion: the movement to write.
         unit: BVH's unit of length (`write_bvh`); other formats define their own.
 
@@ -169,6 +184,10 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
         from motionmind.formats.glb import write_glb
 
         write_glb(path, motion)
+    elif suffix == ".vrma":
+        from motionmind.formats.vrma import write_vrma
+
+        write_vrma(path, motion)
     elif suffix == ".npz":
         from motionmind.formats.npz import write_npz
 

@@ -64,11 +64,15 @@ class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
     bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
 
 
+MARKS = "motionmind"  # where glTF keeps MarksSchema: the key in a node's extras
+
+
 class MarksSchema(msgspec.Struct, omit_defaults=True):
-    """Marks of a motion that formats of other programs hold as text only: see `Motion`."""
+    """Text in other programs' formats: marks (see `Motion`), and the far ends of bones by joint, metres."""
 
     insertions: list[InsertionSchema] = []
     keyframed: bool = False
+    tips: dict[str, Vector] = {}
 
 
 T = TypeVar("T")

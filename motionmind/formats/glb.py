@@ -13,8 +13,9 @@ The layout makes programs recognise an armature:
 - A mesh on that skin (`_glb_body`): an unused skin is a fault, and an animation without a skin is not an armature.
 - One animation that rotates all joints and moves the root. A single frame has no animation; its nodes stand in the
   posture instead, where programs show it without playing anything. The skin still holds the rest pose.
-- What glTF has no place for, the stretches that the engine made and whether frames are keyframes, is text in the root
-  joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and writes it again if asked to.
+- What glTF has no place for (the stretches that the engine made, whether frames are keyframes, far ends of bones) is
+  text in the root joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and writes it
+  again if asked to.
 """
 
 from __future__ import annotations
@@ -33,14 +34,13 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
-from motionmind.formats._json import MarksSchema, insertion_schema, rounded
+from motionmind.formats._json import MARKS, MarksSchema, insertion_schema, rounded
 from motionmind.geometry import rotations as rot
 
 # The format's constants: 3.6.2.2 and 5.11.5.
 _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # the target of a buffer view
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-MARKS = "motionmind"  # of the root joint's extras, where the marks are
 _LONGEST = 1e6  # metres; single precision is off by centimetres there, and by more beyond
 
 
@@ -66,16 +66,16 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     for what, lengths in (("root", motion.root), ("offsets", skeleton.offsets), ("tips", skeleton.tips)):
         if np.abs(lengths).max() > _LONGEST:
             raise MotionMindError(f"{name}: {what}: GLB cannot hold {np.abs(lengths).max():.3g} metres")
-    rest = _at_rest(skeleton)
+    rest = at_rest(skeleton)
     moving, has_root = len(motion) > 1, has_root and skeleton.names[0].lower() != "root"
-    buffer = _Buffer()
+    buffer = GlbBuffer()
     mesh = body_mesh(skeleton, rest[0])
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "MotionMind"},
         "scene": 0,
         "scenes": [{"name": name, "nodes": [0, len(skeleton)]}],
         "nodes": [
-            *(_joint_nodes(skeleton, rest[0]) if moving else _posture_nodes(motion)),
+            *(joint_nodes(skeleton, rest[0]) if moving else _posture_nodes(motion)),
             {"name": f"{skeleton.name} body", "mesh": 0, "skin": 0},  # 3.7.3: its own transform is ignored
         ],
         "meshes": [{"name": f"{skeleton.name} body", "primitives": _primitives(buffer, mesh)}],
@@ -90,9 +90,8 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
         ],
     }
     if moving:
-        document["animations"] = [_animation(buffer, motion, name)]
-    if marks := marks_text(motion):
-        document["nodes"][0]["extras"] = {MARKS: marks}
+        document["animations"] = [animation_of(buffer, motion, name)]
+    document["nodes"][0]["extras"] = {MARKS: _marks(motion)}
     if has_root:
         document["scenes"][0]["nodes"] = [len(skeleton) + 1, len(skeleton)]
         document["nodes"].append({"name": "root", "children": [0]})
@@ -104,17 +103,18 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],
     }
-    write_atomically(path, _container(document, bytes(buffer.data), name))
+    write_atomically(path, container(document, bytes(buffer.data), name))
 
 
-def marks_text(motion: Motion) -> str:
-    """Return what glTF has no place for, as JSON of MarksSchema, times from the first frame's on; "" if nothing."""
+def _marks(motion: Motion) -> str:
+    """Return what glTF has no place for, as JSON of MarksSchema, times from the first frame's on; "{}" if nothing."""
     insertions = [insertion_schema(one, float(motion.times[0])) for one in motion.insertions]
-    marks = MarksSchema(insertions, motion.keyframed)
-    return msgspec.json.encode(marks).decode() if insertions or motion.keyframed else ""
+    body = motion.skeleton
+    tips = {name: rounded(tip).tolist() for name, tip in zip(body.names, body.tips, strict=True) if tip.any()}
+    return msgspec.json.encode(MarksSchema(insertions, motion.keyframed, tips)).decode()
 
 
-class _Buffer:
+class GlbBuffer:
     """The binary chunk under construction, with the views and accessors that describe it (3.6)."""
 
     def __init__(self) -> None:
@@ -153,7 +153,7 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
+def container(document: dict[str, Any], data: bytes, name: str) -> bytes:
     """Return the file's bytes: a header, the JSON padded with spaces, the binary data (4.4)."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
@@ -174,13 +174,13 @@ def _container(document: dict[str, Any], data: bytes, name: str) -> bytes:
 # --- the armature ---------------------------------------------------------------------------------------------------
 
 
-def _at_rest(skeleton: Skeleton) -> Floats:
+def at_rest(skeleton: Skeleton) -> Floats:
     """Return the joints' places at rest [J, 3], metres: the root above the origin, the body's lowest point at 0."""
     lowest = skeleton.rest[:, 1].min()
     return np.asarray(skeleton.rest[: len(skeleton)] - np.array([0.0, lowest, 0.0]))
 
 
-def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
+def joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
     """Return the joints' nodes in order, at rest: a node without a rotation has the identity (3.5.3)."""
     nodes: list[dict[str, Any]] = []
     for joint, name in enumerate(skeleton.names):
@@ -193,7 +193,7 @@ def _joint_nodes(skeleton: Skeleton, root: Floats) -> list[dict[str, Any]]:
 
 def _posture_nodes(motion: Motion) -> list[dict[str, Any]]:
     """Return the joints' nodes in the first posture."""
-    nodes = _joint_nodes(motion.skeleton, motion.root[0])
+    nodes = joint_nodes(motion.skeleton, motion.root[0])
     for node, rotation in zip(nodes, rot.canonical(motion.rotations[0]), strict=True):
         node["rotation"] = rounded(rotation).tolist()
     return nodes
@@ -212,7 +212,7 @@ def _inverse_binds(rest: Floats) -> Singles:
 # --- the mesh -------------------------------------------------------------------------------------------------------
 
 
-def _primitives(buffer: _Buffer, mesh: Mesh) -> list[dict[str, Any]]:
+def _primitives(buffer: GlbBuffer, mesh: Mesh) -> list[dict[str, Any]]:
     """Return one primitive per paint, all on the same vertices; each vertex has weight 1 at one joint (3.7.3)."""
     joints, weights = np.zeros((len(mesh.joints), 4), "<u2"), np.zeros((len(mesh.joints), 4), "<f4")
     joints[:, 0], weights[:, 0] = mesh.joints, 1.0
@@ -243,7 +243,7 @@ def _material(paint: str) -> dict[str, Any]:
 # --- the movement ---------------------------------------------------------------------------------------------------
 
 
-def _animation(buffer: _Buffer, motion: Motion, name: str) -> dict[str, Any]:
+def animation_of(buffer: GlbBuffer, motion: Motion, name: str) -> dict[str, Any]:
     """Return an animation: a sampler and a channel for each joint's rotations, and for the root's places (3.11)."""
     times = (motion.times - motion.times[0]).astype("<f4")
     late = np.flatnonzero(np.diff(times) <= 0.0)

@@ -12,6 +12,7 @@ from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.files import FilePath
+from motionmind.geometry import rotations as rot
 
 _TINY = 1e-6  # seconds and metres
 
@@ -21,7 +22,7 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
 
     Only what this motion has is named. JSON holds all movement. Names are not a loss: formats without them use the
     file's name. Motions that a format cannot hold at all (uneven times in BVH and .npz, a body that does not map to
-    SMPL's in .npz) are refused by its writer.
+    SMPL's in .npz, or to a person's in .vrma) are refused by its writer.
 
     Args:
         motion: the movement to write.
@@ -85,6 +86,13 @@ def _lossy_body(motion: Motion, suffix: str) -> list[str]:
             lossy = [f"the turns of joints that SMPL does not have ({enumerated(missing)})"] if missing else []
         if not any(_same_proportions(body, skeleton) for body in known):
             lossy.insert(0, "the body's proportions")
+    elif suffix == ".vrma":
+        from motionmind.retarget.joint_mapping import joint_mapping
+
+        kept = joint_mapping(skeleton) or skeleton.names
+        turned = rot.angle(motion.rotations, rot.IDENTITY).max(axis=0) > _TINY
+        missing = [name for name, turns in zip(skeleton.names, turned, strict=True) if turns and name not in kept]
+        lossy = [f"the turns of joints that VRM does not have ({enumerated(missing)})"] if missing else []
     elif suffix == ".bvh":
         inner = [joint for joint in set(skeleton.parents[1:]) if skeleton.tips[joint].any()]
         ends = [skeleton.names[joint] for joint in sorted(inner)]

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from command_line import Run
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.formats import read_motion, write_motion
 from motionmind.formats._smpl import smpl_bodies
@@ -195,3 +196,39 @@ def test_at_default_settings_lengths_and_seconds_are_right(tmp_path: Path, run: 
         there = y_up([[place[joint] for joint in motion.skeleton.names] for place in shown["places"]])
         assert np.linalg.norm(there - here, axis=-1).max() < 1e-3, file
         assert shown["end"] == pytest.approx(motion.times[-1], abs=1.0 / 24.0), file
+
+
+THERE_AND_BACK = """
+import json, sys
+import bpy
+
+for source, target, marks in json.loads(sys.argv[1]):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = RATE
+    bpy.ops.import_scene.gltf(filepath=source)
+    bpy.ops.export_scene.gltf(
+        filepath=target, export_extras=marks, export_format="GLB" if target.endswith("glb") else "GLTF_SEPARATE"
+    )
+""".replace("fps = RATE", f"fps = {RATE}")
+
+
+@pytest.mark.skipif(not PYTHON, reason="Blender's module bpy is not here (pip install bpy, or set BLENDER_PYTHON)")
+def test_what_blender_exports_is_read(tmp_path: Path) -> None:
+    plain = ballet_clip("adagio").resample(RATE)
+    motion = replace(plain, insertions=(Insertion(plain.times[[10, 20, 30]], (("left_hip", 1),)),))
+    write_motion(tmp_path / "in.glb", motion)
+    jobs = [
+        (str(tmp_path / "in.glb"), str(tmp_path / name), marks) for name, marks in (("a.glb", True), ("b.gltf", False))
+    ]
+    ran = subprocess.run(
+        [str(PYTHON), "-c", THERE_AND_BACK, json.dumps(jobs)], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    for _, file, marks in jobs:
+        found = read_motion(file)
+        assert found.skeleton.difference(motion.skeleton) is None
+        np.testing.assert_allclose(found.times, motion.times, atol=1e-6)
+        assert rot.angle(found.rotations, motion.rotations).max() < 1e-5
+        np.testing.assert_allclose(found.root, motion.root, atol=1e-5)
+        np.testing.assert_allclose(found.skeleton.tips, motion.skeleton.tips, atol=1e-4)
+        assert np.array_equal(found.bridged(), motion.bridged()) == marks

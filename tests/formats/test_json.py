@@ -378,10 +378,10 @@ def test_postures_in_every_format_that_is_written(tmp_path: Path, suffix: str) -
 
 @pytest.mark.parametrize("name", ["a.fbx", "a", "a.json.gz"])
 def test_an_unknown_suffix_names_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt, \.npz$"):
+    with pytest.raises(FormatError, match=r"can be read end in \.json, \.bvh, \.amc, \.txt, \.npz, \.glb"):
         read_motion(tmp_path / name)
     for write, thing in ((write_motion, random_motion()), (write_posture, random_motion().posture(0))):
-        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt, \.glb, \.npz$"):
+        with pytest.raises(MotionMindError, match=r"can be written end in \.json, \.bvh, \.txt, \.glb, \.npz, \.vrma$"):
             write(tmp_path / name, thing)  # type: ignore[operator]
 
 

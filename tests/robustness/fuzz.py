@@ -10,12 +10,15 @@ test_fuzz.py replays.
 from __future__ import annotations
 
 import argparse
+import base64
 import faulthandler
 import io
+import json
 import random
 import resource
 import shutil
 import signal
+import struct
 import sys
 import tempfile
 import time
@@ -219,11 +222,21 @@ def _moving(frames: int) -> Motion:
     return Motion(body, rotations, np.linspace([0, 1, 0], [1, 1, 0], frames), np.arange(frames) / 30.0, "clip")
 
 
+def _text_of(glb: bytes) -> bytes:
+    """Return a GLB as text, its numbers in base64, and some of them as curves and jumps."""
+    (length,) = struct.unpack_from("<I", glb, 12)
+    document = json.loads(glb[20 : 20 + length])
+    data = base64.b64encode(glb[28 + length :]).decode()
+    document["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{data}"
+    document["animations"][0]["samplers"][2]["interpolation"] = "STEP"
+    return json.dumps(document).encode()
+
+
 def readers(folder: Path) -> list[Reader]:
     """Make every reader's whole files in a folder, and return the readers."""
     motion, seeds = _moving(4), {path.name: path.read_bytes() for path in SEEDS.iterdir()}
     made: dict[str, bytes] = {}
-    for suffix in ("bvh", "json", "npz", "txt"):
+    for suffix in ("bvh", "json", "npz", "txt", "glb", "vrma"):
         write_motion(folder / f"clip.{suffix}", motion)
         made[suffix] = (folder / f"clip.{suffix}").read_bytes()
     write_posture(folder / "posture.json", motion.posture(0))
@@ -241,6 +254,8 @@ def readers(folder: Path) -> list[Reader]:
         Reader("BVH", "a.bvh", [seeds["small.bvh"], made["bvh"]], _movement),
         Reader("JSON movement", "a.json", [made["json"], (folder / "posture.json").read_bytes()], _movement),
         Reader("npz", "a.npz", [made["npz"]], _movement, mutate=damaged_archive),
+        Reader("GLB", "a.glb", [made["glb"], made["vrma"]], _movement),
+        Reader("glTF, text", "a.gltf", [_text_of(made["vrma"])], _movement),
         Reader("papers' notation", "a.txt", [seeds["braces.txt"], seeds["lines.txt"], made["txt"]], _papers),
         Reader("AMC", "toy_01.amc", [seeds["toy.amc"]], _movement, {"toy.asf": seeds["toy.asf"]}),
         Reader(
