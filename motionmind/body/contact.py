@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Indices
+from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limb_of_points, limbs_of
@@ -23,6 +23,7 @@ from motionmind.body.skeleton import Skeleton
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
 FAR = 0.025  # metres that a standing foot may move from one frame to the next
+STAYS = 0.05  # metres that a foot which stays in its place may slide, as it rolls
 _SOFT = 0.025  # metres above the floor at which Zhang et al. stop counting a slide
 _NEAR = 0.1  # of the body's height: how near a leaf must end, at rest, to the lowest point to be a foot
 _FLOOR = 0.05  # share of the frames whose lowest point lies at or below the floor
@@ -181,6 +182,22 @@ def foot_slides(skeleton: Skeleton, rotations: Floats, root: Floats, floor: floa
     moved, height = _foot_ends(skeleton, rotations, root, floor)
     least = np.where(height < LOW, moved, np.inf).min(axis=-1)
     return np.where(np.isfinite(least), least, 0.0)
+
+
+def feet_that_stay(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> Bools:
+    """Return which feet stay in their places on the floor from the first frame to the last [feet].
+
+    Such a foot is near the floor in every frame (see `foot_slides`), and slides no further than 5 cm in all.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [T, J, 4], of two frames at least.
+        root: positions of the root joint [T, 3], metres.
+        floor: height of the floor, metres.
+    """
+    moved, height = _foot_ends(skeleton, rotations, root, floor)
+    least = np.where(height < LOW, moved, np.inf).min(axis=-1)
+    return np.asarray(least.sum(axis=0) <= STAYS)
 
 
 def foot_slide(skeleton: Skeleton, rotations: Floats, root: Floats, floor: float = 0.0) -> float:

@@ -17,7 +17,7 @@ from motionmind.cli.looks import explain, graph
 from motionmind.cli.measures import measure
 from motionmind.cli.options import group, show_help_without_command
 from motionmind.cli.pictures import render, sheet
-from motionmind.cli.printing import Notes, show_warning
+from motionmind.cli.printing import Notes, Warned
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
 from motionmind.cli.streams import forgiving
@@ -64,18 +64,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         with forgiving(), pipes_kept(), warnings.catch_warnings():
             warnings.simplefilter("always", MotionMindWarning)
-            warnings.showwarning = show_warning
-            sys.exit(_run(arguments))
+            warned = Warned()
+            warnings.showwarning = warned.show
+            sys.exit(_run(arguments, warned))
     finally:
         log.removeHandler(notes)
         gc.enable()
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(arguments: Sequence[str] | None, warned: Warned) -> int:
     """Run a command, print its error if any, and return the exit code."""
     code = BAD_INPUT
     try:
-        return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
+        try:
+            return int(app.main(arguments, prog_name="motionmind", standalone_mode=False) or 0)
+        finally:
+            warned.finish()
     except click.Abort:  # Ctrl-C
         return INTERRUPTED
     except click.UsageError as error:

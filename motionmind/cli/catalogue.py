@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import check_outputs
-from motionmind.cli.options import HOME, JSON, Section, command, option
+from motionmind.cli.options import HOME, JSON, command, output
 from motionmind.cli.printing import count, print_written
-from motionmind.cli.types import FILE
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.names.spelling import parse_source
@@ -24,7 +23,7 @@ _ABOUT = 300  # characters: a sentence rather than a name
 
 @command("motionmind postures ballet -o postures.png")
 @click.argument("source")
-@option("-o", "--output", section=Section.OUTPUT, type=FILE, help="Draw the named postures: .png.")
+@output("Draw the named postures: .png.", required=False)
 @JSON
 @HOME
 def postures(source: str, output: Path | None, as_json: bool, home: Path | None) -> None:
@@ -51,7 +50,8 @@ def postures(source: str, output: Path | None, as_json: bool, home: Path | None)
         click.echo(json.dumps(listed))
         return
     _print(displayed_path(found.word), **listed)
-    print_written([output] if output else [])
+    if output:
+        print_written([output])
 
 
 def _list(found: Collection) -> dict[str, list[Any]]:

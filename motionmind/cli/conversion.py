@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read_mapping, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, reading
+from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read_mapping, write_all
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
 from motionmind.cli.types import FILE, RATE, Whole
@@ -22,14 +22,7 @@ if TYPE_CHECKING:
 
 @command("motionmind posture ballet/adagio --frame 23 -o A.json")
 @click.argument("source")
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    required=True,
-    help=f"Write {OUTPUTS}; or .txt.",
-)
+@outputs(f"Write {OUTPUTS}; or .txt.")
 @option(
     "--clip",
     "name",
@@ -46,7 +39,9 @@ if TYPE_CHECKING:
 )
 @reading
 @HOME
-def posture(source: str, frame: int | None, name: str | None, output: Path, home: Path | None, **options: Any) -> None:
+def posture(
+    source: str, frame: int | None, name: str | None, outputs: tuple[Path, ...], home: Path | None, **options: Any
+) -> None:
     """Take one posture out of a clip.
 
     SOURCE is what sheet draws: a file of movement, a score, a corpus, CORPUS/CLIP, or a posture such as
@@ -59,14 +54,14 @@ def posture(source: str, frame: int | None, name: str | None, output: Path, home
     from motionmind.names.spelling import Moment
 
     named = parse_movement(source, home)
-    check_outputs([(output, (*MOVEMENT, ".txt", *PICTURES))], named.source.paths)
+    check_outputs([(path, (*MOVEMENT, ".txt", *PICTURES)) for path in outputs], named.source.paths)
     if frame is not None and named.moment is not None:
         raise MotionMindError(f"{source}: names a frame, and so does --frame; give one of them")
     motion = read_movement(named.source, name, home, **options)
     at = frame_of(named, motion) if frame is None else select_frame(named.source.word, motion, Moment(frame))
-    write(output, motion.posture(at))
+    write_all(outputs, motion.posture(at))
     click.echo(
-        f"{displayed_path(output)}: frame {at} of {len(motion)}, on "
+        f"{', '.join(map(displayed_path, outputs))}: frame {at} of {len(motion)}, on "
         f"{displayed(motion.skeleton.name)} ({len(motion.skeleton)} joints)"
     )
 

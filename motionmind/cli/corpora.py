@@ -31,6 +31,9 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
 
+DETAILS = option(
+    "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
+)
 _LINE = 300  # characters of a title, an author, a source: sentences rather than names
 
 
@@ -113,6 +116,7 @@ def corpora(context: click.Context) -> None:
     help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
+@DETAILS
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
 @option("--source", section=Section.ABOUT, default="", show_default=False, help="State where the movement comes from.")
@@ -131,6 +135,7 @@ def build(
     unit: str | None,
     asf: Path | None,
     source_fps: float | None,
+    details: bool,
     **options: Any,
 ) -> None:
     """Learn a corpus from movement.
@@ -159,7 +164,7 @@ def build(
         **options,
     )
     engine.save(place)
-    print_check(engine.check())
+    print_check(engine.check(), with_states=details, with_details=details)
     click.echo(f"built {displayed_path(place)}")
 
 
@@ -242,6 +247,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
 @command("motionmind corpus check ballet --pairs 500 --seed 1")
 @click.argument("name")
 @JSON
+@option("--details", section=Section.OUTPUT, is_flag=True, help="Print each recording with faults.")
 @option(
     "--pairs",
     section=Section.CHECK,
@@ -252,10 +258,10 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
 )
 @option("--seed", section=Section.CHECK, type=NATURAL, metavar="N", default=0, help="Seed the random pairs.")
 @HOME
-def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) -> None:
+def check(name: str, as_json: bool, details: bool, pairs: int, seed: int, home: Path | None) -> None:
     """Check how well a corpus hangs together.
 
-    Count states and transitions, try to join random pairs of postures, and list faults of the recordings.
+    Count states and transitions, try to join random pairs of postures, and find faults of the recordings.
     """
     from motionmind.tween.engine import Engine
 
@@ -263,7 +269,7 @@ def check(name: str, as_json: bool, pairs: int, seed: int, home: Path | None) ->
     if as_json:
         click.echo(json.dumps(found))
     else:
-        print_check(found)
+        print_check(found, with_details=details)
 
 
 for _command in (build, list_corpora, info, check):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from motionmind.cli.printing import note
 from motionmind.errors import MotionMindError
-from motionmind.files import as_text
+from motionmind.files import all_or_none, as_text
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
@@ -41,6 +41,13 @@ def write(path: Path, movement: Motion | Posture) -> None:
     else:
         write_motion(path, movement)
     note_lossy_fields(path, lossy_fields(motion, path))
+
+
+def write_all(paths: Sequence[Path], movement: Motion | Posture) -> None:
+    """Write a motion or a posture to several files as `write` does, or to none if one cannot be written."""
+    with all_or_none():
+        for path in paths:
+            write(path, movement)
 
 
 def note_lossy_fields(path: Path, fields: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from motionmind.cli.files import check_outputs
-from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option
+from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, output
 from motionmind.cli.types import FILE
 from motionmind.display import displayed, displayed_path
 
@@ -38,14 +38,7 @@ def explain(report: Path, as_json: bool) -> None:
     metavar="NAME",
     help="Draw the graph of this joint, or of facing, if that is a chain of its own.",
 )
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    required=True,
-    help="Write the graph: a picture (.svg, .png), or data (.graphml, .gexf).",
-)
+@output("Write the graph: a picture (.svg, .png), or data (.graphml, .gexf).")
 @HOME
 def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     """Draw a joint's states and the transitions between them.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -159,6 +160,56 @@ def given_option(context: click.Context, names: Collection[str]) -> str | None:
         if source is ParameterSource.COMMANDLINE:
             return parameter.opts[0]
     return None
+
+
+def outputs(text: str, *, required: bool = True) -> Callable[[_Function], _Function]:
+    """Add -o, which may be repeated, as `outputs`: a tuple of paths.
+
+    Args:
+        text: its help text, without that it may be repeated.
+        required: whether there must be one.
+    """
+    return option(
+        "-o",
+        "--output",
+        "outputs",
+        section=Section.OUTPUT,
+        type=FILE,
+        multiple=True,
+        required=required,
+        help=f"{text} Repeatable.",
+    )
+
+
+def output(
+    text: str,
+    *,
+    required: bool = True,
+    type: click.ParamType[Any] = FILE,  # noqa: A002 - as `option` calls it
+) -> Callable[[_Function], _Function]:
+    """Add -o, which may be given once, as `output`: a path, or None.
+
+    Args:
+        text: its help text.
+        required: whether it must be given.
+        type: of the path.
+    """
+    return option(
+        "-o",
+        "--output",
+        section=Section.OUTPUT,
+        type=type,
+        multiple=True,
+        required=required,
+        callback=_only_one,
+        help=text,
+    )
+
+
+def _only_one(context: click.Context, _: click.Parameter, paths: tuple[Path, ...]) -> Path | None:
+    if len(paths) > 1:
+        raise click.UsageError(f"-o is given {len(paths)} times, and one file is written; give it once", context)
+    return paths[0] if paths else None
 
 
 HOME = option(

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import check_outputs
-from motionmind.cli.options import HOME, Section, command, option, reading
+from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
-from motionmind.cli.types import COUNT, FILE, FILE_OR_FOLDER, RATE, Whole
+from motionmind.cli.types import COUNT, FILE_OR_FOLDER, RATE, Whole
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none
@@ -46,14 +46,7 @@ LAST = option(
 
 @command("motionmind sheet ballet/adagio -o adagio.png")
 @click.argument("source")
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE_OR_FOLDER,
-    required=True,
-    help="Write the picture: .png; or a picture of each clip into a folder.",
-)
+@output("Write the picture: .png; or a picture of each clip into a folder.", type=FILE_OR_FOLDER)
 @option(
     "--clip",
     "names",
@@ -133,14 +126,7 @@ def sheet(
 
 @command("motionmind render clip.bvh -o clip.html")
 @click.argument("source")
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    required=True,
-    help="Write a picture (.png), a film (.gif, .mp4, .svg) or a page (.html).",
-)
+@outputs("Write a picture (.png), a film (.gif, .mp4, .svg) or a page (.html).")
 @option(
     "--clip",
     "name",
@@ -172,7 +158,7 @@ def sheet(
 @reading
 @HOME
 def render(
-    source: str, output: Path, name: str | None, start: int, end: int, home: Path | None, **options: Any
+    source: str, outputs: tuple[Path, ...], name: str | None, start: int, end: int, home: Path | None, **options: Any
 ) -> None:
     """Draw movement as a picture, a film, or a page that plays it.
 
@@ -185,14 +171,17 @@ def render(
 
     drawing = {key: options.pop(key) for key in ("fps", "view", "size")}
     named = parse_movement(source, home)
-    check_outputs([(output, PICTURES)], named.source.paths)
+    check_outputs([(path, PICTURES) for path in outputs], named.source.paths)
     whole = read_movement(named.source, name, home, **options)
     frames = select_part(named, whole, start, end)
     motion = whole.slice(frames.start, frames.stop)
-    write_picture(output, motion, first=frames.start, **drawing)
+    with all_or_none():
+        for path in outputs:
+            write_picture(path, motion, first=frames.start, **drawing)
     seconds = motion.times[-1] - motion.times[0]
-    kilobytes = output.stat().st_size / 1000
-    click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
+    for path in outputs:
+        kilobytes = path.stat().st_size / 1000
+        click.echo(f"{displayed_path(path)}: {count(len(motion), 'frame')}, {seconds:.2f} s, {kilobytes:.0f} kB")
 
 
 def _make_files(folder: Path, motions: Sequence[Motion], read_from: Sequence[Path]) -> list[Path]:

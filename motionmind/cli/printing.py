@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
@@ -19,13 +19,12 @@ from motionmind.display import displayed, displayed_path, printable
 from motionmind.errors import MotionMindWarning, enumerated
 
 if TYPE_CHECKING:
-    from motionmind.learned.plausibility import Sighting
     from motionmind.search.solve import Progress
     from motionmind.tween.result import Tween
     from motionmind.tween.what_if import WhatIf
 
 
-MOST_CLIPS = 30  # whose faults are printed
+_FEW = 3  # warnings that are printed without --details
 
 
 class Notes(logging.Handler):
@@ -108,34 +107,35 @@ class Interruption:
         self.is_requested = True
 
 
-def print_tween(result: Tween, files: Sequence[Path]) -> None:
-    """Print a tween in a few lines: moves, cost, proof, make-up, distances from the corpus, and the files written."""
+def print_tween(result: Tween, files: Sequence[Path], *, with_details: bool = False) -> None:
+    """Print a tween in plain words, and the files written; with details costs, states and distances from the corpus."""
+    from motionmind.tween.headline import headline
+
+    click.echo(headline(result))
+    _print_beyond(result)
+    for one in result.what_if:
+        click.echo(f"without   {format_what_if(one)}")
+    if with_details:
+        _print_details(result)
+    print_written(files)
+
+
+def _print_beyond(result: Tween, indent: str = "") -> None:
+    """Print where a viewer would wince, a line each."""
+    from motionmind.tween.headline import beyond
+
+    for sentence in beyond(result):
+        click.echo(f"{indent}beware    {sentence}")
+
+
+def _print_details(result: Tween) -> None:
+    """Print the search's figures: moves, cost, proof, make-up, and distances from the corpus."""
     lines = [*_search_lines(result), *_distance_lines(result)]
     if result.detail:
         lines.append(("detail", f"from {', '.join(dict.fromkeys(displayed(source.clip) for source in result.detail))}"))
     lines.insert(1, ("pace", _tempo(result)))
-    lines += [("seen", sentence) for sentence in _beyond(result.shown)]
-    lines += [("without", format_what_if(one)) for one in result.what_if]
     for name, line in lines:
         click.echo(f"{name:10}{line}")
-    print_written(files)
-
-
-# What is said of what a viewer sees, with the greatest value, the corpus's greatest and the part of the body.
-_SEEN = {
-    "balance": "it leans {0:.2f} m over what it stands on, in the corpus {1:.2f} at most",
-    "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
-    "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
-    "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
-    "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
-}
-
-
-def _beyond(shown: Mapping[str, Sighting]) -> list[str]:
-    """Say in words what a viewer sees in a movement that goes beyond all that the corpus shows."""
-    return [
-        _SEEN[name].format(one.value, one.most, displayed(one.part)) for name, one in shown.items() if one.is_beyond
-    ]
 
 
 def _tempo(result: Tween) -> str:
@@ -173,9 +173,9 @@ def format_what_if(one: WhatIf) -> str:
 
 
 def print_written(files: Sequence[Path]) -> None:
-    """Print the names of the files that were written, if any."""
-    if files:
-        click.echo(f"written   {', '.join(displayed_path(file) for file in files)}")
+    """Print the names of the files that were written."""
+    names = ", ".join(displayed_path(file) for file in files)
+    click.echo(f"written   {names or 'nothing: name a file by -o'}")
 
 
 def _search_lines(result: Tween) -> list[tuple[str, str]]:
@@ -220,24 +220,27 @@ def _shares(result: Tween) -> str:
     return ": " + ", ".join(f"{name} {number / len(seen):.0%}" for name, number in times.most_common())
 
 
-def print_alternatives(results: Sequence[Tween], files: Sequence[Path]) -> None:
-    """Print alternative tweens, a line each, with the share by which each differs from those above.
+def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_details: bool = False) -> None:
+    """Print alternative tweens in plain words, each with the share by which it differs from those above.
 
-    What restrictions cost the first follows, where that was asked.
+    With details a table of their costs follows. What restrictions cost the first follows, where that was asked.
     """
-    click.echo(
-        "    moves  seconds      cost  at least     gap  proven       attested  bridged  differs from those above"
-    )
+    from motionmind.tween.headline import headline
+
     for number, result in enumerate(results, start=1):
         differs = ", ".join(f"{share:.0%}" for share in result.differs)
-        line = (
-            f"{number:2}  {result.moves:5}  {result.motion.times[-1]:7.2f}  {result.cost:8.3f}  "
-            f"{result.lower_bound:8.3f}  {result.gap:6.2%}  {result.status:11}  {result.attested:8.1%}  "
-            f"{len(result.bridges):7}  {differs}"
-        )
-        click.echo(line.rstrip())
+        click.echo(f"{number:2}  {headline(result)}{f'; differs by {differs}' if differs else ''}")
+        _print_beyond(result, "    ")
     for one in results[0].what_if:
         click.echo(f"without   {format_what_if(one)}")
+    if with_details:
+        click.echo("    moves  seconds      cost  at least     gap  proven       attested  bridged")
+        for number, result in enumerate(results, start=1):
+            click.echo(
+                f"{number:2}  {result.moves:5}  {result.motion.times[-1]:7.2f}  {result.cost:8.3f}  "
+                f"{result.lower_bound:8.3f}  {result.gap:6.2%}  {result.status:11}  {result.attested:8.1%}  "
+                f"{len(result.bridges):7}"
+            )
     print_written(files)
 
 
@@ -322,22 +325,29 @@ def print_origins(summary: dict[str, Any]) -> None:
         )
 
 
-def print_check(check: dict[str, Any]) -> None:
-    """Print what `Engine.check` found: states, edges and out-degree of each joint, share of pairs joined, faults."""
+def print_check(check: dict[str, Any], *, with_states: bool = True, with_details: bool = False) -> None:
+    """Print what `Engine.check` found: size, states of each joint, share of pairs joined, faults.
+
+    Args:
+        check: what was found.
+        with_states: whether to print a line for each joint, with its states, edges and out-degree.
+        with_details: whether to print a line for each recording with faults.
+    """
     rate = f"{check['rate']:g} a second" if check["rate"] else "keyframes"
     click.echo(
         f"{displayed(check['name'])}: {count(len(check['clips']), 'clip')}, {check['postures']} postures ({rate}), "
         f"{displayed(check['skeleton'])}"
     )
     print_origins(check)
-    width = max(len(displayed(joint)) for joint in check["states"])
-    click.echo(f"{'joint':{width}}  states  edges  out-degree")
-    for joint, states in check["states"].items():
-        click.echo(
-            f"{displayed(joint):{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}"
-        )
+    if with_states:
+        width = max(len(displayed(joint)) for joint in check["states"])
+        click.echo(f"{'joint':{width}}  states  edges  out-degree")
+        for joint, states in check["states"].items():
+            click.echo(
+                f"{displayed(joint):{width}}  {states:6}  {check['edges'][joint]:5}  {check['out_degree'][joint]:10.2f}"
+            )
     click.echo(f"{check['joinable']:.1%} of {check['pairs']} random pairs of postures can be joined without a bridge")
-    _print_faults(check["faults"], check["repairs"])
+    _print_faults(check["faults"], check["repairs"], with_details)
 
 
 def format_repairs(summary: dict[str, Any]) -> str:
@@ -347,36 +357,62 @@ def format_repairs(summary: dict[str, Any]) -> str:
     return f"{clips}, {exact} stretches put back exactly, {len(summary['repairs']) - exact} reconstructed"
 
 
-def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, Any]]) -> None:
-    """Print how often joints jump in each recording, and what became of it."""
-    if faults:
-        click.echo(
-            f"{count(len(faults), 'flip')} in the recordings, where a joint turns too far in one frame (all: --json):"
-        )
+def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, Any]], with_details: bool) -> None:
+    """Print how often joints jump in the recordings, and what became of it; with details for each recording."""
+    if not faults:
+        return
     clips = list(dict.fromkeys(fault["clip"] for fault in faults))
-    for clip in clips[:MOST_CLIPS]:
-        ends = Counter(fault["repair"] for fault in faults if fault["clip"] == clip)
-        parts = [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
-        parts += [f"{ends['none']} left"] * (ends["none"] > 0)
+    total = _format_faults(faults, [one for one in repairs if not one["exact"]])
+    more = ":" if with_details else " (--details lists them)"
+    click.echo(f"{count(len(clips), 'recording')} with joints that turn too far in one frame, {total}{more}")
+    for clip in clips if with_details else ():
         parts_of_clip = re.compile(rf"{re.escape(clip)}(\.\d+)?")
         stretches = [one for one in repairs if parts_of_clip.fullmatch(one["clip"]) and not one["exact"]]
-        frames = {frame for one in stretches for frame in range(one["start"], one["stop"])}
-        if frames:
-            joints = enumerated(dict.fromkeys(displayed(one["joint"]) for one in stretches), 4)
-            parts.append(f"{count(len(frames), 'frame')} reconstructed ({joints})")
-        click.echo(f"  {displayed(clip)}: {count(ends.total(), 'flip')}, {', '.join(parts)}")
-    if len(clips) > MOST_CLIPS:
-        click.echo(f"  and {count(len(clips) - MOST_CLIPS, 'more clip')}")
+        joints = enumerated(dict.fromkeys(displayed(one["joint"]) for one in stretches), 4)
+        here = _format_faults([fault for fault in faults if fault["clip"] == clip], stretches)
+        click.echo(f"  {displayed(clip)}: {here}{f' ({joints})' if joints else ''}")
 
 
-def show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
-    """Print our own warnings as notes, and drop others, which are for developers: a `warnings.showwarning`."""
-    if issubclass(category, MotionMindWarning):
-        note(str(message))
+def _format_faults(faults: Sequence[dict[str, Any]], stretches: Sequence[dict[str, Any]]) -> str:
+    """Format flips and stretches that were reconstructed: "3 flips, 2 put back exactly, 9 frames reconstructed"."""
+    ends = Counter(fault["repair"] for fault in faults)
+    parts = [count(len(faults), "flip")]
+    parts += [f"{ends['put back']} put back exactly"] * (ends["put back"] > 0)
+    parts += [f"{ends['none']} left"] * (ends["none"] > 0)
+    frames = {(one["clip"], frame) for one in stretches for frame in range(one["start"], one["stop"])}
+    parts += [f"{count(len(frames), 'frame')} reconstructed"] * bool(frames)
+    return ", ".join(parts)
+
+
+class Warned:
+    """Shows our own warnings as notes, and drops others, which are for developers.
+
+    A command with `--details` prints each of them only where that is given; else the first few, and how many more.
+    """
+
+    def __init__(self) -> None:
+        self._shown = self._left = 0
+
+    def show(
+        self,
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        """Show a warning: a `warnings.showwarning`."""
+        if not issubclass(category, MotionMindWarning):
+            return
+        context = click.get_current_context(silent=True)
+        self._shown += 1
+        if context and context.params.get("details") is False and self._shown > _FEW:
+            self._left += 1
+        else:
+            note(str(message))
+
+    def finish(self) -> None:
+        """Say how many warnings were not shown."""
+        if self._left:
+            note(f"{count(self._left, 'more warning')} like these (--details prints them)")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import check_outputs
-from motionmind.cli.options import HOME, JSON, Section, command, given_option, option
+from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, output
 from motionmind.cli.printing import Interruption, note, print_written
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching
 from motionmind.cli.tweens import INTERRUPTED
@@ -22,13 +22,7 @@ if TYPE_CHECKING:
 
 @command("motionmind review variation.json --approve 6,7 --discard 8 --list")
 @click.argument("file", type=FILE)
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    help="Write the edited variation: .json  [default: FILE itself]",
-)
+@output("Write the edited variation: .json  [default: FILE itself]", required=False)
 @option("--list", "listing", section=Section.OUTPUT, is_flag=True, help="Print the seams, after the edits.")
 @JSON
 @option("--undo", section=Section.EDITS, count=True, help="Take back the last edit; repeat for earlier ones.")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, write
-from motionmind.cli.options import OUTPUTS, Section, command, option
+from motionmind.cli.files import MOVEMENT, check_outputs, write_all
+from motionmind.cli.options import OUTPUTS, Section, command, option, output, outputs
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE, RATE
 from motionmind.cli.words import parse_tolerances
@@ -19,7 +19,7 @@ _TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
 
 @command("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
-@option("-o", "--output", section=Section.OUTPUT, type=FILE, required=True, help=f"Write {OUTPUTS}.")
+@outputs(f"Write {OUTPUTS}.")
 @option(
     "--fps", section=Section.OUTPUT, type=RATE, help="Resample to N frames per second  [default: a frame a posture]"
 )
@@ -27,7 +27,7 @@ _TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
 @option(
     "--posture", section=Section.PART, metavar="NAME", help="Take a posture that the score names, instead of a clip."
 )
-def compose(score: Path, output: Path, clip: str | None, posture: str | None, fps: float | None) -> None:
+def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: str | None, fps: float | None) -> None:
     """Turn a score, movement written as text, into a motion.
 
     docs/notation.md explains the language of scores.
@@ -39,28 +39,26 @@ def compose(score: Path, output: Path, clip: str | None, posture: str | None, fp
         raise click.UsageError("give --clip or --posture, not both")
     if fps and posture:
         raise click.UsageError("--fps is for clips, not for a posture")
-    check_outputs([(output, MOVEMENT + PICTURES)], [score])
+    check_outputs([(path, MOVEMENT + PICTURES) for path in outputs], [score])
+    names = ", ".join(map(displayed_path, outputs))
     if posture:
         found = notation.posture(read_score(score), posture)
-        write(output, found)
-        click.echo(
-            f"{displayed_path(output)}: {displayed(posture)}, {len(found.skeleton)} joints "
-            f"({displayed(found.skeleton.name)})"
-        )
+        write_all(outputs, found)
+        click.echo(f"{names}: {displayed(posture)}, {len(found.skeleton)} joints ({displayed(found.skeleton.name)})")
         return
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
     motion = motion if fps is None else motion.resample(fps)
-    write(output, motion)
+    write_all(outputs, motion)
     click.echo(
-        f"{displayed_path(output)}: {displayed(motion.name)}, {count(len(motion), 'frame')} in {seconds:.1f} s, "
+        f"{names}: {displayed(motion.name)}, {count(len(motion), 'frame')} in {seconds:.1f} s, "
         f"{displayed(motion.skeleton.name)}"
     )
 
 
 @command("motionmind library corpora/karate/*.score -o mine.toml --tolerance 12 --tolerance hip=8")
 @click.argument("scores", type=FILE, nargs=-1, required=True)
-@option("-o", "--output", section=Section.OUTPUT, type=FILE, required=True, help="Write the library: .toml.")
+@output("Write the library: .toml.")
 @option(
     "--tolerance",
     section=Section.STATES,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, option
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs
 from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import FILE, Whole
@@ -43,8 +43,11 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     metavar="NAME",
     help="Take this corpus, by name or folder  [default: that of A and B, if they are named postures of one]",
 )
-@option("-o", "--output", section=Section.OUTPUT, type=FILE, help=f"Write {OUTPUTS}.")
+@outputs(f"Write {OUTPUTS}.", required=False)
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
+@option(
+    "--details", section=Section.OUTPUT, is_flag=True, help="Print costs, states and distances from the corpus, too."
+)
 @option("--problem", section=Section.OUTPUT, type=FILE, help="Write the problem that was solved: .cfn, for toulbar2.")
 @option(
     "--alternatives",
@@ -77,8 +80,9 @@ def tween(
     a: str,
     b: str,
     corpus: str | None,
-    output: Path | None,
+    outputs: tuple[Path, ...],
     report: Path | None,
+    details: bool,
     problem: Path | None,
     home: Path | None,
     alternatives: int | None,
@@ -106,24 +110,24 @@ def tween(
 
     named = parse_posture(a, home), parse_posture(b, home)
     around = tuple(parse_frames(word, home) if word else None for word in (before, after))
-    outputs = _Outputs(output, report, problem, alternatives)
+    files = _Files(outputs, report, problem, alternatives)
     read_from = [path for one in (*named, *around) if one for path in one.source.paths]
-    outputs.check([*read_from, *via_files(options, home)])
+    files.check([*read_from, *via_files(options, home)])
     request = request_options(options, home) | {"what_if": what_if}
     engine = Engine.load(corpus or _corpus_of(named, home), home)
     start, request["before"] = read_end(named[0], around[0], "before", home)
     end, request["after"] = read_end(named[1], around[1], "after", home)
     announce_compilation()
-    with _diagnosing(outputs), Interruption() as interruption:
-        results = _find_tweens(engine, (start, end), request, outputs.count, interruption)
-    files, reports = outputs.write(results)
-    if outputs.is_report_printed:
+    with _diagnosing(files), Interruption() as interruption:
+        results = _find_tweens(engine, (start, end), request, files.count, interruption)
+    written, reports = files.write(results)
+    if files.is_report_printed:
         printed = list(map(plain, reports))
         click.echo(json.dumps(printed[0] if alternatives is None else printed))
     elif alternatives is None:
-        print_tween(results[0], files)
+        print_tween(results[0], written, with_details=details)
     else:
-        print_alternatives(results, files)
+        print_alternatives(results, written, with_details=details)
     if interruption.is_requested:
         click.get_current_context().exit(INTERRUPTED)
 
@@ -162,17 +166,17 @@ def _find_tweens(
 
 
 @dataclass(frozen=True)
-class _Outputs:
-    """The files that the command writes: for each alternative a motion, a report and a problem.
+class _Files:
+    """The files that the command writes: for each alternative motions, a report and a problem.
 
     Attributes:
-        motion: the file of the motion.
+        motions: the files of the motion.
         report: the file of the report; - to print it.
         problem: the file of the problem.
         alternatives: how many tweens are asked for; None for one, whose files are not numbered.
     """
 
-    motion: Path | None
+    motions: tuple[Path, ...]
     report: Path | None
     problem: Path | None
     alternatives: int | None
@@ -189,16 +193,13 @@ class _Outputs:
 
     def check(self, sources: Sequence[Path]) -> None:
         """Check that all files can be written, and are not among `sources`."""
-        suffixes: tuple[tuple[str, ...], ...] = (MOVEMENT + PICTURES, (), (".cfn",))
-        check_outputs(
-            [
-                (path, allowed)
-                for number in range(1, self.count + 1)
-                for path, allowed in zip(self._files_of(number), suffixes, strict=True)
-                if path
-            ],
-            sources,
-        )
+        outputs: list[tuple[Path, tuple[str, ...]]] = []
+        for number in range(1, self.count + 1):
+            motions, report, problem = self._files_of(number)
+            outputs += [(path, MOVEMENT + PICTURES) for path in motions]
+            outputs += [(report, ())] if report else []
+            outputs += [(problem, (".cfn",))] if problem else []
+        check_outputs(outputs, sources)
 
     def write(self, results: Sequence[Tween]) -> tuple[list[Path], list[TweenReport]]:
         """Write all that was asked for, or nothing if one file fails; return the files, and the reports if asked."""
@@ -206,17 +207,18 @@ class _Outputs:
         from motionmind.tween.report import encode_report
         from motionmind.tween.result import report_of
 
-        files = [path for number in range(1, len(results) + 1) for path in self._files_of(number) if path]
+        files: list[Path] = []
         reports = []
         with all_or_none() as written:
             for number, result in enumerate(results, start=1):
-                motion, report, problem = self._files_of(number)
-                if motion:
-                    write(motion, result.motion)
+                motions, report, problem = self._files_of(number)
+                files += [*motions, *(path for path in (report, problem) if path)]
+                for path in motions:
+                    write(path, result.motion)
                 if problem:
                     write_atomically(problem, result.problem().encode())
                 if self.report:
-                    reports.append(report_of(result, sha256_of(written, motion)))
+                    reports.append(report_of(result, sha256_of(written, next(iter(motions), None))))
                 if report:
                     write_atomically(report, encode_report(reports[-1]))
         return files, reports
@@ -232,19 +234,23 @@ class _Outputs:
         elif report:
             write_atomically(report, f"{text}\n".encode())
 
-    def _files_of(self, number: int) -> list[Path | None]:
-        """Return the motion's, the report's and the problem's file of one tween, None for those not to be written."""
-        paths = (self.motion, None if self.is_report_printed else self.report, self.problem)
-        return [path and numbered(path, number, self.alternatives) for path in paths]
+    def _files_of(self, number: int) -> tuple[list[Path], Path | None, Path | None]:
+        """Return the motion's files, the report's and the problem's of one tween, None for those not to be written."""
+        report = None if self.is_report_printed else self.report
+        return (
+            [numbered(path, number, self.alternatives) for path in self.motions],
+            report and numbered(report, number, self.alternatives),
+            self.problem and numbered(self.problem, number, self.alternatives),
+        )
 
 
 @contextmanager
-def _diagnosing(outputs: _Outputs) -> Iterator[None]:
+def _diagnosing(files: _Files) -> Iterator[None]:
     """Write the diagnosis in place of the report if there is no path."""
     try:
         yield
     except NoPathError as error:
-        outputs.write_diagnosis(error)
+        files.write_diagnosis(error)
         raise
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli.files import MOVEMENT, check_outputs, write
-from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, reading
+from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
     Interruption,
     announce_compilation,
@@ -41,14 +41,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 @command("motionmind vary macarena --attractor rossler -o variation.json")
 @click.argument("source", metavar="PIECE")
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    required=True,
-    help=f"Write {OUTPUTS}; review takes .json.",
-)
+@outputs(f"Write {OUTPUTS}; review takes .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
 @option(
@@ -164,7 +157,7 @@ def vary(
     context: click.Context,
     /,
     source: str,
-    output: Path,
+    outputs: tuple[Path, ...],
     report: Path | None,
     as_json: bool,
     attractor: str,
@@ -186,10 +179,10 @@ def vary(
 
     if report == Path("-"):
         report, as_json = None, True
-    files = [output, *([report] if report else [])]
-    suffixes: tuple[tuple[str, ...], ...] = (MOVEMENT + PICTURES, ())
+    files: list[tuple[Path, tuple[str, ...]]] = [(path, MOVEMENT + PICTURES) for path in outputs]
+    files += [(report, ())] if report else []
     named = parse_movement(source, home)
-    check_outputs(list(zip(files, suffixes, strict=False)), [*named.source.paths, *via_files(options, home)])
+    check_outputs(files, [*named.source.paths, *via_files(options, home)])
     flow = flow_of(attractor, **parse_parameters(parameter))
     request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
     trajectory = {key: options.pop(key) for key in ("start", "skip", "step", "transient", "length", "alternatives")}
@@ -206,11 +199,11 @@ def vary(
             **trajectory,
             **request,
         )
-    _write(files, variation, request["fps"])
+    _write(outputs, report, variation, request["fps"])
     print_variation(variation, as_json)
     _print_advice(variation, engine)
     if not as_json:
-        print_written(files)
+        print_written([path for path, _ in files])
     if interruption.is_requested:
         context.exit(INTERRUPTED)
 
@@ -219,14 +212,7 @@ def vary(
 @option(
     "--of", "variation", section=Section.INPUT, type=FILE, required=True, help="Draw this variation, which vary wrote."
 )
-@option(
-    "-o",
-    "--output",
-    section=Section.OUTPUT,
-    type=FILE,
-    required=True,
-    help="Write a picture (.png, .svg) or a page (.html).",
-)
+@output("Write a picture (.png, .svg) or a page (.html).")
 def attractor(variation: Path, output: Path) -> None:
     """Draw a variation on its attractor.
 
@@ -298,24 +284,24 @@ def _read_facing(corpus: str, home: Path | None) -> Facing:
     return facing
 
 
-def _write(files: Sequence[Path], variation: Variation, fps: float) -> None:
-    """Write a variation, and its report if there is a second file, or nothing if one of them fails.
+def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, fps: float) -> None:
+    """Write a variation, and its report if asked, or nothing if one of the files fails.
 
     JSON holds the whole variation, other files its movement, resampled if their frames must be even in time.
     """
     from motionmind.formats import write_atomically
     from motionmind.variation.variation_json import write_variation
 
-    output, *reports = files
-    suffix = output.suffix.lower()
     with all_or_none() as written:
-        if suffix == ".json":
-            write_variation(output, variation)
-        else:
-            motion = variation.motion()
-            write(output, motion.resample(fps) if suffix in _EVEN else motion)
-        for report in reports:
-            told = variation.report() | {"motion_sha256": sha256_of(written, output)}
+        for path in outputs:
+            suffix = path.suffix.lower()
+            if suffix == ".json":
+                write_variation(path, variation)
+            else:
+                motion = variation.motion()
+                write(path, motion.resample(fps) if suffix in _EVEN else motion)
+        if report:
+            told = variation.report() | {"motion_sha256": sha256_of(written, outputs[0])}
             write_atomically(report, f"{json.dumps(told)}\n".encode())
 
 

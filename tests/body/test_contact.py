@@ -10,7 +10,15 @@ import pytest
 
 from motionmind._typing import Floats
 from motionmind.body.anatomy_file import anatomy_named
-from motionmind.body.contact import find_floor, floor_height, limb_heights, lowest_height, lowest_point, skating
+from motionmind.body.contact import (
+    feet_that_stay,
+    find_floor,
+    floor_height,
+    limb_heights,
+    lowest_height,
+    lowest_point,
+    skating,
+)
 from motionmind.body.human import BODIES, human23
 from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
@@ -115,3 +123,21 @@ def test_a_foot_that_is_put_down_or_lifted_does_not_skate() -> None:
     for heights, expected in (((0.0, 0.0), 1.0), ((0.0, 0.06), 0.0), ((0.06, 0.0), 0.0), ((0.04, 0.04), 1.0)):
         root = np.array([[0.0, low + heights[0], 0.0], [0.1, low + heights[1], 0.0]])
         assert skating(body, rest, root) == expected
+
+
+def test_a_foot_stays_that_is_on_the_floor_all_the_time_and_hardly_slides() -> None:
+    body = human23()
+    frames, low = 30, 0.971
+    at_rest = np.tile(rot.IDENTITY, (frames, 23, 1))
+    level = np.linspace(0.0, 1.0, frames)[:, None] * [1.0, 0.0, 0.0] + [0.0, low, 0.0]
+    for slides, stays in ((0.0, True), (0.045, True), (0.055, False), (1.0, False)):
+        root = np.array([0.0, low, 0.0]) + slides * (level - [0.0, low, 0.0])
+        assert feet_that_stay(body, at_rest, root).tolist() == [stays, stays], slides
+    up = np.tile([0.0, low, 0.0], (frames, 1))
+    up[10, 1] += 0.06  # a hop, down in the same place
+    assert feet_that_stay(body, at_rest, up).tolist() == [False, False]
+    assert feet_that_stay(body, at_rest, up + np.array([0.0, 0.3, 0.0]), 0.3).tolist() == [False, False]
+    assert feet_that_stay(body, at_rest, level * [0.0, 1.0, 0.0] + [0.0, 0.3, 0.0], 0.3).tolist() == [True, True]
+    kick = at_rest.copy()
+    kick[:, body.index("right_hip")] = rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), -np.linspace(0.0, 1.0, frames))
+    assert feet_that_stay(body, kick, np.tile([0.0, low, 0.0], (frames, 1))).tolist() == [True, False]

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,7 @@ def files_under(folder: Path) -> dict[str, bytes]:
 
 def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     ran = run(
-        *("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.bvh"),
+        *("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.bvh", "-o", "again.json", "--details"),
         *("--report", "report.json", "--problem", "problem.cfn", "--fps", "50"),
     )
     assert ran.code == 0
@@ -84,8 +85,9 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert ran.err.count("\n") == 2
     report = json.loads(Path("report.json").read_text("utf-8"))
     table = {line.split()[0]: line for line in ran.out.splitlines()}
-    table.pop("seen", None)  # where it goes beyond the corpus
+    table.pop("beware", None)  # where it goes beyond the corpus
     assert list(table) == [
+        "6",
         "moves",
         "pace",
         "cost",
@@ -101,7 +103,8 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert f" {report['moves']}, in " in table["moves"]
     assert f"{report['cost']:.3f}" in table["cost"]
     assert f"{report['lower_bound']:.3f}, gap {report['gap']:.2%}" in table["proven"]
-    assert table["written"].endswith("tween.bvh, report.json, problem.cfn")
+    assert table["written"].endswith("tween.bvh, again.json, report.json, problem.cfn")
+    assert len(read_motion("again.json")) == len(read_motion("tween.bvh"))
     motion = read_motion("tween.bvh")
     assert motion.fps == pytest.approx(50.0)
     assert np.allclose(rot.angle(motion.rotations[-1], read_posture(FIFTH).rotations), 0.0, atol=1e-6)
@@ -109,18 +112,71 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     assert {"problem", "variables", "functions"} <= set(problem)
 
 
+def test_a_tween_is_told_in_plain_words_and_that_nothing_is_written(run: Run) -> None:
+    ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet")
+    assert ran.out.splitlines() == [
+        "6 moves in 2.3 s, every one seen in ballet; proven the best of its kind; the left foot stays in place",
+        "written   nothing: name a file by -o",
+    ]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "sheet ballet/fifth -o a.png -o b.png",
+        "graph --corpus ballet --joint left_hip -o a.svg -o b.svg",
+        "postures ballet -o a.png -o b.png",
+    ],
+)
+def test_a_second_file_is_not_ignored(line: str, run: Run, tmp_path: Path) -> None:
+    ran = run(*line.split())
+    assert ran.code == 2
+    assert "-o is given 2 times, and one file is written; give it once" in ran.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_several_files_are_written_or_none(run: Run, tmp_path: Path) -> None:
+    write_motion("clip.json", clip())
+    score = BALLET / "allegro.score"
+    for words in (
+        ("posture", "clip.json@3", "-o", "a.json", "-o", "a.png"),
+        ("render", "clip.json@3", "-o", "r.svg", "-o", "r.png"),
+        ("compose", score, "--clip", "jump", "-o", "c.json", "-o", "c.npz", "--fps", 30),
+        ("vary", "clip.json", "-o", "v.json", "-o", "v.bvh", "--length", 9),
+    ):
+        ran = run(*words)
+        assert ran.code == 0, ran.err
+        assert all(Path(word).stat().st_size for before, word in pairwise(map(str, words)) if before == "-o")
+    assert run("posture", "clip.json@3", "-o", "x.json", "-o", "nowhere/x.png").code == 2
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_of_many_warnings_a_few_are_printed(run: Run) -> None:
+    posture = json.loads(ARABESQUE.read_text("utf-8"))
+    posture["rotations"]["left_hip"] = [2.0 * number for number in posture["rotations"]["left_hip"]]
+    frame = [posture["rotations"][joint] for joint in clip().skeleton.names]
+    motion = {"format": "motionmind-motion", "version": 1, "skeleton": "human23", "times": [0.0, 0.2]}
+    motion |= {"root": [posture["root"]] * 2, "rotations": [frame] * 2}
+    for number in range(9):
+        Path(f"take{number}.json").write_text(json.dumps(motion), "utf-8")
+    takes = [f"take{number}.json" for number in range(9)]
+    few, all_of_them = (run("corpus", "build", "mine", *takes, *more).err.splitlines() for more in ((), ["--details"]))
+    assert few == [*all_of_them[:3], "note: 6 more warnings like these (--details prints them)"]
+    assert len(all_of_them) == 9
+
+
 def test_a_tween_says_what_a_viewer_sees_beyond_the_corpus(capsys: pytest.CaptureFixture[str]) -> None:
     engine = Engine.load("ballet")
     motion = engine.corpus.motion(engine.corpus.clips[0])
     tween = engine.tween(motion.posture(0), motion.posture(1))
     print_tween(tween, [])
-    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("seen")]
+    assert not [line for line in capsys.readouterr().out.splitlines() if line.startswith("beware")]
     away = np.linspace(0.0, 9.0, len(tween.motion))[:, None] * [1.0, 0.0, 0.0]
     carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + away))
     print_tween(carried, [])
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("seen"))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("beware"))
     pace = carried.report()["shown"]["pace"]
-    assert line.startswith(f"seen      travel is {pace['value']:.1f} times as fast as")
+    assert line.startswith(f"beware    travel is {pace['value']:.1f} times as fast as")
     assert line.endswith(f"more than {pace['most']:.1f} times")
 
 
@@ -195,7 +251,7 @@ def test_build_takes_a_mix_and_says_what_it_learned(run: Run, tmp_path: Path) ->
     ran = run("corpus", "build", "mine", "walk.bvh", "step.json", "leap.txt", "--rate", 5, "--licence", "CC0")
     assert ran.code == 0
     assert ran.err == "note: walk.bvh: one unit taken as 0.01 m (cm), by the height of the body\n"
-    assert re.match(r"mine: 3 clips, \d+ postures \(5 a second\), walk\njoint +states  edges  out-degree\n", ran.out)
+    assert re.match(r"mine: 3 clips, \d+ postures \(5 a second\), walk\n\d", ran.out)
     assert re.search(r"\d+\.\d% of 2000 random pairs of postures can be joined without a bridge\n", ran.out)
     assert ran.out.endswith(f"built {tmp_path / 'home' / 'corpora' / 'mine'}\n")
     info = run("corpus", "info", "mine", "--json").json
@@ -284,8 +340,10 @@ def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
     }
     assert found["repairs"] == [{"clip": "jump", "joint": "left_hip", "start": 60, "stop": 61, "exact": False}]
     said = run("corpus", "check", "mine").out
-    assert "2 flips in the recordings" in said
-    assert "  jump: 2 flips, 1 frame reconstructed (left_hip)\n" in said
+    flips = "1 recording with joints that turn too far in one frame, 2 flips, 1 frame reconstructed"
+    assert said.endswith(f"\n{flips} (--details lists them)\n")
+    said = run("corpus", "check", "mine", "--details").out
+    assert said.endswith(f"\n{flips}:\n  jump: 2 flips, 1 frame reconstructed (left_hip)\n")
     assert "repaired   1 clip, 0 stretches put back exactly, 1 reconstructed\n" in run("corpus", "info", "mine").out
     assert built(run, "jump.bvh", "plain.bvh", "--flip-angle", 180)["faults"] == []
 

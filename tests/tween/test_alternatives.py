@@ -120,12 +120,14 @@ def test_what_contradicts_is_refused(ballet: Engine) -> None:
 
 def test_the_command_line_prints_a_table_and_says_where_there_are_no_more(run: Run) -> None:
     asked = ("tween", A, B, "--corpus", "ballet", "--alternatives", 3)
-    table = run(*asked).out.splitlines()
-    assert table[0].split("  ")[-1] == "differs from those above"
-    assert [line.split()[0] for line in table[1:]] == ["1", "2", "3"]
-    assert table[1].endswith("optimal        100.0%        0")
-    shares = [int(word.rstrip("%,")) for word in table[3].split()[-2:]]
+    lines = run(*asked, "--details").out.splitlines()
+    assert [line.split()[0] for line in lines] == ["1", "2", "3", "moves", "1", "2", "3", "written"]
+    assert lines[0].endswith("; proven the best of its kind; the left foot stays in place")
+    assert " of those that differ so much" in lines[1]
+    shares = [int(word.rstrip("%,")) for word in lines[2].split()[-2:]]
     assert min(shares) >= 20
+    assert lines[4].endswith("optimal        100.0%        0")
+    assert run(*asked).out.splitlines() == [*lines[:3], lines[-1]]
     ran = run(*asked, "--differ", 0.9, "-o", "out.json")
     assert ran.code == 0
     assert "note: 2 of 3 found: no path of 6 moves was found that differs by 90.0% from each of 2" in ran.err

@@ -1,0 +1,104 @@
+"""A tween in a few words: what a choreographer wants to know of it first, and where a viewer would wince."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from motionmind.body.contact import feet_that_stay, find_feet
+from motionmind.body.motion import Motion
+from motionmind.body.plausibility import at_rate, floor_of
+from motionmind.display import displayed
+from motionmind.errors import enumerated
+from motionmind.tween.result import Tween
+
+_FAR = 30.0  # degrees; nobody sees that a smaller move of a joint is a bridge
+_SIDES = ("left", "right")
+
+# Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body.
+_SHOWN = {
+    "balance": "it leans {0:.2f} m over what it stands on, in the corpus {1:.2f} at most",
+    "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
+    "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
+    "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
+    "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
+}
+
+
+def headline(tween: Tween) -> str:
+    """Return a tween in a line: its length, whether the corpus knows its moves, what is proven, what the feet do.
+
+    >>> from motionmind import Engine
+    >>> from motionmind.tween.headline import headline
+    >>> engine = Engine.load("ballet")
+    >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+    >>> headline(engine.tween(motion.posture(0), motion.posture(3)))
+    '3 moves in 1.5 s, every one seen in ballet; proven the best of its kind; feet stay in place'
+    """
+    if tween.moves == 0:
+        return "no move: A and B are the same posture"
+    parts = [f"{_count(tween.moves, 'move')} in {tween.motion.times[-1]:.1f} s, {_seen(tween)}", _proof(tween)]
+    return "; ".join([*parts, *_feet(tween.motion)])
+
+
+def beyond(tween: Tween) -> list[str]:
+    """Say where a tween goes beyond all that the corpus shows, so that a viewer would wince; each in a line."""
+    said = [
+        _SHOWN[name].format(one.value, one.most, displayed(one.part))
+        for name, one in tween.shown.items()
+        if one.is_beyond
+    ]
+    if tween.bridges:
+        far = max(tween.bridges, key=lambda bridge: bridge.degrees)
+        if far.degrees >= _FAR:
+            said.append(
+                f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees as in no clip, in move {far.move + 1}"
+            )
+    return said
+
+
+def _seen(tween: Tween) -> str:
+    """Say whether the corpus attests the moves."""
+    sources = (source for row in tween.sources for source in row if source is not None)
+    times = Counter(source.corpus for source in sources)
+    corpora = enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
+    if not tween.bridges:
+        return f"{'seen' if tween.moves == 1 else 'every one seen'} in {corpora}"
+    joints = dict.fromkeys(displayed(bridge.joint) for bridge in tween.bridges)
+    return f"seen in {corpora} but for {_count(len(tween.bridges), 'move')} of {enumerated(joints, 3)}"
+
+
+def _proof(tween: Tween) -> str:
+    """Say what is proven of the cost."""
+    kind = "of those that differ so much" if tween.differs else "of its kind"
+    if tween.status == "sampled":
+        return "drawn at random"
+    if tween.status == "optimal":
+        return f"proven the best {kind}"
+    ended = "ended early, " * (tween.status == "interrupted")
+    if tween.lower_bound <= 0.0:
+        return f"{ended}not proven to be near the best"
+    percent = math.ceil(100.0 * (tween.cost / tween.lower_bound - 1.0) - 1e-6)
+    return f"{ended}proven to cost at most {percent}% more than the best {kind}"
+
+
+def _feet(motion: Motion) -> list[str]:
+    """Say which feet stay in their places, if any do."""
+    feet = [motion.skeleton.names[joint] for joint in find_feet(motion.skeleton)]
+    if len(motion) < 2 or not feet:
+        return []
+    sampled = at_rate(motion)
+    where = sampled.skeleton, sampled.rotations, sampled.root
+    staying = [foot for foot, stays in zip(feet, feet_that_stay(*where, floor_of(*where)), strict=True) if stays]
+    if not staying:
+        return []
+    if len(staying) == len(feet):
+        return ["feet stay in place"]
+    side = staying[0].partition("_")[0]
+    if len(feet) == 2 and side in _SIDES:
+        return [f"the {side} foot stays in place"]
+    return [f"{len(staying)} of {len(feet)} feet stay in place"]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"

@@ -1,0 +1,103 @@
+"""A tween in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motionmind.learned.plausibility import Sighting
+from motionmind.names.finding import find_posture
+from motionmind.tween.certificate import Bridge
+from motionmind.tween.engine import Engine
+from motionmind.tween.headline import beyond, headline
+from motionmind.tween.result import Tween
+
+
+@pytest.fixture(scope="module")
+def tween() -> Tween:
+    return Engine.load("ballet").tween(find_posture("ballet/tendu"), find_posture("ballet/fifth"))
+
+
+def test_it_says_length_making_proof_and_feet(tween: Tween) -> None:
+    assert headline(tween) == (
+        f"{tween.moves} moves in {tween.motion.times[-1]:.1f} s, every one seen in ballet; "
+        "proven the best of its kind; the left foot stays in place"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"status": "bounded", "cost": 102.0, "lower_bound": 100.0},
+            "; proven to cost at most 2% more than the best of",
+        ),
+        (
+            {"status": "bounded", "cost": 100.001, "lower_bound": 100.0},
+            "; proven to cost at most 1% more than the best",
+        ),
+        ({"status": "bounded", "lower_bound": 0.0}, "; not proven to be near the best"),
+        (
+            {"status": "interrupted", "cost": 150.0, "lower_bound": 100.0},
+            "; ended early, proven to cost at most 50% more than the best of its kind",
+        ),
+        ({"status": "sampled"}, "; drawn at random"),
+        ({"differs": (0.3,)}, "; proven the best of those that differ so much"),
+        ({"bridges": (Bridge("neck", 0, 5.0, 5.0),)}, ", seen in ballet but for 1 move of neck; "),
+        (
+            {"bridges": tuple(Bridge(name, 0, 5.0, 5.0) for name in "abcd")},
+            ", seen in ballet but for 4 moves of a, b, c and 1 more; ",
+        ),
+        ({"sources": ()}, ", every one seen in the corpus; "),
+        ({"path": np.zeros((1, 3), np.int32)}, "no move: A and B are the same posture"),
+    ],
+)
+def test_it_says_what_is_so(tween: Tween, changes: dict[str, Any], said: str) -> None:
+    assert said in headline(replace(tween, **changes))
+
+
+def test_feet_that_do_not_stay_are_not_said_to(tween: Tween) -> None:
+    far = np.linspace(0.0, 1.0, len(tween.motion))[:, None]
+    carried = replace(tween, motion=replace(tween.motion, root=tween.motion.root + far * [1.0, 0.0, 0.0]))
+    assert "stay" not in headline(carried)
+    still = replace(tween.motion, rotations=np.tile(tween.motion.rotations[:1], (len(tween.motion), 1, 1)))
+    still = replace(still, root=np.tile(tween.motion.root[:1], (len(tween.motion), 1)))
+    assert headline(replace(tween, motion=still)).endswith("; feet stay in place")
+
+
+def test_an_insect_has_more_feet_than_two() -> None:
+    engine = Engine.load("walk-hexapod")
+    said = headline(engine.tween(find_posture("walk-hexapod/stand"), find_posture("walk-hexapod/groom")))
+    assert "of 6 feet stay in place" in said or said.endswith("feet stay in place")
+
+
+def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
+    tween: Tween, shown: Callable[[Tween, str, Sighting], Tween]
+) -> None:
+    assert beyond(tween) == []
+    for name, sighting, said in (
+        ("balance", Sighting(0.31, 0.1, "m"), "it leans 0.31 m over what it stands on, in the corpus 0.10 at most"),
+        ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.0 times as fast as is fast in the corpus"),
+    ):
+        (sentence,) = beyond(shown(tween, name, sighting))
+        assert sentence.startswith(said)
+        assert beyond(shown(tween, name, replace(sighting, value=0.0))) == []
+    near, far = Bridge("neck", 0, 29.0, 29.0), Bridge("left_hip", 2, 108.2, 108.2)
+    assert beyond(replace(tween, bridges=(near,))) == []
+    assert beyond(replace(tween, bridges=(near, far))) == ["left_hip turns by 108 degrees as in no clip, in move 3"]
+
+
+@pytest.fixture
+def shown() -> Callable[[Tween, str, Sighting], Tween]:
+    """A function that returns a tween which shows a viewer something else."""
+
+    def change(tween: Tween, name: str, sighting: Sighting) -> Tween:
+        changed = replace(tween)
+        changed.__dict__["shown"] = {**tween.shown, name: sighting}  # a cached property
+        return changed
+
+    return change
