@@ -176,6 +176,41 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
     assert times > 3
 
 
+def test_the_open_list_gives_the_least_node_whatever_was_taken_from_its_middle() -> None:
+    rng, count = np.random.default_rng(0), 300
+    nodes = astar._root(cases()[0].trellis, 0.0, count)
+    for node in range(1, count):
+        nodes.key[node], nodes.f[node], nodes.var[node] = rng.integers(0, 40), rng.integers(0, 5), rng.integers(0, 5)
+        astar._open(nodes, node)
+    left = [*rng.permutation(count)]
+    for _ in range(count // 2):
+        astar._close(nodes, left.pop())
+    came = []
+    while nodes.tally[astar._HEAPED] > 0:
+        came.append(int(nodes.heap[0]))
+        astar._close(nodes, came[-1])
+    assert came == sorted(left, key=lambda node: (nodes.key[node], -nodes.var[node], nodes.f[node], node))
+
+
+def test_nodes_are_told_apart_in_whatever_bucket_they_are() -> None:
+    """By variable and whole frontier: half of all frontiers are added, and those are found and no others."""
+    rng = np.random.default_rng(0)
+    trellis = next(case.trellis for case in cases() if case.trellis.chains > 2)
+    nodes, added = astar._root(trellis, 0.0, 2000), set()
+    asked = [(var, frontier) for var in range(2 * trellis.chains) for frontier in np.ndindex(*[3] * trellis.chains)]
+    for var, frontier in asked:
+        if rng.random() < 0.5:
+            chain, nodes.frontier[0] = var % trellis.chains, frontier
+            astar._add(nodes, 0, var, frontier[chain], chain, 0.0, 0.0)
+            added.add((var, frontier))
+    for var, frontier in asked:
+        chain, nodes.frontier[0] = var % trellis.chains, frontier
+        found = astar._find(nodes, 0, var, frontier[chain], chain)
+        assert (found >= 0) == ((var, frontier) in added)
+        if found >= 0:
+            assert (nodes.var[found], tuple(nodes.frontier[found])) == (var, frontier)
+
+
 # --- against the search in plain Python -------------------------------------------------------------------------------
 
 
