@@ -295,6 +295,12 @@ def test_missing_end_sites_leave_no_tip(tmp_path: Path) -> None:
     assert read_bvh(write(tmp_path, text)).skeleton.tips[1].tolist() == [0, 0, 0]
 
 
+def test_of_several_end_sites_the_first_is_the_tip(tmp_path: Path) -> None:
+    end = "    End Site\n    {\n      OFFSET 0 40 0\n    }\n"
+    motion = read_bvh(write(tmp_path, SMALL.replace(end, end + end.replace("0 40 0", "7 8 9"))), unit=1.0)
+    np.testing.assert_array_equal(motion.skeleton.tips[motion.skeleton.index("Spine")], [0.0, 40.0, 0.0])
+
+
 def test_joints_with_0_1_2_channels_and_axes_twice(tmp_path: Path) -> None:
     text = SMALL.replace("CHANNELS 3 Zrotation Xrotation Yrotation", "CHANNELS 0")
     text = text.replace("CHANNELS 3 Xrotation Yrotation Zrotation", "CHANNELS 2 Yrotation Zrotation")

@@ -184,11 +184,13 @@ def test_frames_of_bandai() -> None:
     names = rig_names("Bandai-Namco")
     source = disguise(dance(), names, {}, {name: rig.frames[name] for name in names})
     # As in the files: in its own frame a limb's bone lies along x, to the right along -x.
-    hand = source.skeleton.offsets[source.skeleton.index("Hand_R")]
-    np.testing.assert_allclose(hand / np.linalg.norm(hand), [-1.0, 0.0, 0.0], atol=1e-12)
+    for joint, along in (("Hand_R", -1.0), ("Foot_L", 1.0), ("Foot_R", -1.0)):
+        bone = source.skeleton.offsets[source.skeleton.index(joint)]
+        np.testing.assert_allclose(bone / np.linalg.norm(bone), [along, 0.0, 0.0], atol=1e-12)
     found = to_human23(source)
     same_movement(found, dance(), ("fingers",))
     np.testing.assert_allclose(found.skeleton.offsets, BODY.offsets, atol=1e-12)
+    np.testing.assert_allclose(found.skeleton.tips, BODY.tips, atol=1e-12)  # toes lie otherwise than ankles
 
 
 def test_names_of_bandai_on_a_zero_pose_that_stands() -> None:
@@ -356,6 +358,9 @@ def test_joints_in_a_row_stand_where_the_first_does_and_turn_as_the_last() -> No
     assert np.max(rot.angle(ours[:, BODY.index("thorax")], theirs)) < 1e-7
     theirs = split.global_rotations(rotations)[:, split.index("mixamorig:Spine1")]
     assert np.max(rot.angle(ours[:, BODY.index("lumbar")], theirs)) < 1e-7
+    there = split.positions(rotations, source.root)[:, split.index("mixamorig:Spine")]
+    here = found.skeleton.positions(found.rotations, found.root)[:, BODY.index("lumbar")]
+    np.testing.assert_allclose(here, there, atol=1e-9)
     # The arms hang as they hung.
     for joint in ("left_wrist", "right_shoulder"):
         i = BODY.index(joint)
