@@ -227,6 +227,18 @@ def test_ties_go_to_the_lowest_index() -> None:
     assert space.assign(-between).tolist() == [[0], [1]]
 
 
+@pytest.mark.parametrize("further", [-1e-12, 0.0, 1e-12])
+def test_ties_but_for_rounding_go_to_the_lowest_index_too(further: float) -> None:
+    centres = rot.about_vertical(np.array([-0.5, 0.5 + further]))
+    assert states_module.nearest(rot.about_vertical(np.zeros((1,))), centres)[0].tolist() == [0]
+
+
+def test_a_state_is_in_the_middle_of_its_samples_on_both_sides_of_half_a_turn_too() -> None:
+    about = rot.canonical(rot.about_vertical(np.radians([172.0, 174.0, 176.0, 182.0, 188.0])))
+    (centre,) = Codebook(15.0).fit(["a"], about[:, None]).of("a")
+    assert np.degrees(rot.angle(centre, rot.about_vertical(np.radians(178.4)))) < 0.1
+
+
 def test_small_blocks_give_the_same_as_one() -> None:
     q = random_rotations(500, 1)[:, 0]
     centres = Codebook(10.0).fit(["a"], q[:, None]).of("a")

@@ -40,7 +40,8 @@ from motionmind.metrics import (
     skating,
     sparc,
 )
-from motionmind.metrics.measure import at_rate, measure
+from motionmind.metrics.measure import _pieces, at_rate, measure
+from motionmind.metrics.style import features
 from motionmind.tween.engine import Engine
 
 seeds = st.integers(0, 2**32 - 1)
@@ -397,6 +398,16 @@ def test_style_is_told_by_how_joints_move_and_not_by_where_they_are() -> None:
     away = rot.mul(rot.exp(np.array([1.0, -2.0, 0.5])), real)
     assert classifier.takes(away, "slow", sequence) == classifier.takes(real, "slow", sequence)
     assert classifier.table(0) == found
+
+
+@pytest.mark.parametrize(("frames", "windows"), [(17, 0), (18, 1), (26, 1), (27, 2), (36, 3)])
+def test_windows_of_style_begin_every_nine_frames_up_to_the_last_that_fits(frames: int, windows: int) -> None:
+    turned = wavers(np.random.default_rng(3), 1.0, 1)["1 0"][0][:frames]
+    assert features(turned).shape == (windows, 10)
+
+
+def test_pieces_are_as_long_as_asked_and_a_clip_that_is_shorter_is_one() -> None:
+    assert _pieces([10, 3, 2, 4], 4, 3) == [(0, 0), (0, 4), (1, 0), (3, 0)]
 
 
 def test_of_two_corpora_in_one_style_each_is_taken_for_the_other_as_often() -> None:

@@ -631,6 +631,15 @@ def test_a_leg_reaches_what_is_in_its_reach_and_bends_as_it_did() -> None:
     assert np.all(np.sum(axis * np.cross(knee, target - knee), axis=-1) > 0.0)
 
 
+def test_a_leg_reaches_its_target_about_a_hinge_askew_to_its_bones() -> None:
+    rng = np.random.default_rng(6)
+    hip, leg = bent(rng.uniform(0.3, 0.9, 50), rng)
+    target = 0.95 * leg[:, 2] + rng.uniform(-0.01, 0.01, (50, 3))
+    thigh, shank = reach(hip, leg, target, np.array([1.0, 0.5, -0.3]))
+    end = rot.mul_vec(thigh, leg[:, 1]) + rot.mul_vec(shank, leg[:, 2] - leg[:, 1])
+    np.testing.assert_allclose(end, target, atol=1e-9)
+
+
 def test_a_leg_that_is_too_short_is_stretched_ever_less_and_never_straight() -> None:
     far = np.linspace(0.0, 0.5, 200)
     hip, leg = bent(np.full(200, 0.6), np.random.default_rng(3))
