@@ -22,11 +22,11 @@ from toys import solution
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, find_bridges
-from motionmind.grammar.coordination import PSEUDO_COUNT, compile_network, fit_network
+from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, compile_network, fit_network
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions
 from motionmind.search.problem import Model, Problem, Rules
-from motionmind.tween.problem import build_model
+from motionmind.tween.problem import build_model, couplings
 
 TURNS = 8  # steps of the facing's circle
 PARENTS = {2: (-1, 0), 3: (-1, 0, 0), 4: (-1, 0, 1, 1)}
@@ -344,6 +344,25 @@ def test_standing_somewhere_costs_lambda_times_minus_log_p(seed: int, factor: fl
     for j, table in tables.items():
         alone = model.alone[body.slice(j)]
         np.testing.assert_allclose(alone, factor * table.min(axis=0), atol=1e-12)
+
+
+def test_what_a_state_costs_at_least_is_no_more_than_beside_any_state_of_its_parent(seed: int) -> None:
+    """Of any tables, not only of those that a corpus's counts make."""
+    rng, starts = np.random.default_rng(seed), np.array([0, 3, 8])
+    seen = rng.random((3, 5)) < 0.4
+    parent, state = np.nonzero(seen)
+    net = Coordination(
+        np.array([-1, 0]),
+        np.array([0, 0, 3]),
+        np.concatenate([[0], np.cumsum(seen.sum(axis=1))]),
+        state.astype(np.int32),
+        rng.uniform(0.0, 9.0, len(parent)),
+        np.concatenate([np.zeros(3), rng.uniform(0.0, 5.0, 5)]),
+        rng.uniform(0.0, 5.0, 3),
+    )
+    table, alone = net.table(1, starts), couplings(net, starts, 0.5).alone
+    assert np.all(alone[3:] <= 0.5 * table.min(axis=0) + 1e-12)
+    assert np.all(alone[:3] == 0.0)
 
 
 def test_lists_that_the_search_looks_things_up_in_are_in_order(seed: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
 from motionmind.realise.feet import LIFT
-from motionmind.realise.flight import find_flights
+from motionmind.realise.flight import PUSHES, Flight, find_flights, flying_frames
 from motionmind.realise.footfalls import (
     BRIEF,
     CROSSES,
@@ -404,6 +404,31 @@ def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     assert (first.start, last.end) == (0, 60)
     assert first.rates[0] == last.rates[1] == 0.0
     assert first.end / 30.0 == pytest.approx(np.sqrt(0.4 / GRAVITY), abs=0.04)
+
+
+def test_a_body_that_rises_in_a_or_falls_in_b_is_longer_in_the_air() -> None:
+    """Half a metre above where it stands: as long as it takes to fall from there at that velocity."""
+    calm, masses = np.zeros(61), np.array([1.5, 1.5])
+    for rate in (-2.0, 0.5, 2.0):
+        for hovering, rates, falls in (((True, False), (rate, None), rate), ((False, True), (None, rate), -rate)):
+            (flight,) = find_flights(calm, calm, np.ones(61), masses, hovering, rates, GRAVITY, 30.0)
+            seconds = (falls + np.sqrt(falls**2 + 2.0 * GRAVITY * 0.5)) / GRAVITY
+            assert (flight.end - flight.start) / 30.0 == pytest.approx(seconds, abs=1.0 / 30.0)
+            assert flight.rates == rates
+
+
+def test_jumps_one_after_another_leave_time_to_land_and_push() -> None:
+    flights = find_flights(
+        np.ones(121), np.full(121, 0.05), np.ones(121), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
+    )
+    assert len(flights) > 3
+    assert all(after.start - before.end >= PUSHES * 30.0 - 1.0 for before, after in pairwise(flights))
+
+
+def test_between_the_last_frame_on_the_floor_and_the_first_nothing_bears_the_body() -> None:
+    flights = [Flight(3, 6, (None, None)), Flight(8, 10, (None, 0.0))]
+    assert np.flatnonzero(flying_frames(flights, (False, True), 11)).tolist() == [4, 5, 9, 10]
+    assert np.flatnonzero(flying_frames(flights, (False, False), 11)).tolist() == [4, 5, 9]
 
 
 # --- laws -------------------------------------------------------------------------------------------------------------

@@ -22,9 +22,11 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
 from motionmind.realise.detail import GOES_OVER, LIVELIER, detail_of, likest_moves, share_of_detail
+from motionmind.realise.expectation import Expectation
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
+from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
@@ -107,6 +109,31 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
     np.testing.assert_allclose(flown[[0, -1]], [a, b], atol=1e-12)
 
 
+def test_a_little_way_that_is_missing_is_made_up_in_the_air_rather_than_on_the_floor() -> None:
+    still, clearance = np.tile(rot.IDENTITY, (21, 23, 1)), np.where(np.arange(21) > 10, 1.0, 0.0)
+    flown = root_trajectory(
+        human23(), still, clearance, np.ones((20, 6)), np.zeros((20, 3)), np.zeros(3), np.array([0.01, 0.0, 0.0]), 1.0
+    )
+    steps = np.diff(flown[:, 0])
+    assert steps[:10].max() < 0.3 * steps[11:].min()
+
+
+def test_each_half_step_is_slowed_as_much_as_its_fastest_joint_needs() -> None:
+    corpus = gather("walks", [walk(5)], facing="stage")
+    times, poses = np.linspace(0.0, 2.0, 21), np.tile(rot.IDENTITY, (21, 23, 1))
+    elbow = human23().index("left_elbow")
+    poses[9:12, elbow] = rot.from_axis_angle([1.0, 0.0, 0.0], np.array([0.4, 1.0, 0.5]))
+    still = Expectation(times, poses, np.zeros(21), np.zeros((21, 1)), np.zeros((20, 1)), np.ones((20, 23)))
+    frames, fastest = np.linspace(0.0, 2.0, 121), np.full(25, 3.0)
+    slower = keep_pace(still, frames, corpus, fastest, np.zeros((20, 3)), (False, False))
+    turned = still.chains(corpus, frames)[:, elbow]
+    speeds = rot.angle(turned[:-1], turned[1:]) * 60.0
+    assert speeds.max() > 6.0
+    needed = speeds.reshape(20, 6).max(axis=1) / (HEADROOM * 3.0)
+    assert np.all(slower >= np.maximum(needed, 1.0) - 1e-9)
+    np.testing.assert_array_equal(slower[[0, 1, 2, -3, -2, -1]], 1.0)
+
+
 # --- walks -----------------------------------------------------------------------------------------------------------
 
 
@@ -159,11 +186,15 @@ def recorded(seconds: float = 8.0, seed: int = 3) -> Motion:
     return Motion(slow.skeleton, rotations, natural_spline(slow.times, slow.root, times), times, "trembling")
 
 
-def test_the_likest_moves_are_those_of_the_best_sequence_of_all() -> None:
+@pytest.mark.parametrize("more", [None, 0.0, 0.15, 0.3, 0.55, 1.0])
+def test_the_likest_moves_are_those_of_the_best_sequence_of_all(more: float | None) -> None:
+    """Of another movement, or of one that goes over from clip to clip, and exaggerates so much that this pays."""
     corpus = gather("walks", [walk(5), walk(4, seed=1)], reverse=1.0)
-    moves, poses = corpus.moves, walk(4, seed=2)
-    chains = corpus.to_chains(poses.rotations)
-    shown = corpus.to_chains(corpus.rotations)
+    moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)
+    chains = corpus.to_chains(walk(4, seed=2).rotations)
+    if more is not None:
+        shares = np.array([-more, -more, 1.0 + more, 1.0 + more])[:, None]
+        chains = rot.slerp(shown[1:5], shown[5:9], shares)
     far = np.array([[np.mean(4.0 - 4.0 * np.sum(s * p, axis=-1)[:23] ** 2) for s in shown] for p in chains])
 
     def cost(sequence: tuple[int, ...]) -> float:
