@@ -80,6 +80,15 @@ def test_the_joints_at_fault_are_those_without_a_way(few: Engine, found: Found) 
                 assert (fault["start"], fault["goal"]) == (f"state {start}", f"state {goal}")
 
 
+def test_what_would_join_all_is_what_would_join_each(found: Found) -> None:
+    joints_apart = 0
+    for _, _, diagnosis in found:
+        each = [{remedy["what"] for remedy in fault["remedies"]} for fault in diagnosis["faults"]]
+        assert {*diagnosis["helps"]} == set.intersection(*each)
+        joints_apart += set.intersection(*each) != set.union(*each)
+    assert joints_apart
+
+
 def test_what_is_said_to_help_does(few: Engine, found: Found) -> None:
     backwards, both_sides = fit(reverse=1.0), fit(mirror=True)
     tried: dict[str, int] = {}

@@ -127,12 +127,13 @@ def flipped(motion: Motion, frames: slice) -> Motion:
     return replace(motion, rotations=rotations)
 
 
-def test_a_flip_of_the_recording_is_no_velocity(ballet: Engine) -> None:
+@pytest.mark.parametrize(("first", "last"), [(0, 11), (3, 8)])
+def test_a_flip_of_the_recording_is_no_velocity(ballet: Engine, first: int, last: int) -> None:
     """A velocity is that of the frames between it and the end; right at the end, there is none to be had."""
     fine = CLIP.resample(120.0)
     before, after = fine.slice(150, 161), fine.slice(400, 411)
     a, b = before.posture(-1), after.posture(0)
-    found = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(0, 7)), flipped(after, slice(4, 11)))
+    found = formulate(ballet, a, b, TweenRequest(), flipped(before, slice(first, 7)), flipped(after, slice(4, last)))
     for velocity, wanted in (
         (found.leaving, Velocity.at_end(before.slice(7, 11))),
         (found.arriving, Velocity.at_start(after.slice(0, 4))),

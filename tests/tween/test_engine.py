@@ -129,6 +129,14 @@ def test_a_equal_to_b_is_no_move_at_no_cost(six_segments: Engine) -> None:
     assert json.loads(json.dumps(tween.report()))["path"] == tween.path.tolist()
 
 
+def test_a_equal_to_b_is_left_for_a_posture_to_pass_through(six_segments: Engine) -> None:
+    a, via = CLIPS[0].posture(7), CLIPS[0].posture(10)
+    tween = six_segments.tween(a, a, via=[via])
+    assert 0 < tween.passed[0] < tween.moves
+    states = six_segments.space.assign(six_segments.corpus.to_chains(via.rotations[None]))[0]
+    np.testing.assert_array_equal(tween.path[tween.passed[0]], states)
+
+
 def test_the_same_posture_elsewhere_is_a_move(six_segments: Engine) -> None:
     a = CLIPS[0].posture(7)
     b = replace(a, root=a.root + np.array([0.1, 0.0, 0.0]))

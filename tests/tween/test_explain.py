@@ -113,6 +113,17 @@ def test_coordination_is_what_the_network_says(insects: Engine, bridged: Tween) 
             assert bridged.costs.coordination[t, chain] == pytest.approx(cost, abs=1e-9)
 
 
+def test_the_report_says_how_far_each_end_is_from_its_states(insects: Engine) -> None:
+    rotations = insects.corpus.rotations[[5, 9]]
+    a, b = rot.mul(rotations, rot.exp(np.array([[[0.02, 0.0, 0.0]], [[0.0, 0.05, 0.0]]])))
+    tween = insects.tween(*(Posture(insects.corpus.skeleton, end, insects.corpus.root[5]) for end in (a, b)))
+    told = tween.report()["snap_degrees"]
+    for end, rotations, states in (("A", a, tween.path[0]), ("B", b, tween.path[-1])):
+        off = insects.space.distance(insects.corpus.to_chains(rotations[None]), states[None])[0]
+        assert list(told[end].values()) == pytest.approx(off.tolist(), abs=1e-9)
+        assert off.mean() > 0.5
+
+
 def test_a_source_says_when_it_was(insects: Engine, bridged: Tween) -> None:
     starts = {clip.name: clip.start for clip in insects.corpus.clips}
     for source in (source for row in bridged.sources for source in row if source):
@@ -196,7 +207,9 @@ def test_what_is_no_report_is_refused(bridged: Tween, tmp_path: Path, run: Run) 
         ({"costs": None}, r"costs"),
         ({"path": report["path"][:-1]}, "tables are not of"),
         ({"degrees": []}, "tables are not of"),
+        ({"names": report["names"][:-1]}, "tables are not of"),
         ({"times": [0.0]}, "postures and 1 times"),
+        ({"times": report["times"][:-1]}, f"postures and {len(report['times']) - 1} times"),
         ({"path": [], "names": []}, "tables"),
     ):
         path.write_text(json.dumps(report | change), "utf-8")

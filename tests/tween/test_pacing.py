@@ -15,9 +15,10 @@ from motionmind.corpus.bundled import bundled
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import way_of
+from motionmind.learned.pace import way_between, way_of
 from motionmind.realise.detour import detour
 from motionmind.tween.engine import Engine
+from motionmind.tween.pacing import usual_times
 from motionmind.tween.report import read_report
 from motionmind.tween.request import TweenRequest
 from motionmind.tween.result import Tween
@@ -54,6 +55,18 @@ def moved(posture: Posture, heights: float, radians: float) -> Posture:
     rotations = posture.rotations.copy()
     rotations[0] = rot.mul(rot.about_vertical(np.array(radians)), rotations[0])
     return Posture(posture.skeleton, rotations, posture.root + np.array([heights * posture.skeleton.height, 0.0, 0.0]))
+
+
+def test_in_the_least_time_the_smoothest_movement_has_the_fastest_speeds(engine: Engine) -> None:
+    """The smoothest movement goes 10 s^3 - 15 s^4 + 6 s^5 of its way: Flash and Hogan (1985)."""
+    a, b = ends(engine)
+    (time,) = usual_times(engine, (a, b))
+    share = np.linspace(0.0, 1.0, 1001)
+    peak = np.gradient(10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5, share).max()
+    parts, fastest = way_between(a, b).parts, engine.pace.fastest
+    assert (peak * parts / time.least / fastest).max() == pytest.approx(1.0, abs=1e-3)
+    slowest = [*engine.corpus.skeleton.names, "turning", "travel"].index(time.slowest)
+    assert (parts / fastest).argmax() == slowest
 
 
 @pytest.mark.parametrize("by", [(1.0, 0.0), (0.0, 1.0)])
