@@ -176,6 +176,16 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
     assert times > 3
 
 
+@pytest.mark.parametrize("count", [1000, 1024, 1025, 2047, 2049])
+def test_so_many_nodes_as_are_said_to_fit_into_memory_do(count: int) -> None:
+    """Just beyond a power of two the buckets take most."""
+    for trellis in {case.trellis.chains: case.trellis for case in cases()}.values():
+        memory = next(size for size in range(10**7) if astar.nodes_in(size, trellis.chains) == count)
+        nodes = astar._root(trellis, 0.0, count)
+        taken = sum(array.nbytes for array in nodes) - nodes.tally.nbytes + count  # and a mark while others go
+        assert 0.9 * memory < taken <= memory
+
+
 def test_the_open_list_stays_in_order_whatever_is_taken_from_its_middle() -> None:
     rng, count = np.random.default_rng(0), 200
     nodes = astar._root(cases()[0].trellis, 0.0, count)
