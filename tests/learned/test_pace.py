@@ -13,7 +13,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import EVERYDAY, FPS, SLOPES, Pace, Way, find_still, learn_pace, way_between, way_of
+from motionmind.learned.pace import EVERYDAY, FPS, SLOPES, Pace, Way, _fit, find_still, learn_pace, way_between, way_of
 
 ARM = 7
 
@@ -71,6 +71,11 @@ def test_who_is_slower_in_the_same_is_expected_to_take_longer(factor: float) -> 
     there = way(human23(), turn=1.0, travel=0.3)
     assert (float(other.expected(there)) > float(usual.expected(there))) == (factor > 1.0)
     assert other.fastest[ARM] == pytest.approx(usual.fastest[ARM] / factor, rel=0.15)
+
+
+def test_of_many_windows_on_a_line_the_law_is_that_line() -> None:
+    efforts = np.linspace(0.5, 3.0, 20_000)
+    np.testing.assert_allclose(_fit(efforts, 0.7 + 0.5 * efforts)[:2], [0.7, 0.5], atol=0.01)
 
 
 def test_a_longer_way_takes_longer() -> None:

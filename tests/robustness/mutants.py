@@ -34,7 +34,9 @@ COPIED = ["motionmind", "tests", "experiments", "corpora", "discretization", "do
 PATIENCE = 6.0  # times what the tests take of the code as it is, after which a mutant is said to hang
 LONGEST_START = 120.0  # seconds, beyond those: code that is mutated is compiled again
 
-KILLED, SURVIVED, HANGS, DOES_NOT_APPLY = "killed", "survived", "hangs", "does not apply"
+KILLED, SURVIVED, HANGS = "killed", "survived", "hangs"
+DOES_NOT_APPLY = "does not apply"  # its tests cannot be collected
+FAILS_ANYWAY = "fails anyway"  # its tests fail of the code as it is
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,10 @@ class Copy:
 
     def outcome(self, mutant: Mutant) -> str:
         """Return what becomes of a mutant."""
-        longest = LONGEST_START + PATIENCE * sum(map(self.seconds, mutant.tests))
+        try:
+            longest = LONGEST_START + PATIENCE * sum(map(self.seconds, mutant.tests))
+        except RuntimeError:
+            return FAILS_ANYWAY
         with self.changed(mutant):
             code = self.run(mutant.tests, longest)
         if code is None:

@@ -113,6 +113,26 @@ def test_an_index_of_what_is_not_there_is_refused_wherever_it_stands(
             Engine.load(str(folder))
 
 
+@pytest.mark.parametrize("name", ["transitions.targets", "bridges.targets", "coordination.pair_states"])
+def test_the_index_after_the_last_and_one_twice_in_a_row_are_refused(built: Path, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    place = store.load(folder).place
+    whole, engine = np.load(place / f"{name}.npy"), Engine.load(str(built))
+    last = len(engine.corpus.skeleton) - 1 if name.startswith("coordination") else -1  # facing is not coordinated
+    rows = np.load(place / f"{name.replace('targets', 'indptr').replace('states', 'ptr')}.npy")
+    first = rows[np.diff(rows).argmax()]
+    for at, value, fault in (
+        (first + 1, whole[first], "does not rise within a row"),
+        (-1, engine.space.sizes[last], "holds an index of what is not there"),
+    ):
+        array = whole.copy()
+        array[at] = value
+        np.save(place / f"{name}.npy", array)
+        with pytest.raises(FormatError, match=f"{name} .*{fault}"):
+            Engine.load(str(folder))
+
+
 @pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.kind == "f8"])
 def test_what_is_no_number_is_refused_wherever_it_stands(built: Path, tmp_path: Path, name: str) -> None:
     folder = tmp_path / "altered"

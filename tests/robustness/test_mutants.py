@@ -86,6 +86,7 @@ def test_a_copy_is_changed_for_a_while_and_no_bytecode_stays(tmp_path: Path, mon
         ("while y == 2: pass", mutants.HANGS),
         ("import os; os._exit(2 if y == 2 else 0)", mutants.DOES_NOT_APPLY),
         ("import os; y == 2 and os.abort()", mutants.KILLED),
+        ("assert y == 2", mutants.FAILS_ANYWAY),
     ],
 )
 def test_outcomes(test: str, outcome: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -176,20 +176,29 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
     assert times > 3
 
 
-def test_the_open_list_gives_the_least_node_whatever_was_taken_from_its_middle() -> None:
-    rng, count = np.random.default_rng(0), 300
+@pytest.mark.parametrize("count", [1000, 1024, 1025, 2047, 2049])
+def test_so_many_nodes_as_are_said_to_fit_into_memory_do(count: int) -> None:
+    """Just beyond a power of two the buckets take most."""
+    for trellis in {case.trellis.chains: case.trellis for case in cases()}.values():
+        memory = next(size for size in range(10**7) if astar.nodes_in(size, trellis.chains) == count)
+        nodes = astar._root(trellis, 0.0, count)
+        taken = sum(array.nbytes for array in nodes) - nodes.tally.nbytes + count  # and a mark while others go
+        assert 0.9 * memory < taken <= memory
+
+
+def test_the_open_list_stays_in_order_whatever_is_taken_from_its_middle() -> None:
+    rng, count = np.random.default_rng(0), 200
     nodes = astar._root(cases()[0].trellis, 0.0, count)
     for node in range(1, count):
-        nodes.key[node], nodes.f[node], nodes.var[node] = rng.integers(0, 40), rng.integers(0, 5), rng.integers(0, 5)
+        nodes.key[node], nodes.f[node], nodes.var[node] = rng.integers(0, 60), rng.integers(0, 5), rng.integers(0, 5)
         astar._open(nodes, node)
-    left = [*rng.permutation(count)]
-    for _ in range(count // 2):
-        astar._close(nodes, left.pop())
-    came = []
-    while nodes.tally[astar._HEAPED] > 0:
-        came.append(int(nodes.heap[0]))
-        astar._close(nodes, came[-1])
-    assert came == sorted(left, key=lambda node: (nodes.key[node], -nodes.var[node], nodes.f[node], node))
+    place = {node: (nodes.key[node], -nodes.var[node], nodes.f[node], node) for node in range(count)}
+    for node in rng.permutation(count)[: count - 1]:
+        astar._close(nodes, node)
+        heap = nodes.heap[: nodes.tally[astar._HEAPED]].tolist()
+        assert all(place[heap[(k - 1) // 2]] < place[heap[k]] for k in range(1, len(heap)))
+        assert nodes.slot[heap].tolist() == [*range(len(heap))]
+        assert nodes.slot[node] == -1
 
 
 def test_nodes_are_told_apart_in_whatever_bucket_they_are() -> None:

@@ -1,0 +1,50 @@
+"""How a corpus's bodies turn, travel and go on, moment by moment, and the states of where they face."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion
+from motionmind.corpus.gather import gather
+from motionmind.discretize import Codebook
+from motionmind.geometry import rotations as rot
+from motionmind.learned.carriage import learn_carriage
+from motionmind.learned.learning import learn
+
+
+def turning(frames: int, turn: float, ahead: float) -> Motion:
+    """A body at rest that turns by `turn` radians a posture, past facing backwards, and travels in an arc ahead."""
+    headings = 2.0 + turn * np.arange(frames)
+    rotations = np.tile(rot.IDENTITY, (frames, 23, 1))
+    rotations[:, 0] = rot.about_vertical(headings)
+    steps = rot.mul_vec(rot.about_vertical(headings[:-1] + 0.5 * turn), np.array([0.0, 0.0, ahead]))
+    root = np.array([0.0, 0.9, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return Motion(human23(), rotations, root, 0.2 * np.arange(frames), "turning")
+
+
+@pytest.mark.parametrize("turn", [0.4, -0.3])
+def test_half_a_move_turns_and_travels_half_as_far_in_the_body_s_heading(turn: float) -> None:
+    carriage = learn_carriage(gather("turning", [turning(20, turn, 0.1)]))
+    np.testing.assert_allclose(carriage.turn, 0.5 * turn, atol=1e-9)
+    np.testing.assert_allclose(carriage.travel, np.tile([0.0, 0.0, 0.05], (19, 1)), atol=1e-9)
+
+
+def test_shares_of_the_steps_that_leave_a_moment_add_up_to_one_by_their_weights() -> None:
+    """Also of a posture that more moves arrive in than leave, of other weights."""
+    corpus = gather("back and forth", [turning(9, 0.3, 0.0)], reverse=1.0)
+    carriage = learn_carriage(corpus)
+    moments = len(corpus) + len(corpus.moves.begins)
+    sums = np.bincount(carriage.begins, carriage.shares, moments)
+    np.testing.assert_allclose(sums[np.unique(carriage.begins)], 1.0, atol=1e-12)
+    leaving = np.flatnonzero(corpus.moves.begins == 4)
+    ahead, back = sorted(carriage.shares[leaving])[::-1]
+    assert ahead / back == pytest.approx(np.e)
+
+
+def test_a_posture_faces_within_half_a_step_of_its_state() -> None:
+    corpus = gather("turning", [turning(60, 0.17, 0.0)], facing="free")
+    learned = learn(corpus, Codebook(15.0))
+    off = learned.space.distance(corpus.to_chains(corpus.rotations), learned.states)
+    assert off[:, -1].max() <= 180.0 / learned.space.sizes[-1] + 1e-6
