@@ -15,10 +15,12 @@ from motionmind.body.rates import check_size
 from motionmind.errors import FormatError, did_you_mean, enumerated
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
+from motionmind.notation.posture_line import Row, posture_row
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row, Work, check_words, play_phrase, posture_row
+from motionmind.notation.rows import check_words, play_phrase
 from motionmind.notation.score import Clip, Score, Setting
 from motionmind.notation.stance import Feet, place_legs
+from motionmind.notation.work import Work
 
 LIMIT_TOLERANCE = 0.5  # degrees past a limit that rounding explains
 FLOOR_TOLERANCE = 0.01  # metres under the floor that nobody sees
@@ -362,5 +364,6 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     )
     total = held.sum(axis=1)[:, None]
     stay = (held[..., None] * (before - after)).sum(axis=1) / np.where(total > 0.0, total, 1.0)
-    go = rot.mul_vec(turn[1:], np.array([[row.go[0], 0.0, row.go[1]] for row in rows[1:]]).reshape(-1, 3) / 100.0)
-    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + go)
+    go = np.zeros((len(rows) - 1, 3))
+    go[:, [0, 2]] = np.array([row.go for row in rows[1:]]).reshape(-1, 2) / 100.0
+    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + rot.mul_vec(turn[1:], go))

@@ -29,8 +29,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.notation import compose as notation
 from motionmind.notation import rows as phrases
 from motionmind.notation.compose import compose, motions
+from motionmind.notation.posture_line import Row
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row
 from motionmind.notation.sources import sources
 
 Mutate = Callable[[str, random.Random], bytes]
