@@ -59,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: the words after the program's name; those of `sys.argv` by default.
     """
     log, notes = logging.getLogger("motionmind"), Notes(logging.INFO)
+    level = log.level
     log.addHandler(notes)
     log.setLevel(logging.INFO)
     try:
@@ -68,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(_run(arguments))
     finally:
         log.removeHandler(notes)
+        log.setLevel(level)
         gc.enable()
 
 

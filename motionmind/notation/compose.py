@@ -12,7 +12,7 @@ from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.rates import check_size
-from motionmind.errors import FormatError, did_you_mean, enumerated
+from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
 from motionmind.notation.posture_line import Row, posture_row
@@ -66,7 +66,7 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
         )
     if clip is not None and clip not in names:
         hint = did_you_mean(clip, names) or f"; there are {enumerated(names, 60)}"
-        raise FormatError(f"no clip {clip!r}{hint}", path=path)
+        raise FormatError(f"no clip {quoted(clip)}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
 
@@ -109,7 +109,7 @@ def posture(score: Score, name: str) -> Posture:
     """
     if name not in score.postures:
         hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
-        raise FormatError(f"no posture {name!r}{hint}", path=score.path)
+        raise FormatError(f"no posture {quoted(name)}{hint}", path=score.path)
     row = posture_row(score.postures[name])
     return _join_moves(score.body, name, [row], _place_distinct(score.body, [row])).posture(0)
 

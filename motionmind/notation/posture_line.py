@@ -10,6 +10,7 @@ from functools import partial
 from typing import NamedTuple
 
 from motionmind.body.anatomy import SIDES
+from motionmind.errors import quoted
 from motionmind.notation.score import NUMBER, Line, Phrase, Score, Setting, Where, number
 from motionmind.notation.work import Work
 
@@ -140,7 +141,7 @@ def _first_cell(score: Score, text: str, where: Where) -> _Cell:
     while words:
         word = words.popleft()
         if word not in readers:
-            raise where.error(f"{word!r} is no way to move; there are a number of counts, up, face, turn, go")
+            raise where.error(f"{quoted(word)} is no way to move; there are a number of counts, up, face, turn, go")
         readers[word](score, cell, words, where)
     return cell
 
@@ -192,5 +193,5 @@ def _counts(word: str, where: Where) -> float:
     except (ValueError, ZeroDivisionError, OverflowError):
         counts = 0.0
     if not 0.01 <= counts <= 1000.0:
-        raise where.error(f"{word!r} is no number of counts")
+        raise where.error(f"{quoted(word)} is no number of counts")
     return counts

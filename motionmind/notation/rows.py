@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
 
+from motionmind.display import displayed
+from motionmind.errors import quoted
 from motionmind.notation.posture_line import Row, is_hold, read_row
 from motionmind.notation.score import Clip, Line, Phrase, Score, Where, tempo
 from motionmind.notation.work import LONG, Work
@@ -114,7 +116,7 @@ def _continue(rows: list[Row], before: list[Row], where: Where) -> list[Row]:
 def _difference(before: Row, after: Row) -> str:
     """Describe how two postures differ."""
     parts = [
-        f"{' / '.join(dict.fromkeys(was))}, then {' / '.join(dict.fromkeys(is_))}"
+        f"{displayed(' / '.join(dict.fromkeys(was)))}, then {displayed(' / '.join(dict.fromkeys(is_)))}"
         for a, b, was, is_ in zip(before.limbs, after.limbs, before.words, after.words, strict=True)
         if a != b
     ]
@@ -137,13 +139,15 @@ def _call(phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> 
     call, *ways = _split_outside_brackets(line.text)
     match = re.fullmatch(r"([\w.-]++)\s*+(\(([^)]*+)\))?", call)
     if not match:
-        raise line.where.error(f"{line.text!r}: a posture has cells with | between, a phrase is called by its name")
+        raise line.where.error(
+            f"{quoted(line.text, 80)}: a posture has cells with | between, a phrase is called by its name"
+        )
     if depth + len(ways) > MAX_DEPTH:
         raise line.where.error(f"{len(ways)} ways to do a phrase are too many")
     called = phrase.score.phrase(match[1], line.where)
     given = [part.strip() for part in match[3].split(",")] if match[2] else []
     if not all(given):
-        raise line.where.error(f"{line.text!r}: an open word is filled with nothing")
+        raise line.where.error(f"{quoted(line.text, 80)}: an open word is filled with nothing")
     if len(given) != len(called.open):
         raise line.where.error(f"{called.name} leaves {len(called.open)} words open, and {len(given)} are given")
     own = called.score is not phrase.score
@@ -197,12 +201,12 @@ def _modify(run: _Player, how: str, phrase: Phrase, line: Line, counts: float, d
         taken = words[1 : words.index("of")]
         for layer in taken:
             if layer not in layers:
-                raise line.where.error(f"{layer!r} is no layer; there are {', '.join(layers)}")
+                raise line.where.error(f"{quoted(layer)} is no layer; there are {', '.join(layers)}")
         other = _call(phrase, replace(line, text=" ".join(words[words.index("of") + 1 :])), counts, depth, work)
         chosen = [layers.index(layer) for layer in taken]
         return lambda before: _with_layers(run(before), other(before), chosen)
     raise line.where.error(
-        f"{how!r} is no way to do a phrase; there are other side, backwards, there and back, 3 times, "
+        f"{quoted(how)} is no way to do a phrase; there are other side, backwards, there and back, 3 times, "
         "with LAYERS of PHRASE"
     )
 
