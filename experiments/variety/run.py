@@ -27,9 +27,12 @@ KINDS = ("vary", "GenMM")
 
 
 def jobs(setting: Setting) -> list[dict[str, Any]]:
-    """Return a job for each clip: those of the bundled ballet, and a recording."""
+    """Return a job for each clip: those of the bundled ballet, or its shortest in a quick run, and a recording."""
     data = str(setting.data) if setting.data else None
-    clips = [("ballet", clip.name) for clip in corpus(None, "ballet").clips]
+    ballet = corpus(None, "ballet").clips
+    if setting.quick:
+        ballet = (min(ballet, key=len),)
+    clips = [("ballet", clip.name) for clip in ballet]
     clips += [RECORDING] if recorded(data, RECORDING[0]) else []
     samples = 1 if setting.quick else SAMPLES
     return [

@@ -59,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: the words after the program's name; those of `sys.argv` by default.
     """
     log, notes = logging.getLogger("motionmind"), Notes(logging.INFO)
+    level = log.level
     log.addHandler(notes)
     log.setLevel(logging.INFO)
     try:
@@ -69,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(_run(arguments, warned))
     finally:
         log.removeHandler(notes)
+        log.setLevel(level)
         gc.enable()
 
 

@@ -15,6 +15,7 @@ from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searc
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, NATURAL, Numbers, Span
 from motionmind.cli.variations import load_engine, print_variation
+from motionmind.files import all_or_none, sha256_of
 
 if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
@@ -110,10 +111,12 @@ def review(
         after = _smooth(after, smooth, home, request, interruption)
     after = _decide(after, options)
     is_written = after.edits != before.edits or output is not None
-    if is_written:
-        write_variation(output or file, after)
+    with all_or_none() as written:
+        if is_written:
+            write_variation(output or file, after)
+        motion_sha256 = sha256_of(written, output or file)
     if listing or as_json or not has_edits:
-        print_variation(after, as_json)
+        print_variation(after, as_json, motion_sha256)
     if has_edits and after.edits == before.edits:
         note("nothing changed")
     if is_written and not as_json:

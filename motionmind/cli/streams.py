@@ -19,9 +19,19 @@ class _Escaping:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write text with what a terminal would act on as escapes."""
-        self._stream.write(escaped(text))
+        """Write text with what a terminal would act on as escapes; drop it if its reader has gone away."""
+        try:
+            self._stream.write(escaped(text))
+        except BrokenPipeError:
+            _silence(self._stream)
         return len(text)
+
+    def flush(self) -> None:
+        """Flush, unless the reader has gone away."""
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            _silence(self._stream)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -38,7 +48,7 @@ class _Forgiving:
         try:
             return self._stream.write(text)
         except (OSError, ValueError):  # ValueError: it was closed
-            self.silence()
+            _silence(self._stream)
             return len(text)
 
     def flush(self) -> None:
@@ -46,17 +56,18 @@ class _Forgiving:
         try:
             self._stream.flush()
         except (OSError, ValueError):
-            self.silence()
-
-    def silence(self) -> None:
-        """Let what is buffered go nowhere, or Python would fail with it when it ends."""
-        with suppress(OSError, ValueError):
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())
-            os.close(nowhere)
+            _silence(self._stream)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def _silence(stream: TextIO) -> None:
+    """Let what is buffered and what is still written go nowhere, or Python would fail with it when it ends."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 @contextmanager
@@ -77,12 +88,8 @@ def forgiving() -> Iterator[None]:
     try:
         yield
     finally:
-        sys.stderr.flush()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):  # a full disk, which Python says again when it ends
+                if stream is not None:
+                    stream.flush()
         sys.stdout, sys.stderr = given
-        # A reader that has gone away is no error, and Python would say it is one when it flushes what is left.
-        with suppress(OSError):
-            try:
-                if sys.stdout is not None:
-                    sys.stdout.flush()
-            except BrokenPipeError:
-                _Forgiving(sys.stdout).silence()

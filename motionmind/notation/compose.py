@@ -12,13 +12,15 @@ from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.rates import check_size
-from motionmind.errors import FormatError, did_you_mean, enumerated
+from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.geometry import rotations as rot
+from motionmind.notation.posture_line import Row, posture_row
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row, Work, check_words, play_phrase, posture_row
+from motionmind.notation.rows import check_words, play_phrase
 from motionmind.notation.score import Clip, Score, Setting
 from motionmind.notation.stance import Feet, place_legs
+from motionmind.notation.work import Work
 
 LIMIT_TOLERANCE = 0.5  # degrees past a limit that rounding explains
 FLOOR_TOLERANCE = 0.01  # metres under the floor that nobody sees
@@ -64,7 +66,7 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
         )
     if clip is not None and clip not in names:
         hint = did_you_mean(clip, names) or f"; there are {enumerated(names, 60)}"
-        raise FormatError(f"no clip {clip!r}{hint}", path=path)
+        raise FormatError(f"no clip {quoted(clip)}{hint}", path=path)
     return motions(score, [found for found in score.clips if clip is None or found.name == clip])[0]
 
 
@@ -107,7 +109,7 @@ def posture(score: Score, name: str) -> Posture:
     """
     if name not in score.postures:
         hint = did_you_mean(name, score.postures) or f"; there are {enumerated(score.postures, 60) or 'none'}"
-        raise FormatError(f"no posture {name!r}{hint}", path=score.path)
+        raise FormatError(f"no posture {quoted(name)}{hint}", path=score.path)
     row = posture_row(score.postures[name])
     return _join_moves(score.body, name, [row], _place_distinct(score.body, [row])).posture(0)
 
@@ -362,5 +364,6 @@ def _steps(rows: list[Row], placed: _Placed, turn: Floats, centre: Floats) -> Fl
     )
     total = held.sum(axis=1)[:, None]
     stay = (held[..., None] * (before - after)).sum(axis=1) / np.where(total > 0.0, total, 1.0)
-    go = rot.mul_vec(turn[1:], np.array([[row.go[0], 0.0, row.go[1]] for row in rows[1:]]).reshape(-1, 3) / 100.0)
-    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + go)
+    go = np.zeros((len(rows) - 1, 3))
+    go[:, [0, 2]] = np.array([row.go for row in rows[1:]]).reshape(-1, 2) / 100.0
+    return np.where(total > 0.0, stay, centre[:-1] - centre[1:] + rot.mul_vec(turn[1:], go))

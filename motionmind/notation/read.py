@@ -10,7 +10,7 @@ from unicodedata import normalize
 
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import HEADINGS, anatomy_named, read_body
-from motionmind.errors import FormatError, did_you_mean, enumerated
+from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import read_lines
 from motionmind.notation.score import (
@@ -168,7 +168,9 @@ def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
     rest, where = rest.strip(), head.where
     if word in score.body.layers or word == "facings":
         if rest:
-            raise where.error(f"{rest!r} after the heading {word}: positions go on lines of their own, indented")
+            raise where.error(
+                f"{quoted(rest, 80)} after the heading {word}: positions go on lines of their own, indented"
+            )
         for line in inner:
             _add_entry(score, word, line)
         return
@@ -176,7 +178,7 @@ def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
         layers = tuple(score.body.layers)
         known = HEADINGS + layers
         raise where.error(
-            f"{word!r} is no heading{did_you_mean(word, known) or f'; there are {enumerated(known, 20)}'}"
+            f"{quoted(word)} is no heading{did_you_mean(word, known) or f'; there are {enumerated(known, 20)}'}"
         )
     if inner and word not in ("phrase", "clip"):
         raise inner[0].where.error(f"indented, but there is nothing to say below {word}")
@@ -187,7 +189,7 @@ def _read_block(score: Score, head: Line, inner: list[Line]) -> None:
     elif word == "posture":
         name, equals, text = (part.strip() for part in rest.partition("="))
         if not equals:
-            raise where.error(f"{rest!r}: write posture NAME = {' | '.join(score.body.layers)}")
+            raise where.error(f"{quoted(rest, 80)}: write posture NAME = {' | '.join(score.body.layers)}")
         own = [known for known, found in score.postures.items() if found.score is score]
         _check_name(name, own, where)
         score.postures[name] = Phrase(name, score, (Line(where, text),), where)
@@ -202,7 +204,7 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
         rest, _, about = (part.strip() for part in rest.partition(":"))
     name, bracket, arguments = rest.partition("(")
     if bracket and (word == "clip" or not arguments.endswith(")")):
-        raise where.error(f"{rest!r}: write phrase NAME, or phrase NAME (WORD, WORD)")
+        raise where.error(f"{quoted(rest, 80)}: write phrase NAME, or phrase NAME (WORD, WORD)")
     words = tuple(part.strip() for part in arguments.removesuffix(")").split(",")) if bracket else ()
     if len(words) > MAX_OPEN:
         raise where.error(f"{len(words)} open words; a phrase has {MAX_OPEN} at most")
@@ -212,7 +214,7 @@ def _add_phrase(score: Score, word: str, rest: str, inner: list[Line], where: Wh
     known = score.phrases.get(name)
     _check_name(name, (name,) if known and known.score is score else (), where)
     if name in ("start", "tempo") or name[0].isdigit():
-        raise where.error(f"{name!r} cannot be a phrase's name: a line that begins so is something else")
+        raise where.error(f"{quoted(name)} cannot be a phrase's name: a line that begins so is something else")
     if not inner:
         raise where.error(f"{word} {name} has no lines")
     make = Clip if word == "clip" else Phrase
@@ -237,11 +239,11 @@ def _include(score: Score, where: Where, name: str, other: Score) -> None:
 def _check_name(name: str, taken: Container[str], where: Where) -> str:
     """Return a new name; FormatError if it is malformed, reserved or taken."""
     if not NAME.fullmatch(name):
-        raise where.error(f"{name!r} cannot be a name: use letters, digits and hyphens")
+        raise where.error(f"{quoted(name)} cannot be a name: use letters, digits and hyphens")
     if name in (*SIDES, "neutral"):
-        raise where.error(f"{name!r} cannot be a name: it means something already")
+        raise where.error(f"{quoted(name)} cannot be a name: it means something already")
     if name in taken:
-        raise where.error(f"{name!r} is there already")
+        raise where.error(f"{quoted(name)} is there already")
     return name
 
 
@@ -249,10 +251,10 @@ def _add_entry(score: Score, layer: str, line: Line) -> None:
     """Add a line of a vocabulary, or a facing, to the score."""
     name, equals, text = (part.strip() for part in line.text.partition("="))
     if not equals:
-        raise line.where.error(f"{line.text!r}: write NAME = what it is")
+        raise line.where.error(f"{quoted(line.text, 80)}: write NAME = what it is")
     if layer == "facings":
         if not NUMBER.fullmatch(text):
-            raise line.where.error(f"{text!r}: a facing is degrees to the left of the audience")
+            raise line.where.error(f"{quoted(text)}: a facing is degrees to the left of the audience")
         score.facings[_check_name(name, {}, line.where)] = number(text, name, line.where)
         return
     positions = score.positions.setdefault(layer, {})
@@ -266,15 +268,15 @@ def _parse_position(score: Score, layer: str, text: str, where: Where) -> Positi
     """Parse a position's definition: one part, or those of the leading limb and of the other around a slash."""
     parts = text.split("/")
     if len(parts) > 1 and not score.paired(layer):
-        raise where.error(f"{text!r}: a / is for two limbs, and the {layer} is none")
+        raise where.error(f"{quoted(text)}: a / is for two limbs, and the {layer} is none")
     if len(parts) > 2:
-        raise where.error(f"{text!r}: one / too many")
+        raise where.error(f"{quoted(text)}: one / too many")
     positions = [_parse_terms(score, layer, part, where) for part in parts]
     if len(positions) == 1:
         return positions[0]
     for part, position in zip(parts, positions, strict=True):
         if position.lead != position.other:
-            raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
+            raise where.error(f"{quoted(part.strip())} is for both sides; beside a / goes what one limb does")
     return Position(positions[0].lead, positions[1].lead, True)
 
 
@@ -284,7 +286,7 @@ def _parse_terms(score: Score, layer: str, text: str, where: Where) -> Position:
     for term in text.split(","):
         words = term.split()
         if not words:
-            raise where.error(f"{text.strip()!r}: nothing between commas" if text.strip() else "nothing is said")
+            raise where.error(f"{quoted(text.strip())}: nothing between commas" if text.strip() else "nothing is said")
         setting = _parse_setting(score, layer, words, where)
         if setting is not None:
             sided = bool(setting.get("lean left")) if score.paired(layer) else setting != mirrored(setting)
@@ -321,7 +323,7 @@ def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> S
     if not set(parts) <= set(joints):
         if NUMBER.fullmatch(words[-1]):
             known = [*joints, *score.body.groups, *SUPPORTS, *STANDING]
-            raise where.error(f"{first!r} is no joint of the {layer}{did_you_mean(first, known)}")
+            raise where.error(f"{quoted(first)} is no joint of the {layer}{did_you_mean(first, known)}")
         return None
     setting: dict[object, float] = {}
     for name, value in _pairs(words[1:], where):
@@ -331,7 +333,7 @@ def _parse_angles(score: Score, layer: str, words: list[str], where: Where) -> S
             names |= {angle.opposite: (key, -1.0) for key, angle in angles.items() if angle.opposite}
             if name not in names:
                 hint = did_you_mean(name, names) or f"; it has {', '.join(names)}"
-                raise where.error(f"{name!r} is no angle of the {first}{hint}")
+                raise where.error(f"{quoted(name)} is no angle of the {first}{hint}")
             key, sign = names[name]
             setting[joint, angles[key].axis] = sign * angles[key].sign * shares.get(key, 1.0) * value
     if not setting:
@@ -350,7 +352,7 @@ def _parse_standing(words: list[str], where: Where) -> dict[object, float]:
         known = (*STANDING, "lean")
         if word not in known:
             hint = did_you_mean(word, known) or f"; there are {', '.join(known)}"
-            raise where.error(f"{word!r} means nothing of a leg that stands{hint}")
+            raise where.error(f"{quoted(word)} means nothing of a leg that stands{hint}")
         value = number(next(rest, ""), f"{word} {direction}".strip(), where)
         least, most = STANDING.get(word, (-200.0, 200.0))
         if not least <= value <= most:

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from motionmind.body.anatomy import SIDES, Anatomy
-from motionmind.errors import FormatError, did_you_mean
+from motionmind.display import displayed
+from motionmind.errors import FormatError, did_you_mean, quoted
 
 Setting = Mapping[object, float]
 
@@ -135,13 +136,15 @@ class Score:
             return self._led_by_side(layer, text, where)
         if len(parts) > 2 or not self.paired(layer):
             raise where.error(
-                f"{text!r}: left / right is for two limbs" if len(parts) == 2 else f"{text!r}: one / too many"
+                f"{quoted(text)}: left / right is for two limbs"
+                if len(parts) == 2
+                else f"{quoted(text)}: one / too many"
             )
         settings = []
         for part in parts:
             position = self._combine(layer, part, where)
             if position.lead != position.other:
-                raise where.error(f"{part.strip()!r} is for both sides; beside a / goes what one limb does")
+                raise where.error(f"{quoted(part.strip())} is for both sides; beside a / goes what one limb does")
             settings.append(position.lead)
         return settings[0], settings[1]
 
@@ -150,10 +153,11 @@ class Score:
         words = text.split()
         sides = [word for word in words if word in SIDES]
         if len(sides) > 1:
-            raise where.error(f"{text!r} names two sides")
+            raise where.error(f"{quoted(text)} names two sides")
         position = self._combine(layer, " ".join(word for word in words if word not in SIDES), where)
         if position.sided and not sides:
-            raise where.error(f"{text!r}: say which side: {text} left or {text} right")
+            short = displayed(text, 40)
+            raise where.error(f"{short!r}: say which side: {short} left or {short} right")
         settings = position.lead, position.other
         return self.mirrored(layer, settings) if sides == ["right"] else settings
 
@@ -204,7 +208,7 @@ class Score:
         if name not in known:
             elsewhere = [other for other, names in home.positions.items() if name in names]
             hint = did_you_mean(name, known) or (f"; it is a position of the {elsewhere[0]}" if elsewhere else "")
-            raise where.error(f"{word!r} is no position of the {layer}{hint}")
+            raise where.error(f"{quoted(word)} is no position of the {layer}{hint}")
         return known[name]
 
     def phrase(self, word: str, where: Where) -> Phrase:
@@ -212,12 +216,12 @@ class Score:
         prefix, dot, name = word.rpartition(".")
         home = self._included(prefix, where) if dot else self
         if name not in home.phrases:
-            raise where.error(f"{word!r} is no phrase{did_you_mean(name, home.phrases)}")
+            raise where.error(f"{quoted(word)} is no phrase{did_you_mean(name, home.phrases)}")
         return home.phrases[name]
 
     def _included(self, prefix: str, where: Where) -> Score:
         if prefix not in self.included:
-            raise where.error(f"{prefix!r} is no score that is included{did_you_mean(prefix, self.included)}")
+            raise where.error(f"{quoted(prefix)} is no score that is included{did_you_mean(prefix, self.included)}")
         return self.included[prefix]
 
     def facing(self, word: str, where: Where) -> float:
@@ -226,7 +230,7 @@ class Score:
             return number(word, "face", where)
         if word not in self.facings:
             raise where.error(
-                f"{word!r} is no facing{did_you_mean(word, self.facings)}; give one of the facings, or degrees"
+                f"{quoted(word)} is no facing{did_you_mean(word, self.facings)}; give one of the facings, or degrees"
             )
         return self.facings[word]
 
@@ -250,7 +254,7 @@ def _overlay(upper: Setting, lower: Setting) -> Setting:
 def tempo(text: str, where: Where) -> float:
     """Parse counts per minute, from 1 to 6000; FormatError for anything else."""
     if not NUMBER.fullmatch(text) or not 1.0 <= float(text) <= 6000.0:
-        raise where.error(f"tempo {text}: give counts a minute, from 1 to 6000")
+        raise where.error(f"tempo {displayed(text, 40)}: give counts a minute, from 1 to 6000")
     return float(text)
 
 

@@ -22,7 +22,7 @@ GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another po
 # slower than any movement that was recorded, mostly by less than this. Chosen on `indian` and `cmu-05`: at 3, movement
 # of `cmu-05` is taken for the dancer's less often.
 LIVELIER = 4.0
-# How much more detail joints get which no step moves, where a movement stands still beside what it copies; chosen on
+# How much more detail all joints but the legs' get, where a movement stands still beside what it copies; chosen on
 # `cmu-05`.
 MISSES = 0.6
 
@@ -80,10 +80,10 @@ def share_of_detail(
 ) -> tuple[Floats, Floats]:
     """Return how much of the detail of copied moves a movement gets in each of its own: [T] and [T].
 
-    The first is for the joints that take steps, hips to ankles. They get all of it where the movement is at least a
-    LIVELIER-th as fast as the move that is copied, and in proportion to its speed where it is slower. The second is for
-    all others, which get more, by MISSES times the share of the speed that is missing. Speeds are the turns from end to
-    end, root mean square over the joints, a second.
+    The first is for the legs, which get all of it where the movement is at least a LIVELIER-th as fast as the move that
+    is copied, and in proportion to its speed where it is slower. The second is for all others, which get more, by
+    MISSES times the share of the speed that is missing. Speeds are the turns from end to end, root mean square over the
+    joints, a second.
 
     Args:
         moves: the corpus's moves.
@@ -95,8 +95,8 @@ def share_of_detail(
     speed = _turns(poses[:-1], poses[1:]) / seconds
     copied_speed = _turns(orientations[moves.begins[copied]], orientations[moves.ends[copied]]) / moves.seconds[copied]
     relative = np.divide(speed, copied_speed, out=np.ones(len(copied)), where=speed < copied_speed)
-    stepping = np.minimum(LIVELIER * relative, 1.0)
-    return stepping, stepping * (1.0 + MISSES * (1.0 - relative))
+    legs = np.minimum(LIVELIER * relative, 1.0)
+    return legs, legs * (1.0 + MISSES * (1.0 - relative))
 
 
 def _turns(a: Floats, b: Floats) -> Floats:

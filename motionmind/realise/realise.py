@@ -262,10 +262,9 @@ def _detail(walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carria
         return np.zeros((len(clock.frames), joints, 3)), np.zeros(0, dtype=np.int64)
     orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
     moves = likest_moves(corpus.moves, orientations, poses)
-    stepping, others = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
-    share = np.repeat(others[:, None], joints, axis=1)
-    for leg, knee in find_legs(corpus.skeleton)[1]:
-        share[:, leg[: knee + 2]] = stepping[:, None]
+    of_legs, of_others = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
+    share = np.repeat(of_others[:, None], joints, axis=1)
+    share[:, [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]] = of_legs[:, None]
     scale = np.repeat(share * walk.trust[::2] ** LINGERS, between + 1, axis=0)
     times, detail = subdivide_times(at, between), detail_of(corpus, moves)
     detail = detail * np.concatenate([scale, scale[-1:]])[..., None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import signal
@@ -595,12 +596,27 @@ def test_an_interrupt_is_quiet(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals and pipes as POSIX has them")
-def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize("output", [[], ["-o", "tween.json"]])
+def test_a_reader_that_goes_away_is_no_error(output: list[str], tmp_path: Path) -> None:
+    postures = [BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth")]
+    words = ["tween", *postures, "--corpus", "ballet", *output] if output else ["corpus", "info", "ballet"]
     end, begin = os.pipe()
     os.close(end)
-    process = start("corpus", "info", "ballet", cwd=tmp_path, stdout=begin)
+    process = start(*words, cwd=tmp_path, stdout=begin)
     os.close(begin)
     assert process.communicate()[1] == ""
+    assert process.returncode == 0
+    for name in output[1:]:
+        assert len(read_motion(tmp_path / name)) > 1
+
+
+def test_running_leaves_the_log_as_it_was(run: Run) -> None:
+    """Whoever calls the command line from Python gets no notes from then on that were not asked for."""
+    log = logging.getLogger("motionmind")
+    before = log.level, list(log.handlers)
+    for words in (["corpus", "list"], ["corpus", "info", "nowhere"]):
+        run(*words)
+        assert (log.level, log.handlers) == before
 
 
 # --- files are safe -------------------------------------------------------------------------------------------------

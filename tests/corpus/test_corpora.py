@@ -17,8 +17,8 @@ from motionmind.corpus.bundled import bundled
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played, posture
+from motionmind.notation.posture_line import Row
 from motionmind.notation.read import read_score
-from motionmind.notation.rows import Row
 from motionmind.notation.score import Score, Setting
 
 CORPORA = bundled("corpora")

@@ -15,7 +15,6 @@ import faulthandler
 import io
 import json
 import random
-import resource
 import shutil
 import signal
 import struct
@@ -48,6 +47,11 @@ from motionmind.tween.narrative import explain
 from motionmind.tween.report import encode_report, read_report
 from motionmind.tween.result import report_of
 from motionmind.variation.variation_json import read_variation
+
+try:
+    import resource
+except ImportError:  # the system is no POSIX
+    resource = None  # type: ignore[assignment]
 
 ROOT = Path(__file__).parents[2]
 SEEDS = Path(__file__).parent / "seeds"
@@ -425,6 +429,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--reader", help="damage the files of this reader alone")
     parser.add_argument("--table", action="store_true", help="print the table of docs/robustness.md")
     given = parser.parse_args(arguments)
+    if resource is None:
+        print(
+            "error: there is no POSIX here, by which time and memory are limited: use Linux or macOS", file=sys.stderr
+        )
+        return 2
     faulthandler.enable()
     in_memory = Path("/dev/shm")  # where files cost no time
     folder = Path(tempfile.mkdtemp(prefix="fuzz-", dir=in_memory if in_memory.is_dir() else None))

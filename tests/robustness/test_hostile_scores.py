@@ -140,4 +140,28 @@ def test_a_hundred_thousand_postures_take_a_second(turn: str, tmp_path: Path) ->
     motion = compose(path)
     taken = time.process_time() - began
     assert 0.75 * MAX_POSTURES < len(motion) <= MAX_POSTURES
-    assert taken < 3.0, f"{taken:.1f} s"  # 1 s on an idle machine
+    assert taken < 2.0, f"{taken:.1f} s"  # 0.6 s of work on an idle machine
+
+
+LONG_LINES = {
+    "a line that calls nothing": "clip c\n  start | stand\n  " + "what is this " * 3000 + "\n",
+    "a line with an open word left empty": "phrase q (W)\n  1 | W\nclip c\n  q (" + "stand " * 3000 + ",)\n",
+    "a cell": "clip c\n  start | " + "stand still " * 3000 + "\n",
+    "a first cell": "clip c\n  start | stand\n  " + "turn slowly " * 3000 + " | stand\n",
+    "a side": "clip c\n  start | stand left right " + "stand " * 3000 + "\n",
+    "a way to do a phrase": STEP + "clip c\n  start | stand\n  s, " + "very slowly " * 3000 + "\n",
+    "a tempo": "clip c\n  tempo " + "very slow " * 3000 + "\n",
+    "a heading": "legs " + "and arms " * 3000 + "\n",
+    "a phrase's name": "phrase " + "one two " * 3000 + "\n  1 | stand\n",
+    "a position": "arms\n  " + "one two " * 3000 + "= low\n",
+    "an angle": "arms\n  a = shoulder " + "up and down " * 3000 + "\n",
+    "an unknown heading": "and so on " * 3000 + "\n",
+}
+
+
+@pytest.mark.parametrize("text", LONG_LINES.values(), ids=list(LONG_LINES))
+def test_a_message_quotes_no_more_of_a_line_than_shows_which(text: str, tmp_path: Path) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(FormatError) as refused:
+        motions(read_score(path))
+    assert len(str(refused.value)) < len(str(path)) + 400

@@ -103,6 +103,16 @@ def test_a_printed_report_holds_the_hash_of_its_motion_too(run: Run, tmp_path: P
     assert report["motion_sha256"] == hashlib.sha256((tmp_path / "out.json").read_bytes()).hexdigest()
 
 
+@pytest.mark.parametrize("way", [["--report", "-"], ["--json"]])
+def test_a_printed_report_of_a_variation_holds_the_hash_of_its_file(run: Run, tmp_path: Path, way: list[str]) -> None:
+    report = run("vary", "ballet/jump", "-o", "variation.json", "--nudge", 5, *way).json
+    written = (tmp_path / "variation.json").read_bytes()
+    assert report["motion_sha256"] == hashlib.sha256(written).hexdigest()
+    assert run("review", "variation.json", "--list", "--json").json["motion_sha256"] is None  # nothing is written
+    report = run("review", "variation.json", "--cut", "0..1", "--paste", 3, "-o", "cut.json", "--json").json
+    assert report["motion_sha256"] == hashlib.sha256((tmp_path / "cut.json").read_bytes()).hexdigest()
+
+
 def test_a_file_is_written_at_once_outside_and_together_inside(tmp_path: Path) -> None:
     (tmp_path / "old").write_bytes(b"old")
     with files.all_or_none() as written:

@@ -59,12 +59,11 @@ def test_four_ballet_tweens_differ_and_are_nearly_proven(ballet: Engine, names: 
 
 def test_four_tweens_of_recorded_dance_differ_and_are_nearly_proven(cmu05: Engine) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(3):
-        ends = []
-        for clip in rng.choice(cmu05.corpus.clips, size=2):
-            motion = cmu05.corpus.motion(clip)
-            ends.append(motion.posture(int(rng.integers(len(motion)))))
-        check(find(cmu05, (ends[0], ends[1]), 4), 0.2, gap=0.02)
+    ends = []
+    for clip in rng.choice(cmu05.corpus.clips, size=2):
+        motion = cmu05.corpus.motion(clip)
+        ends.append(motion.posture(int(rng.integers(len(motion)))))
+    check(find(cmu05, (ends[0], ends[1]), 4), 0.2, gap=0.02)
 
 
 @pytest.mark.parametrize("asked", [{"differ": 0.5}, {"coordination": "progression"}, {"guide": 0.0}, {"strict": True}])

@@ -116,7 +116,7 @@ def test_a_tolerance_that_is_said_to_help_does(found: Found) -> None:
                 coarser = fit(discretization=Codebook(15.0, {fault["joint"]: degrees}))
                 assert fault["joint"] not in at_fault(coarser, a, b)
                 tried += 1
-            if tried >= 3:
+            if tried:  # each takes a corpus of its own
                 return
     assert tried
 

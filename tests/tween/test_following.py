@@ -53,7 +53,7 @@ def test_a_held_joint_stays_where_it_would_have_moved(name: str) -> None:
     """Of any joint that starts and ends in one state, and that the free movement takes away from it, legs and all."""
     engine = engine_of(name)
     tolerances, held, legs = engine.space.tolerances, 0, 0
-    for a, b in pairs(engine, 12 if name == "ballet" else 40):
+    for a, b in pairs(engine, 12 if name == "ballet" else 24):
         states = engine.space.assign(engine.corpus.to_chains(np.stack([a.rotations, b.rotations])))
         try:
             free = engine.tween(a, b, moves=8)

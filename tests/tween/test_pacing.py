@@ -219,7 +219,7 @@ def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -
 
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:
     still, filled = [], []
-    for seed in range(6):
+    for seed in range(4):
         a, b = ends(engine, seed)
         long = 4.0 * seconds(engine.tween(a, b))
         plain, tween = (engine.tween(a, b, duration=long, without=names) for names in (["pace"], []))
