@@ -199,12 +199,7 @@ def vary(
             **trajectory,
             **request,
         )
-<<<<<<< HEAD
-    _write(outputs, report, variation, request["fps"])
-    print_variation(variation, as_json)
-=======
-    print_variation(variation, as_json, _write(files, variation, request["fps"]))
->>>>>>> 40a91d4
+    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
     _print_advice(variation, engine)
     if not as_json:
         print_written([path for path, _ in files])
@@ -288,24 +283,18 @@ def _read_facing(corpus: str, home: Path | None) -> Facing:
     return facing
 
 
-<<<<<<< HEAD
-def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, fps: float) -> None:
+def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, fps: float) -> str | None:
     """Write a variation, and its report if asked, or nothing if one of the files fails.
-=======
-def _write(files: Sequence[Path], variation: Variation, fps: float) -> str | None:
-    """Write a variation, and its report if there is a second file, or nothing if one of them fails.
->>>>>>> 40a91d4
 
     JSON holds the whole variation, other files its movement, resampled if their frames must be even in time.
 
     Returns:
-        The hash of the variation's file; None if it went to a pipe.
+        The hash of the first of the variation's files; None if there is none, or it went to a pipe.
     """
     from motionmind.formats import write_atomically
     from motionmind.variation.variation_json import write_variation
 
     with all_or_none() as written:
-<<<<<<< HEAD
         for path in outputs:
             suffix = path.suffix.lower()
             if suffix == ".json":
@@ -313,18 +302,9 @@ def _write(files: Sequence[Path], variation: Variation, fps: float) -> str | Non
             else:
                 motion = variation.motion()
                 write(path, motion.resample(fps) if suffix in _EVEN else motion)
+        motion_sha256 = sha256_of(written, next(iter(outputs), None))
         if report:
-            told = variation.report() | {"motion_sha256": sha256_of(written, outputs[0])}
-=======
-        if suffix == ".json":
-            write_variation(output, variation)
-        else:
-            motion = variation.motion()
-            write(output, motion.resample(fps) if suffix in _EVEN else motion)
-        motion_sha256 = sha256_of(written, output)
-        for report in reports:
             told = variation.report() | {"motion_sha256": motion_sha256}
->>>>>>> 40a91d4
             write_atomically(report, f"{json.dumps(told)}\n".encode())
     return motion_sha256
 
