@@ -32,7 +32,7 @@ DETAIL = 0.2  # seconds within which the root smooths the fine detail that it ca
 REACH = 0.002  # metres by which a leg is too short
 LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
 PLACE = 0.08  # metres that a standing leg leans more than the movement has it
-KNEE = 0.1  # radians that a standing leg's knee bends more or less than the movement has it; chosen on cmu-05
+KNEE = 0.15  # radians that a standing leg's knee bends more or less than the movement has it; chosen on cmu-05
 STRAIGHT = 0.15  # radians: a knee that is straighter counts as bent so far, for it turns a leg's length into any bend
 PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
 TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
@@ -123,7 +123,7 @@ def carry(
         flights = find_flights(
             known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
         )
-    flying = flying_frames(flights, (hovering[0], hovering[1]), count)
+    flying, freedom = flying_frames(flights, (hovering[0], hovering[1]), count), leg_freedom(flights, count, fps)
     planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
     bearing = find_bearing(*planned)
     if "steps" in without:
@@ -143,12 +143,12 @@ def carry(
         mass = _mass(skeleton, posed)
         steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += _prior_rows(root, bearing, fps)
-        steady += _standing_rows(shape, bearing, floor, leg_freedom(flights, count, fps))
+        steady += _standing_rows(shape, bearing, floor, freedom)
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
             rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
-            rows += _knee_rows(skeleton, own.places, shape, bearing, floor, start, feet)
+            rows += _knee_rows(skeleton, own.places, shape, bearing, floor, start, feet, freedom)
             if balances:
                 points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
                 centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
@@ -156,11 +156,10 @@ def carry(
             start = solve(rows, start, fixed)
         off = _departures(skeleton, shape, bearing, floor, start, feet, known.moving, fps)
         posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
-    bound = 1.0 - leg_freedom(flights, count, fps)
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
     start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
-    return Carried(start, off, bearing.holds(fps), heights, bound)
+    return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom)
 
 
 def _departures(
@@ -381,11 +380,12 @@ def _knee_rows(
     floor: Floats,
     root: Floats,
     feet: list[Foot],
+    freedom: Floats,
 ) -> list[Rows]:
     """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `_reach_rows`.
 
     A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
-    then, as a body goes over a leg that it stands on.
+    then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
     """
     rows, every = [], np.arange(len(root))
     for number, foot in enumerate(feet):
@@ -396,7 +396,7 @@ def _knee_rows(
         lever = far / (thigh * shank * np.sin(bends))  # radians that the knee bends a metre of the leg's length
         along = lever[:, None] * leg / np.maximum(far, 1e-9)[:, None]
         target = np.sum(along * root, axis=-1) + lever * (far - was)
-        rows.append(position_rows(every, along, target, bearing.loads[:, number] * KNEE**-2.0))
+        rows.append(position_rows(every, along, target, bearing.loads[:, number] * (1.0 - freedom) * KNEE**-2.0))
     return rows
 
 

@@ -21,7 +21,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
-from motionmind.realise.detail import GOES_OVER, LIVELIER, detail_of, likest_moves, share_of_detail
+from motionmind.realise.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
 from motionmind.realise.expectation import Expectation
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
@@ -263,8 +263,9 @@ def test_a_movement_gets_detail_in_proportion_to_its_speed(slower: float) -> Non
     moves, shown = corpus.moves, corpus.to_chains(corpus.rotations)[:, :23]
     copied = np.flatnonzero((moves.begins < 8) & (moves.ends > moves.begins))[:6]
     poses = shown[[*moves.begins[copied], moves.ends[copied[-1]]]]
-    share = share_of_detail(moves, shown, copied, poses, slower * moves.seconds[copied])
-    np.testing.assert_allclose(share, min(1.0, LIVELIER / slower), rtol=1e-12)
+    legs, others = share_of_detail(moves, shown, copied, poses, slower * moves.seconds[copied])
+    np.testing.assert_allclose(legs, min(1.0, LIVELIER / slower), rtol=1e-12)
+    np.testing.assert_allclose(others / legs, 1.0 + MISSES * (1.0 - min(1.0, 1.0 / slower)), rtol=1e-12)
 
 
 def test_rest_gets_no_detail_of_movement() -> None:
