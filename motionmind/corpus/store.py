@@ -29,7 +29,7 @@ CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that 
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
-    *("_typing.py", "errors.py", "files.py", "jit.py"),
+    *("_typing.py", "display.py", "errors.py", "files.py", "jit.py"),
     *("geometry", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
 )
 
