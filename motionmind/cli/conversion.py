@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read_mapping, write_all
+from motionmind.cli.files import MOVEMENT, check_outputs, evened, note_lossy_fields, read_mapping, write_all
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
@@ -136,6 +136,7 @@ def convert(
     fps = fps or (taker.rates[suffix] if taker else None)
     if fps is not None:
         motion = motion.resample(fps)
+    motion = evened(output, motion)
     if taker:
         write_for(output, motion, taker, unit=out_unit)
     elif suffix == ".txt":

@@ -189,7 +189,10 @@ def _read_clips(
             if file.suffix.lower() == ".score":
                 yield from motions(read_score(file))
             else:
-                yield own_skeleton(replace(read(file, *source), name=names[file]), mapping)
+                motion = own_skeleton(replace(read(file, *source), name=names[file]), mapping)
+                if len(motion) == 1:
+                    note(f"{file}: holds one posture, and no move to learn from")
+                yield motion
     progress("learning")
 
 

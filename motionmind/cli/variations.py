@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, write
+from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
     Interruption,
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
 
 _STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
-_EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
 @command("motionmind vary macarena --attractor rossler -o variation.json")
@@ -66,7 +65,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     type=Whole(),
     metavar="N",
     default=0,
-    help="Begin at frame N, counted from the end if negative.",
+    help="Begin at frame N, counted from the end if negative; a recording begins where those of the corpus do.",
 )
 @option(
     "--to",
@@ -268,8 +267,14 @@ def _read_piece(
     if unused and not judge:
         raise click.UsageError(f"{unused} is for --corpus, which is not given", context)
     engine = load_engine(judge, home) if judge else None
-    if rate is None and engine and source.kind == "file":
-        rate = engine.corpus.rate
+    if engine and source.kind == "file" and not motion.keyframed:
+        rate = engine.corpus.rate if rate is None else rate
+        if engine.corpus.skip and not given_option(context, ["begin"]) and named.moment is None:
+            begin = engine.corpus.skip
+            note(
+                f"{source.word}: begins at frame {begin}, as the recordings of {engine.corpus.name} do "
+                "(--from 0 for all of it)"
+            )
     frames = select_part(named, motion, begin, end)
     facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
     return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine
@@ -301,7 +306,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
                 write_variation(path, variation)
             else:
                 motion = variation.motion()
-                write(path, motion.resample(fps) if suffix in _EVEN else motion)
+                write(path, motion.resample(fps) if suffix in EVEN else motion)
         motion_sha256 = sha256_of(written, next(iter(outputs), None))
         if report:
             told = variation.report() | {"motion_sha256": motion_sha256}

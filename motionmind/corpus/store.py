@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from motionmind.corpus import versions
 from motionmind.corpus.bundled import bundled
-from motionmind.errors import CorpusError, FormatError
+from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
@@ -63,7 +63,7 @@ def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     with suppress(OSError, ValueError):  # not a possible path: too long, or with a zero byte
         if name and (Path(name) / MANIFEST).is_file():
             return Path(name)
-    raise CorpusError(f"no corpus {name!r}; there are {', '.join(corpora) or 'none'}")
+    raise CorpusError(f"no corpus {name!r}{suggestion(name, corpora)}")
 
 
 def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
