@@ -275,5 +275,35 @@ def check(name: str, as_json: bool, details: bool, pairs: int, seed: int, home: 
         print_check(found, with_details=details)
 
 
-for _command in (build, list_corpora, info, check):
+@command("motionmind corpus rename mine dancer")
+@click.argument("name")
+@click.argument("new")
+@HOME
+def rename(name: str, new: str, home: Path | None) -> None:
+    """Rename a corpus that you built.
+
+    Corpora that were mixed from it keep its old name in their reports.
+    """
+    from motionmind.corpus import store
+
+    place = store.rename(name, new, home)
+    click.echo(f"renamed {displayed(name)} to {displayed_path(place)}")
+
+
+@command("motionmind corpus delete dancer --yes")
+@click.argument("name")
+@option("--yes", "is_sure", section=Section.EDITS, is_flag=True, help="Delete it; there is no way back.")
+@HOME
+def delete(name: str, is_sure: bool, home: Path | None) -> None:
+    """Delete a corpus that you built."""
+    from motionmind.corpus import store
+
+    place = store.place_for(name, home)
+    if not is_sure and place.exists():
+        raise MotionMindError(f"{place}: would be deleted for good; say --yes")
+    store.delete(name, home)
+    click.echo(f"deleted {displayed_path(place)}")
+
+
+for _command in (build, list_corpora, info, check, rename, delete):
     corpora.add_command(_command)

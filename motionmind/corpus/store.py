@@ -75,6 +75,66 @@ def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     return home(folder) / "corpora" / name
 
 
+def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
+    """Delete a user's corpus at once; who has loaded it keeps what it read.
+
+    Args:
+        name: of the corpus.
+        folder: the user's home (`home`).
+
+    Raises:
+        CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, or it
+            cannot be deleted.
+    """
+    place = _own(name, folder)
+    try:
+        versions.remove(place)
+    except OSError as error:
+        raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
+
+
+def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Rename a user's corpus, and return its new folder.
+
+    First its manifest gets the new name, then its folder; each of them at once. After a kill in between, the corpus is
+    whole under its old name, and can be renamed again.
+
+    Args:
+        name: of the corpus.
+        new: its new name, which no corpus has.
+        folder: the user's home (`home`).
+
+    Raises:
+        CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, the
+            new name is invalid or taken, or it cannot be renamed.
+    """
+    place, target = _own(name, folder), place_for(new, folder)
+    if target.exists():
+        raise CorpusError(f"there is a corpus {new!r} already; corpus delete {new} removes it")
+    manifest = read_manifest(place)
+    try:
+        with versions.hold(_place_of(place, manifest)):  # so that no build in the meantime removes what it names
+            data = msgspec.json.encode(read_manifest(place) | {"name": new})
+            replace_file(place / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
+            place.rename(target)
+        sync_folder(target.parent)
+    except OSError as error:
+        raise CorpusError(f"{place}: cannot be renamed: {error.strerror or error}") from error
+    return target
+
+
+def _own(name: str, folder: str | os.PathLike[str] | None) -> Path:
+    """Return the folder of a built corpus of the user's own; CorpusError if it is none."""
+    place = place_for(name, folder)
+    corpora = list_corpora(folder)
+    if corpora.get(name) != place:
+        own = [known for known, where in corpora.items() if where.parent == place.parent]
+        raise CorpusError(f"no corpus {name!r} of your own{suggestion(name, own)}")
+    if stranger := versions.find_stranger(place, MANIFEST):
+        raise CorpusError(f"{place}: holds {stranger.relative_to(place)}, which is no part of a built corpus")
+    return place
+
+
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest of a corpus's folder; FormatError if it is invalid or of an unknown version."""
     return _parse(folder / MANIFEST, _read(folder / MANIFEST))

@@ -433,6 +433,20 @@ def test_a_corpus_of_the_same_name_is_replaced(run: Run) -> None:
     assert [entry["name"] for entry in built(run, "step.bvh", "--rate", 5)["clips"]] == ["step"]
 
 
+def test_a_corpus_is_renamed_and_deleted(run: Run, tmp_path: Path) -> None:
+    write_motion("walk.bvh", clip())
+    built(run, "walk.bvh")
+    place = tmp_path / "home" / "corpora"
+    assert run("corpus", "rename", "mine", "walks").out == f"renamed mine to {place / 'walks'}\n"
+    assert run("corpus", "info", "walks").out.startswith("name       walks\n")
+    ran = run("corpus", "delete", "walks")
+    assert (ran.code, ran.err) == (2, f"error: {place / 'walks'}: would be deleted for good; say --yes\n")
+    assert run("corpus", "delete", "walks", "--yes").out == f"deleted {place / 'walks'}\n"
+    assert list(place.iterdir()) == []
+    for words in (("delete", "ballet", "--yes"), ("rename", "ballet", "mine"), ("delete", "walks", "--yes")):
+        assert run("corpus", *words).code == 2
+
+
 def test_what_cannot_be_read_is_listed_as_such(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "home" / "corpora" / "torn"
     folder.mkdir(parents=True)
