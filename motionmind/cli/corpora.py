@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import clip_names, read, read_mapping
 from motionmind.cli.options import (
     HOME,
@@ -76,6 +77,7 @@ def corpora(context: click.Context) -> None:
     section=Section.LEARN,
     multiple=True,
     metavar="CORPUS[:WEIGHT]",
+    shell_complete=completion.corpora,
     help="Learn from another corpus, too, and count each of its moves WEIGHT times  [default: 1]. Repeatable.",
 )
 @option(
@@ -223,7 +225,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
 
 
 @command("motionmind corpus info ballet --json")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @JSON
 @HOME
 def info(name: str, as_json: bool, home: Path | None) -> None:
@@ -248,7 +250,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
 
 
 @command("motionmind corpus check ballet --pairs 500 --seed 1")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @JSON
 @option("--details", section=Section.OUTPUT, is_flag=True, help="Print each recording with faults.")
 @option(
@@ -276,7 +278,7 @@ def check(name: str, as_json: bool, details: bool, pairs: int, seed: int, home: 
 
 
 @command("motionmind corpus rename mine dancer")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @click.argument("new")
 @HOME
 def rename(name: str, new: str, home: Path | None) -> None:
@@ -291,7 +293,7 @@ def rename(name: str, new: str, home: Path | None) -> None:
 
 
 @command("motionmind corpus delete dancer --yes")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @option("--yes", "is_sure", section=Section.EDITS, is_flag=True, help="Delete it; there is no way back.")
 @HOME
 def delete(name: str, is_sure: bool, home: Path | None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
@@ -39,7 +40,7 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
 
 
 @command("motionmind vary macarena --attractor rossler -o variation.json")
-@click.argument("source", metavar="PIECE")
+@click.argument("source", metavar="PIECE", shell_complete=completion.movement)
 @outputs(f"Write {OUTPUTS}; review takes .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
@@ -49,6 +50,7 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
     "corpus",
     section=Section.CORPORA,
     metavar="NAME",
+    shell_complete=completion.corpora,
     help="Judge what is abrupt, and smooth it, by this corpus  [default: the corpus that the piece comes from, if any]",
 )
 @HOME
@@ -87,7 +89,8 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
     section=Section.TRAJECTORY,
     metavar="NAME",
     default="lorenz",
-    help="Follow this flow: lorenz, rossler, chua, duffing, halvorsen or thomas.",
+    shell_complete=completion.flows,
+    help=f"Follow this flow: {', '.join(completion.FLOWS[:-1])} or {completion.FLOWS[-1]}.",
 )
 @option(
     "--parameter",

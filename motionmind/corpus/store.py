@@ -10,17 +10,18 @@ import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
-import numpy as np
 import platformdirs
-from numpy.typing import NDArray
 
 from motionmind.corpus import versions
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: (1,), BUILT: (1, 2)}  # that can be read; the last is written
@@ -193,6 +194,8 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
 
 def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a new version and make it the current one; all that it consists of is on disk before that."""
+    import numpy as np  # here, for shells complete names of corpora without it
+
     with versions.new_version(folder) as version:
         for name, array in arrays.items():
             with (version / f"{name}.npy").open("xb") as file:
@@ -297,6 +300,8 @@ def remedy(folder: Path) -> str:
 
 def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Open a corpus's arrays in `place`; the manifest states each one's type and shape, as [type, *shape], or None."""
+    import numpy as np
+
     arrays = {}
     for name, shape in shapes.items():
         file = _array_file(place, name)
