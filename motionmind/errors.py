@@ -115,6 +115,19 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
+def suggestion(name: str, known: Iterable[str], otherwise: str = "there are", most: int = 60) -> str:
+    """Return '; did you mean X?', or else the known names: '; there are X, Y', the first `most` of them.
+
+    Args:
+        name: the name that nothing has.
+        known: the names that there are.
+        otherwise: the words before them.
+        most: how many to list.
+    """
+    known = list(known)
+    return did_you_mean(name, known) or f"; {otherwise} {enumerated(known, most) or 'none'}"
+
+
 def enumerated(names: Iterable[str], most: int = 5) -> str:
     """Join names with commas for a message: the first `most`, then how many more there are."""
     names = list(names)

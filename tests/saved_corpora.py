@@ -1,4 +1,4 @@
-"""Small corpora on disk, and a program that saves one and is killed on the way."""
+"""Small corpora on disk, and a program that saves, renames or deletes one and is killed on the way."""
 
 from __future__ import annotations
 
@@ -64,10 +64,17 @@ def kill_before(change: int) -> None:
 
 
 def main(words: Mapping[str, str]) -> None:
-    """Save a corpus in a folder, and be killed before a change if one is given."""
+    """Save a corpus in a folder, or rename or delete the one there, and be killed before a change if one is given."""
     if change := int(words.get("change", 0)):
         kill_before(change)
-    store.save(Path(words["folder"]), MANIFEST, arrays(int(words["seed"])))
+    folder, home = Path(words["folder"]), Path(words["folder"]).parents[1]
+    match words.get("do", "save"):
+        case "save":
+            store.save(folder, MANIFEST, arrays(int(words["seed"])))
+        case "rename":
+            store.rename(folder.name, "legs", home)
+        case "delete":
+            store.delete(folder.name, home)
 
 
 if __name__ == "__main__":

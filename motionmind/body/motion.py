@@ -182,6 +182,13 @@ class Motion:
         """Frames per second, from the median step; 0 for a single frame."""
         return 0.0 if len(self) < 2 else float(1.0 / np.median(np.diff(self.times)))
 
+    @property
+    def is_even(self) -> bool:
+        """Whether the frames are evenly spaced in time, to a thousandth of a step."""
+        steps = self.times - np.linspace(self.times[0], self.times[-1], len(self))
+        length = float(self.times[-1] - self.times[0]) / max(len(self) - 1, 1)
+        return bool(np.abs(steps).max() <= 1e-3 * length)
+
     def resample(self, rate: float) -> Motion:
         """Return the motion at `rate` postures a second, from its first time on; rotations by slerp, root linearly.
 

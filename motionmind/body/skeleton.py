@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from motionmind._typing import Floats, Indices
-from motionmind.errors import SkeletonError
+from motionmind.errors import SkeletonError, suggestion
 from motionmind.geometry import rotations as rot
 
 
@@ -86,7 +86,7 @@ class Skeleton:
             SkeletonError: there is no such joint; the message names those there are.
         """
         if joint not in self.names:
-            raise SkeletonError(f"no joint {joint!r} in {self.name}; its joints are {', '.join(self.names)}")
+            raise SkeletonError(f"no joint {joint!r} in {self.name}{suggestion(joint, self.names, 'its joints are')}")
         return self.names.index(joint)
 
     def children(self, joint: int) -> list[int]:

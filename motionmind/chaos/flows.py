@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, suggestion
 
 Field = Callable[..., Any]
 
@@ -86,11 +86,11 @@ def flow_of(name: str, **parameters: float) -> Flow:
     28.0
     """
     if name not in FLOWS:
-        raise MotionMindError(f"no flow {name!r}; there are {', '.join(sorted(FLOWS))}")
+        raise MotionMindError(f"no flow {name!r}{suggestion(name, sorted(FLOWS))}")
     flow = FLOWS[name]
     for given in parameters:
         if given not in flow.parameters:
-            raise MotionMindError(f"{name} has no parameter {given!r}; it has {', '.join(flow.parameters)}")
+            raise MotionMindError(f"{name} has no parameter {given!r}{suggestion(given, flow.parameters, 'it has')}")
     return replace(flow, parameters={**flow.parameters, **parameters})
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, command, output
 from motionmind.cli.printing import count, print_written
@@ -22,7 +23,7 @@ _ABOUT = 300  # characters: a sentence rather than a name
 
 
 @command("motionmind postures ballet -o postures.png")
-@click.argument("source")
+@click.argument("source", shell_complete=completion.corpora)
 @output("Draw the named postures: .png.", required=False)
 @JSON
 @HOME

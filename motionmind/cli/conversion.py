@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, note_lossy_fields, read_mapping, write_all
+from motionmind.cli import completion
+from motionmind.cli.files import MOVEMENT, check_outputs, evened, note_lossy_fields, read_mapping, write_all
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @command("motionmind posture ballet/adagio --frame 23 -o A.json")
-@click.argument("source")
+@click.argument("source", shell_complete=completion.movement)
 @outputs(f"Write {OUTPUTS}; or .txt.")
 @option(
     "--clip",
@@ -67,7 +68,7 @@ def posture(
 
 
 @command("motionmind convert clip.bvh clip.json --skeleton human23 --fps 30")
-@click.argument("source", metavar="IN")
+@click.argument("source", metavar="IN", shell_complete=completion.movement)
 @click.argument("output", type=FILE, metavar="OUT")
 @option(
     "--skeleton",
@@ -136,6 +137,7 @@ def convert(
     fps = fps or (taker.rates[suffix] if taker else None)
     if fps is not None:
         motion = motion.resample(fps)
+    motion = evened(output, motion)
     if taker:
         write_for(output, motion, taker, unit=out_unit)
     elif suffix == ".txt":

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import clip_names, read, read_mapping
 from motionmind.cli.options import (
     HOME,
@@ -76,6 +77,7 @@ def corpora(context: click.Context) -> None:
     section=Section.LEARN,
     multiple=True,
     metavar="CORPUS[:WEIGHT]",
+    shell_complete=completion.corpora,
     help="Learn from another corpus, too, and count each of its moves WEIGHT times  [default: 1]. Repeatable.",
 )
 @option(
@@ -189,7 +191,10 @@ def _read_clips(
             if file.suffix.lower() == ".score":
                 yield from motions(read_score(file))
             else:
-                yield own_skeleton(replace(read(file, *source), name=names[file]), mapping)
+                motion = own_skeleton(replace(read(file, *source), name=names[file]), mapping)
+                if len(motion) == 1:
+                    note(f"{file}: holds one posture, and no move to learn from")
+                yield motion
     progress("learning")
 
 
@@ -220,7 +225,7 @@ def list_corpora(as_json: bool, home: Path | None) -> None:
 
 
 @command("motionmind corpus info ballet --json")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @JSON
 @HOME
 def info(name: str, as_json: bool, home: Path | None) -> None:
@@ -245,7 +250,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
 
 
 @command("motionmind corpus check ballet --pairs 500 --seed 1")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.corpora)
 @JSON
 @option("--details", section=Section.OUTPUT, is_flag=True, help="Print each recording with faults.")
 @option(
@@ -272,5 +277,35 @@ def check(name: str, as_json: bool, details: bool, pairs: int, seed: int, home: 
         print_check(found, with_details=details)
 
 
-for _command in (build, list_corpora, info, check):
+@command("motionmind corpus rename mine dancer")
+@click.argument("name", shell_complete=completion.corpora)
+@click.argument("new")
+@HOME
+def rename(name: str, new: str, home: Path | None) -> None:
+    """Rename a corpus that you built.
+
+    Corpora that were mixed from it keep its old name in their reports.
+    """
+    from motionmind.corpus import store
+
+    place = store.rename(name, new, home)
+    click.echo(f"renamed {displayed(name)} to {displayed_path(place)}")
+
+
+@command("motionmind corpus delete dancer --yes")
+@click.argument("name", shell_complete=completion.corpora)
+@option("--yes", "is_sure", section=Section.EDITS, is_flag=True, help="Delete it; there is no way back.")
+@HOME
+def delete(name: str, is_sure: bool, home: Path | None) -> None:
+    """Delete a corpus that you built."""
+    from motionmind.corpus import store
+
+    place = store.place_for(name, home)
+    if not is_sure and place.exists():
+        raise MotionMindError(f"{place}: would be deleted for good; say --yes")
+    store.delete(name, home)
+    click.echo(f"deleted {displayed_path(place)}")
+
+
+for _command in (build, list_corpora, info, check, rename, delete):
     corpora.add_command(_command)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from motionmind.body.motion import Motion, Posture
 
 MOVEMENT = (".json", ".bvh", ".glb", ".npz", ".vrma")
+EVEN = (".bvh", ".npz")  # formats whose frames are even in time
+_RATE = 30.0  # frames a second of movement that has to be made even
 
 
 def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | None) -> Motion:
@@ -32,15 +34,27 @@ def write(path: Path, movement: Motion | Posture) -> None:
     from motionmind.formats import lossy_fields, write_motion, write_posture
     from motionmind.render.pictures import write_picture
 
-    motion = movement.as_motion() if isinstance(movement, Posture) else movement
+    motion = movement.as_motion() if isinstance(movement, Posture) else evened(path, movement)
     if path.suffix.lower() in PICTURES:
         write_picture(path, motion)
         return
     if isinstance(movement, Posture):
         write_posture(path, movement)
     else:
-        write_motion(path, movement)
+        write_motion(path, motion)
     note_lossy_fields(path, lossy_fields(motion, path))
+
+
+def evened(path: Path, motion: Motion) -> Motion:
+    """Return a motion as its file can hold it: resampled, which a note says, if the frames have to be even in time."""
+    if path.suffix.lower() not in EVEN or motion.is_even:
+        return motion
+    even = motion.resample(_RATE)
+    note(
+        f"{path}: its frames must be even in time, so {len(motion)} are made {len(even)}, {_RATE:g} a second (--fps "
+        "for another rate)"
+    )
+    return even
 
 
 def write_all(paths: Sequence[Path], movement: Motion | Posture) -> None:

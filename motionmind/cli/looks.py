@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, output
 from motionmind.cli.types import FILE
@@ -36,6 +37,7 @@ def explain(report: Path, as_json: bool) -> None:
     section=Section.PART,
     required=True,
     metavar="NAME",
+    shell_complete=completion.joints,
     help="Draw the graph of this joint, or of facing, if that is a chain of its own.",
 )
 @output("Write the graph: a picture (.svg, .png), or data (.graphml, .gexf).")

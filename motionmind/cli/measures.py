@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_part
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @command("motionmind measure tween.json --corpus ballet")
-@click.argument("source")
+@click.argument("source", shell_complete=completion.movement)
 @CORPUS
 @option(
     "--report",

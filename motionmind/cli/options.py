@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from motionmind.cli import completion
 from motionmind.cli.types import EXISTING_FILE, FILE, FOLDER, RATE
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -222,7 +223,12 @@ HOME = option(
 )
 JSON = option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print JSON.")
 CORPUS = option(
-    "--corpus", section=Section.CORPORA, required=True, metavar="NAME", help="Take this corpus, by name or folder."
+    "--corpus",
+    section=Section.CORPORA,
+    required=True,
+    metavar="NAME",
+    help="Take this corpus, by name or folder.",
+    shell_complete=completion.corpora,
 )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
@@ -45,7 +46,7 @@ LAST = option(
 
 
 @command("motionmind sheet ballet/adagio -o adagio.png")
-@click.argument("source")
+@click.argument("source", shell_complete=completion.movement)
 @output("Write the picture: .png; or a picture of each clip into a folder.", type=FILE_OR_FOLDER)
 @option(
     "--clip",
@@ -125,7 +126,7 @@ def sheet(
 
 
 @command("motionmind render clip.bvh -o clip.html")
-@click.argument("source")
+@click.argument("source", shell_complete=completion.movement)
 @outputs("Write a picture (.png), a film (.gif, .mp4, .svg) or a page (.html).")
 @option(
     "--clip",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, output
 from motionmind.cli.printing import Interruption, note, print_written
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     "--smooth",
     section=Section.EDITS,
     metavar="CORPUS",
+    shell_complete=completion.corpora,
     help="Judge and smooth, by this corpus, the seams that are not smoothed yet, or are discarded.",
 )
 @option(

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
+from click.shell_completion import CompletionItem
 
+from motionmind.cli import completion
 from motionmind.cli.options import Section, given_option, option
 from motionmind.cli.types import COUNT, NATS, NATURAL, POSITIVE, RATE, Moves, Number, Size
 from motionmind.cli.words import parse_avoided, parse_pins, parse_vias
@@ -40,6 +42,7 @@ class SearchOption:
         metavar: the word that stands for its value; None to show its type.
         advanced: whether --help-all alone lists it.
         multiple: whether it may be repeated.
+        complete: what shells complete its value to; None for what its type does.
     """
 
     field: str
@@ -50,6 +53,7 @@ class SearchOption:
     metavar: str | None = None
     advanced: bool = False
     multiple: bool = False
+    complete: Callable[[click.Context, click.Parameter, str], list[CompletionItem]] | None = None
 
 
 _THROUGH, _SEARCH, _WEIGH, _MOTION = Section.THROUGH, Section.SEARCH, Section.WEIGH, Section.MOTION
@@ -63,6 +67,7 @@ SEARCH_OPTIONS = (
         str,
         "POSTURE[@N]",
         multiple=True,
+        complete=completion.postures,
     ),
     SearchOption(
         "pin",
@@ -72,6 +77,7 @@ SEARCH_OPTIONS = (
         str,
         "JOINT[=B]",
         multiple=True,
+        complete=completion.joints,
     ),
     SearchOption(
         "hold",
@@ -81,6 +87,7 @@ SEARCH_OPTIONS = (
         str,
         "JOINTS",
         multiple=True,
+        complete=completion.joints,
     ),
     SearchOption(
         "avoid",
@@ -90,6 +97,7 @@ SEARCH_OPTIONS = (
         str,
         "JOINT=STATE",
         multiple=True,
+        complete=completion.joints,
     ),
     SearchOption(
         "moves",
@@ -221,6 +229,7 @@ def searching(function: _Function) -> _Function:
             metavar=row.metavar,
             multiple=row.multiple,
             help=row.help,
+            shell_complete=row.complete,
             **attributes,
         )(function)
     return function

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from motionmind.cli import completion
 from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs
 from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
@@ -35,12 +36,13 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
 
 
 @command("motionmind tween ballet/arabesque ballet/fifth -o tween.bvh")
-@click.argument("a")
-@click.argument("b")
+@click.argument("a", shell_complete=completion.postures)
+@click.argument("b", shell_complete=completion.postures)
 @option(
     "--corpus",
     section=Section.CORPORA,
     metavar="NAME",
+    shell_complete=completion.corpora,
     help="Take this corpus, by name or folder  [default: that of A and B, if they are named postures of one]",
 )
 @outputs(f"Write {OUTPUTS}.", required=False)
@@ -66,12 +68,14 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as in shells
     "--before",
     section=Section.MOTION,
     metavar="FRAMES",
+    shell_complete=completion.movement,
     help="Leave A with the velocity of these frames, of which the last is A: FILE@FIRST..LAST, or all of FILE.",
 )
 @option(
     "--after",
     section=Section.MOTION,
     metavar="FRAMES",
+    shell_complete=completion.movement,
     help="Arrive at B with the velocity of these frames, of which the first is B, given as for --before.",
 )
 @searching

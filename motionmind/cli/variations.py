@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motionmind.cli.files import MOVEMENT, check_outputs, write
+from motionmind.cli import completion
+from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
     Interruption,
@@ -36,11 +37,10 @@ if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
 
 _STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
-_EVEN = (".bvh", ".npz")  # formats whose frames are even in time
 
 
 @command("motionmind vary macarena --attractor rossler -o variation.json")
-@click.argument("source", metavar="PIECE")
+@click.argument("source", metavar="PIECE", shell_complete=completion.movement)
 @outputs(f"Write {OUTPUTS}; review takes .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
 @option("--json", "as_json", section=Section.OUTPUT, is_flag=True, help="Print the report as JSON, like --report -.")
@@ -50,6 +50,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     "corpus",
     section=Section.CORPORA,
     metavar="NAME",
+    shell_complete=completion.corpora,
     help="Judge what is abrupt, and smooth it, by this corpus  [default: the corpus that the piece comes from, if any]",
 )
 @HOME
@@ -66,7 +67,7 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     type=Whole(),
     metavar="N",
     default=0,
-    help="Begin at frame N, counted from the end if negative.",
+    help="Begin at frame N, counted from the end if negative; a recording begins where those of the corpus do.",
 )
 @option(
     "--to",
@@ -88,7 +89,8 @@ _EVEN = (".bvh", ".npz")  # formats whose frames are even in time
     section=Section.TRAJECTORY,
     metavar="NAME",
     default="lorenz",
-    help="Follow this flow: lorenz, rossler, chua, duffing, halvorsen or thomas.",
+    shell_complete=completion.flows,
+    help=f"Follow this flow: {', '.join(completion.FLOWS[:-1])} or {completion.FLOWS[-1]}.",
 )
 @option(
     "--parameter",
@@ -268,8 +270,14 @@ def _read_piece(
     if unused and not judge:
         raise click.UsageError(f"{unused} is for --corpus, which is not given", context)
     engine = load_engine(judge, home) if judge else None
-    if rate is None and engine and source.kind == "file":
-        rate = engine.corpus.rate
+    if engine and source.kind == "file" and not motion.keyframed:
+        rate = engine.corpus.rate if rate is None else rate
+        if engine.corpus.skip and not given_option(context, ["begin"]) and named.moment is None:
+            begin = engine.corpus.skip
+            note(
+                f"{source.word}: begins at frame {begin}, as the recordings of {engine.corpus.name} do "
+                "(--from 0 for all of it)"
+            )
     frames = select_part(named, motion, begin, end)
     facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
     return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine
@@ -301,7 +309,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
                 write_variation(path, variation)
             else:
                 motion = variation.motion()
-                write(path, motion.resample(fps) if suffix in _EVEN else motion)
+                write(path, motion.resample(fps) if suffix in EVEN else motion)
         motion_sha256 = sha256_of(written, next(iter(outputs), None))
         if report:
             told = variation.report() | {"motion_sha256": motion_sha256}

@@ -149,6 +149,7 @@ class Corpus:
         source: where it comes from.
         licence: the licence for its use.
         faults: joint flips in the corpus's own recordings.
+        skip: frames that were dropped at each recording's start, such as an added T-pose.
     """
 
     name: str
@@ -165,6 +166,7 @@ class Corpus:
     source: str = ""
     licence: str = ""
     faults: tuple[JointFlip, ...] = ()
+    skip: int = 0
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:

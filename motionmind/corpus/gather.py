@@ -145,6 +145,7 @@ def gather(
         source,
         licence,
         own.faults,
+        skip,
     )
 
 

@@ -32,6 +32,7 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
     licence: str
     facing: Facing
     rate: float | None
+    skip: int = 0
 
 
 class SourceManifest(Provenance, frozen=True, kw_only=True):

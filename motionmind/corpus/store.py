@@ -10,17 +10,18 @@ import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
-import numpy as np
 import platformdirs
-from numpy.typing import NDArray
 
 from motionmind.corpus import versions
 from motionmind.corpus.bundled import bundled
-from motionmind.errors import CorpusError, FormatError
+from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
 VERSIONS = {FORMAT: (1,), BUILT: (1, 2)}  # that can be read; the last is written
@@ -63,7 +64,7 @@ def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     with suppress(OSError, ValueError):  # not a possible path: too long, or with a zero byte
         if name and (Path(name) / MANIFEST).is_file():
             return Path(name)
-    raise CorpusError(f"no corpus {name!r}; there are {', '.join(corpora) or 'none'}")
+    raise CorpusError(f"no corpus {name!r}{suggestion(name, corpora)}")
 
 
 def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
@@ -73,6 +74,66 @@ def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     if (bundled("corpora") / name / MANIFEST).is_file():
         raise CorpusError(f"{name!r} is the name of a bundled corpus; choose another")
     return home(folder) / "corpora" / name
+
+
+def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
+    """Delete a user's corpus at once; who has loaded it keeps what it read.
+
+    Args:
+        name: of the corpus.
+        folder: the user's home (`home`).
+
+    Raises:
+        CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, or it
+            cannot be deleted.
+    """
+    place = _own(name, folder)
+    try:
+        versions.remove(place)
+    except OSError as error:
+        raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
+
+
+def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Rename a user's corpus, and return its new folder.
+
+    First its manifest gets the new name, then its folder; each of them at once. After a kill in between, the corpus is
+    whole under its old name, and can be renamed again.
+
+    Args:
+        name: of the corpus.
+        new: its new name, which no corpus has.
+        folder: the user's home (`home`).
+
+    Raises:
+        CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, the
+            new name is invalid or taken, or it cannot be renamed.
+    """
+    place, target = _own(name, folder), place_for(new, folder)
+    if target.exists():
+        raise CorpusError(f"there is a corpus {new!r} already; corpus delete {new} removes it")
+    manifest = read_manifest(place)
+    try:
+        with versions.hold(_place_of(place, manifest)):  # so that no build in the meantime removes what it names
+            data = msgspec.json.encode(read_manifest(place) | {"name": new})
+            replace_file(place / MANIFEST, msgspec.json.format(data, indent=1) + b"\n")
+            place.rename(target)
+        sync_folder(target.parent)
+    except OSError as error:
+        raise CorpusError(f"{place}: cannot be renamed: {error.strerror or error}") from error
+    return target
+
+
+def _own(name: str, folder: str | os.PathLike[str] | None) -> Path:
+    """Return the folder of a built corpus of the user's own; CorpusError if it is none."""
+    place = place_for(name, folder)
+    corpora = list_corpora(folder)
+    if corpora.get(name) != place:
+        own = [known for known, where in corpora.items() if where.parent == place.parent]
+        raise CorpusError(f"no corpus {name!r} of your own{suggestion(name, own)}")
+    if stranger := versions.find_stranger(place, MANIFEST):
+        raise CorpusError(f"{place}: holds {stranger.relative_to(place)}, which is no part of a built corpus")
+    return place
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -133,6 +194,8 @@ def save(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray
 
 def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write a new version and make it the current one; all that it consists of is on disk before that."""
+    import numpy as np  # here, for shells complete names of corpora without it
+
     with versions.new_version(folder) as version:
         for name, array in arrays.items():
             with (version / f"{name}.npy").open("xb") as file:
@@ -237,6 +300,8 @@ def remedy(folder: Path) -> str:
 
 def _open_arrays(folder: Path, place: Path, shapes: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     """Open a corpus's arrays in `place`; the manifest states each one's type and shape, as [type, *shape], or None."""
+    import numpy as np
+
     arrays = {}
     for name, shape in shapes.items():
         file = _array_file(place, name)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import sys
 import time
@@ -21,7 +22,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
-from motionmind.files import TEMPORARY
+from motionmind.files import TEMPORARY, sync_folder
 
 if sys.platform != "win32":
     import fcntl
@@ -84,8 +85,20 @@ def recover(folder: Path) -> None:
             old.rename(folder)
 
 
+def remove(folder: Path) -> None:
+    """Remove a folder with all its versions, at once: it is moved aside first, under a name that is none.
+
+    Raises:
+        OSError: it cannot be moved. What cannot be removed after that is removed with the next version of its name.
+    """
+    aside = folder.with_name(f".{folder.name}-{secrets.token_hex(6)}")
+    folder.rename(aside)
+    sync_folder(folder.parent)
+    shutil.rmtree(aside, ignore_errors=True)
+
+
 def remove_leftovers(folder: Path) -> None:
-    """Remove what killed processes of 0.1 left beside a folder."""
+    """Remove what killed processes left beside a folder: those of 0.1, and those that removed it."""
     for aside in _moved_aside(folder, "(-old)?"):
         shutil.rmtree(aside, ignore_errors=True)
 
@@ -93,7 +106,12 @@ def remove_leftovers(folder: Path) -> None:
 def find_stranger(folder: Path, manifest: str) -> Path | None:
     """Return a file or folder in `folder` that is no part of a version or its manifest; None if there is none."""
     for entry in folder.iterdir() if folder.exists() else ():
-        parts = list(entry.iterdir()) if _is_version(entry) and entry.is_dir() else [entry]
+        parts = [entry]
+        if _is_version(entry) and not entry.is_file():
+            try:
+                parts = list(entry.iterdir())
+            except FileNotFoundError:  # another process has just removed it
+                continue
         for part in parts:
             if not (_is_array(part) or TEMPORARY.fullmatch(part.name) or part == folder / manifest):
                 return part

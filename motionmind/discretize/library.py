@@ -31,7 +31,7 @@ from motionmind.body.human import BODIES
 from motionmind.corpus.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
-from motionmind.errors import FormatError, did_you_mean
+from motionmind.errors import FormatError, did_you_mean, suggestion
 from motionmind.files import FilePath, parse_toml, read_bytes, write_atomically
 from motionmind.geometry import rotations as rot
 
@@ -220,9 +220,8 @@ def library_path(name_or_path: FilePath) -> Path:
     folder = bundled("discretization")
     known = sorted(file.stem for file in folder.glob("*.toml"))
     if str(path) not in known:
-        raise FormatError(
-            f"no library {str(path)!r}; bundled are {', '.join(known) or 'none'}, a file of your own ends in .toml"
-        )
+        hint = suggestion(str(path), known, "a file of your own ends in .toml, bundled are")
+        raise FormatError(f"no library {str(path)!r}{hint}")
     return folder / f"{path}.toml"
 
 

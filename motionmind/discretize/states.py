@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Ints, States
-from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.errors import MotionMindError, SkeletonError, suggestion
 from motionmind.geometry import rotations as rot
 
 # Two orientations that turn into each other by less than this many radians are one state.
@@ -114,9 +114,9 @@ class StateSpace:
         return len(self.names)
 
     def index(self, joint: str) -> int:
-        """Return the index of the joint called `joint`; SkeletonError, which lists the joints, if there is none."""
+        """Return the index of the joint called `joint`; SkeletonError, which says which there are, if none is."""
         if joint not in self.names:
-            raise SkeletonError(f"no joint {joint!r} among the states; there are {', '.join(self.names)}")
+            raise SkeletonError(f"no joint {joint!r} among the states{suggestion(joint, self.names)}")
         return self.names.index(joint)
 
     def of(self, joint: int | str) -> Floats:

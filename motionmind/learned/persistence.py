@@ -40,7 +40,7 @@ from motionmind.retarget.retarget import own_skeleton
 
 _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility)
 
-_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate")
+_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip")
 _PARTS = {
     "transitions": Transitions,
     "bridges": Bridges,

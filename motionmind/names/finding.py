@@ -16,7 +16,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
-from motionmind.errors import MotionMindError, did_you_mean, enumerated
+from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
 from motionmind.learned import persistence
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
@@ -62,7 +62,7 @@ class Collection(ABC):
             raise MotionMindError(f"{self.word}: holds no clips")
         for name in wanted:
             if name not in self.clips:
-                raise MotionMindError(f"{self.word}: no clip {name!r}{_hint(name, list(self.clips))}")
+                raise MotionMindError(f"{self.word}: no clip {name!r}{suggestion(name, list(self.clips))}")
         return self.motions(list(dict.fromkeys(wanted)) or list(self.clips))
 
     def find(self, name: str, *, as_clip: bool) -> Motion:
@@ -77,7 +77,7 @@ class Collection(ABC):
             if not is_clip and name in self.postures:
                 return replace(self.posture(name).as_motion(), name=name)
         known = [*self.postures, *self.clips]
-        raise MotionMindError(f"{self.word}: no posture or clip {name!r}{_hint(name, known)}")
+        raise MotionMindError(f"{self.word}: no posture or clip {name!r}{suggestion(name, known)}")
 
 
 class _ScoreCollection(Collection):
@@ -209,7 +209,7 @@ def check_exists(source: Source, home: Path | None = None) -> None:
     first, slash, _ = word.partition("/")
     corpora = list(store.list_corpora(home))
     if slash:
-        raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{_hint(first, corpora)}")
+        raise MotionMindError(f"{word}: there is no such file, and no corpus {first!r}{suggestion(first, corpora)}")
     if "@" in word:
         raise MotionMindError(f"{word}: there is no such file; frames are spelled clip.bvh@240 or clip.bvh@2.0s")
     hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, _MOST)}, a posture of one is CORPUS/NAME"
@@ -283,7 +283,3 @@ def _elsewhere(name: str, home: Path | None) -> str:
         except MotionMindError:  # a corpus that is damaged has no say here
             continue
     return did_you_mean(name, corpora)
-
-
-def _hint(name: str, known: Sequence[str]) -> str:
-    return did_you_mean(name, known) or f"; there are {enumerated(known, _MOST) or 'none'}"

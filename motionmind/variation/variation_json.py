@@ -20,6 +20,7 @@ Numbers are written in full, and are read to the last bit as they were written.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -38,6 +39,7 @@ from motionmind.variation.seams import Candidate, Index, InsertionCandidate, Jud
 from motionmind.variation.variation import Variation
 
 VERSION = 1
+_MOVEMENT_ALONE = (".bvh", ".glb", ".npz", ".txt", ".gif", ".png", ".mp4", ".svg", ".html")  # as vary writes it, too
 _ROUNDING = 1e-6  # of a quaternion and of metres: how far a candidate's ends may be from the piece's postures
 
 # In a file, a candidate's movement and path are lists of numbers.
@@ -127,6 +129,11 @@ def write_variation(path: FilePath, variation: Variation) -> None:
 
 def _read_motion(path: FilePath) -> MotionSchema:
     """The file at `path`; FormatError unless it holds a variation of a known version."""
+    given = Path(path)
+    if given.suffix.lower() in _MOVEMENT_ALONE:
+        beside = given.with_suffix(".json")
+        hint = f"; did you mean {beside}?" if beside.is_file() else ""
+        raise FormatError(f"holds movement alone; a variation is the .json that vary wrote{hint}", path=path)
     data = read_bytes(path)
     wanted = "where a variation was expected (motionmind vary writes one)"
     if _json.kind_of(data, path) != _json.MOTION:

@@ -182,8 +182,8 @@ def test_what_is_out_of_range_is_refused(arguments: dict[str, object], message: 
 
 
 def test_unknown_names_are_told_what_there_is() -> None:
-    with pytest.raises(MotionMindError, match="no flow 'lorentz'; there are chua, duffing"):
-        flow_of("lorentz")
+    with pytest.raises(MotionMindError, match="no flow 'moon'; there are chua, duffing"):
+        flow_of("moon")
     with pytest.raises(MotionMindError, match="lorenz has no parameter 'r'; it has sigma, rho, beta"):
         flow_of("lorenz", r=28.0)
     with pytest.raises(MotionMindError, match="parameter rho must be a finite number"):

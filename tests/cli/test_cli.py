@@ -25,6 +25,7 @@ from motionmind.corpus.bundled import bundled
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine
+from motionmind.variation.variation_json import read_variation
 
 BALLET = Path(__file__).parents[2] / "corpora" / "ballet"
 ARABESQUE, FIFTH, PLIE = (BALLET / "postures" / f"{name}.json" for name in ("arabesque", "fifth", "plie"))
@@ -150,6 +151,63 @@ def test_several_files_are_written_or_none(run: Run, tmp_path: Path) -> None:
         assert all(Path(word).stat().st_size for before, word in pairwise(map(str, words)) if before == "-o")
     assert run("posture", "clip.json@3", "-o", "x.json", "-o", "nowhere/x.png").code == 2
     assert not (tmp_path / "x.json").exists()
+
+
+def test_what_must_be_even_in_time_is_made_so_and_said(run: Run) -> None:
+    uneven = replace(clip("jump"), times=clip("jump").times ** 1.1)
+    write_motion("uneven.json", uneven)
+    Path("halt.score").write_text(
+        f"title Halt\ninclude {BALLET / 'vocabulary.score'}\nclip halt: Unevenly\n"
+        "  start | first | bas | upright | front\n  1 | second | second\n  3 | first | bas\n",
+        "utf-8",
+    )
+    for words in (("convert", "uneven.json", "{}"), ("compose", "halt.score", "-o", "{}")):
+        for suffix in ("bvh", "npz"):
+            file = f"out.{suffix}"
+            ran = run(*(word.format(file) for word in words))
+            assert ran.code == 0, ran.err
+            frames = len(read_motion(file))
+            assert re.search(
+                rf"note: {file}: its frames must be even in time, so \d+ are made {frames}, 30 a second", ran.err
+            )
+            again = run(*(word.format(file) for word in words), "--fps", 10)
+            assert "must be even" not in again.err
+    ran = run("convert", "uneven.json", "kept.json")
+    assert "even" not in ran.err
+    assert len(read_motion("kept.json")) == len(uneven)
+
+
+def test_a_posture_among_the_clips_is_noticed(run: Run) -> None:
+    write_motion("walk.json", clip(fps=30.0))
+    Path("A.json").write_bytes(ARABESQUE.read_bytes())
+    ran = run("corpus", "build", "mine", "A.json", "walk.json")
+    assert ran.code == 0
+    assert "note: A.json: holds one posture, and no move to learn from\n" in ran.err
+
+
+def test_a_recording_is_varied_as_the_corpus_learned_it(run: Run) -> None:
+    """At the corpus's rate, and without the T-pose that was dropped when it was built."""
+    write_motion("clip.bvh", clip(fps=30.0))
+    assert run("corpus", "build", "mine", "clip.bvh", "--rate", 6, "--skip", 1).code == 0
+    vary = ("vary", "clip.bvh", "--corpus", "mine", "--nudge", 0, "-o", "v.json")
+    ran = run(*vary)
+    assert "note: clip.bvh: begins at frame 1, as the recordings of mine do (--from 0 for all of it)\n" in ran.err
+    learned, piece = Engine.load("mine").corpus, read_variation("v.json").piece
+    assert len(learned.rotations) == len(piece)
+    assert rot.angle(piece.motion.rotations[piece.frames], learned.rotations).max() < 1e-6
+    for words in (("--from", 0), ("--from", 1)):
+        assert "begins at frame" not in run(*vary, *words).err
+    assert run("corpus", "build", "mine", "clip.bvh", "--rate", 6).code == 0
+    assert "begins at frame" not in run(*vary).err
+
+
+def test_review_says_which_file_it_wants(run: Run) -> None:
+    write_motion("clip.json", clip(fps=10.0))
+    assert run("vary", "clip.json", "-o", "v.bvh", "-o", "w.bvh", "-o", "w.json").code == 0
+    for file, hint in (("v.bvh", ""), ("w.bvh", "; did you mean w.json?")):
+        ran = run("review", file)
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err == f"error: {file}: holds movement alone; a variation is the .json that vary wrote{hint}\n"
 
 
 def test_of_many_warnings_a_few_are_printed(run: Run) -> None:
@@ -375,6 +433,20 @@ def test_a_corpus_of_the_same_name_is_replaced(run: Run) -> None:
     assert [entry["name"] for entry in built(run, "step.bvh", "--rate", 5)["clips"]] == ["step"]
 
 
+def test_a_corpus_is_renamed_and_deleted(run: Run, tmp_path: Path) -> None:
+    write_motion("walk.bvh", clip())
+    built(run, "walk.bvh")
+    place = tmp_path / "home" / "corpora"
+    assert run("corpus", "rename", "mine", "walks").out == f"renamed mine to {place / 'walks'}\n"
+    assert run("corpus", "info", "walks").out.startswith("name       walks\n")
+    ran = run("corpus", "delete", "walks")
+    assert (ran.code, ran.err) == (2, f"error: {place / 'walks'}: would be deleted for good; say --yes\n")
+    assert run("corpus", "delete", "walks", "--yes").out == f"deleted {place / 'walks'}\n"
+    assert list(place.iterdir()) == []
+    for words in (("delete", "ballet", "--yes"), ("rename", "ballet", "mine"), ("delete", "walks", "--yes")):
+        assert run("corpus", *words).code == 2
+
+
 def test_what_cannot_be_read_is_listed_as_such(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "home" / "corpora" / "torn"
     folder.mkdir(parents=True)
@@ -460,6 +532,12 @@ BAD = [
     ("convert clip.xyz t.json", r"suffix '\.xyz' is unknown; files that can be read end in \.json, \.bvh"),
     # corpora
     ("tween A.json B.json --corpus nobody", r"no corpus 'nobody'; there are ballet"),
+    ("corpus info balet", r"no corpus 'balet'; did you mean ballet\?"),
+    (f"{TWEEN} --pin left_hop", r"no joint 'left_hop' among the states; did you mean left_hip\?"),
+    (f"{TWEEN} --avoid lft_hip=3", r"no joint 'lft_hip' among the states; did you mean left_hip\?"),
+    ("vary ballet/jump --attractor rosler -o t.json", r"no flow 'rosler'; did you mean rossler\?"),
+    ("vary ballet/jump --parameter roh=3 -o t.json", r"lorenz has no parameter 'roh'; did you mean rho\?"),
+    (f"{BUILD} --discretize balet", r"no library 'balet'; did you mean ballet\?"),
     ("corpus info nobody", r"no corpus 'nobody'; there are ballet"),
     ("corpus list --home A.json", r"'A\.json' is a file"),
     ("corpus build mine", r"Missing argument 'FILES\.\.\.'"),
@@ -480,7 +558,7 @@ BAD = [
     (f"{BUILD} --tolerance -3", r"tolerance in degrees must be a number from"),
     (f"{BUILD} --tolerance nan", r"tolerance in degrees must be a number from"),
     (f"{BUILD} --tolerance left_hop=5", r"no joint 'left_hop'.*; did you mean left_hip\?"),
-    (f"{BUILD} --discretize nobody", r"no library 'nobody'; bundled are ballet, human23"),
+    (f"{BUILD} --discretize nobody", r"no library 'nobody'; .*bundled are ballet, human23"),
     (f"{BUILD} --discretize broken.toml", r"broken\.toml: not TOML"),
     (f"{BUILD} --joints broken.toml", r"broken\.toml: not a joint mapping"),
     (f"{BUILD} --unit parsec", r"unit 'parsec' is unknown; give one of cm, m"),

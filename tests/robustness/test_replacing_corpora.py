@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
 
+import numpy as np
 import pytest
 import saved_corpora
 from faults import failing_at
@@ -118,7 +119,7 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
 ) -> None:
     before(mine)
     there = names(mine.parent)
-    calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], store.np: ["save"]}
+    calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], np: ["save"]}
     for owner, name in [(owner, name) for owner, all_of_it in calls.items() for name in all_of_it]:
         for error in (OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()):
             for number in count(1):
@@ -151,7 +152,7 @@ def test_what_0_1_left_when_it_was_killed_is_put_back_then_removed(mine: Path) -
     mine.rename(mine.with_name(".arms-0123456789ab-old"))
     assert {"arms", ".arms-0123456789ab", ".arms-0123456789ac"}.isdisjoint(store.list_corpora(mine.parents[1]))
     with pytest.raises(ValueError, match="Object arrays"):
-        store.save(mine, MANIFEST, {"one": store.np.array([None])})
+        store.save(mine, MANIFEST, {"one": np.array([None])})
     assert seed_of(mine) == 1
     store.save(mine, MANIFEST, arrays(2))
     assert seed_of(mine) == 2

@@ -1,0 +1,142 @@
+"""Values that shells complete: corpora, postures, clips, joints and flows.
+
+A shell starts the program for each tab, so nothing here imports numpy or parses a score: names are read from manifests
+and from the lines of scores that begin with them. What cannot be read completes to nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+from click.shell_completion import CompletionItem
+
+from motionmind.errors import MotionMindError
+
+FLOWS = ("chua", "duffing", "halvorsen", "lorenz", "rossler", "thomas")  # as `motionmind.chaos.flows.FLOWS`
+_NAMED = re.compile(r"(posture|clip|include)[ \t]+([^\s:=]+)")
+_MOST_SCORES = 100
+
+
+class _Names(NamedTuple):
+    """The names of a corpus: of its postures, of its clips, of its joints."""
+
+    postures: list[str]
+    clips: list[str]
+    joints: list[str]
+
+
+def corpora(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a corpus."""
+    return [CompletionItem(name) for name in _folders(context) if name.startswith(incomplete)]
+
+
+def postures(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a posture of a corpus, or a file; of a clip the first posture is given."""
+    return _complete_named(context, incomplete, "@0")
+
+
+def movement(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a clip or a posture of a corpus, or a file."""
+    return _complete_named(context, incomplete, "")
+
+
+def joints(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a joint of the command's corpus, the last of several that commas separate."""
+    before, comma, last = incomplete.rpartition(",")
+    # Arguments before an option that still lacks its value are in `args`, and in no parameter.
+    words = (context.params.get(name) for name in ("corpus", "a", "b"))
+    places = [str(word).partition("/")[0] for word in (*words, *context.args) if word]
+    corpus = next((place for place in places if place in _folders(context)), "")
+    names = _names(context, corpus).joints
+    return [CompletionItem(f"{before}{comma}{name}") for name in names if name.startswith(last)]
+
+
+def flows(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a flow."""
+    return [CompletionItem(name) for name in FLOWS if name.startswith(incomplete)]
+
+
+def _complete_named(context: click.Context, incomplete: str, suffix: str) -> list[CompletionItem]:
+    """Complete what corpora name, and files; `suffix` goes after the name of a clip."""
+    word, slash, _ = incomplete.partition("/")
+    known = [name for name in _folders(context) if (name == word if slash else name.startswith(word))]
+    found = [f"{name}/" for name in known]
+    if len(known) == 1:  # else the shell would stop at each corpus, and list hundreds
+        names = _names(context, known[0])
+        found = [f"{known[0]}/{name}" for name in names.postures]
+        found += [f"{known[0]}/{clip}{suffix}" for clip in names.clips if clip not in names.postures or suffix]
+    items = [CompletionItem(name) for name in found if name.startswith(incomplete)]
+    if slash and items:
+        return items
+    files = [CompletionItem(name) for name in _files(incomplete)]
+    return [*items, *files] if items else [CompletionItem(incomplete, type="file")]
+
+
+def _files(incomplete: str) -> list[str]:
+    """Return the files of the current folder whose names begin so."""
+    return sorted(path.name for path in Path().iterdir() if path.is_file() and path.name.startswith(incomplete))
+
+
+def _folders(context: click.Context) -> dict[str, Path]:
+    """Return the corpora's folders by name."""
+    from motionmind.corpus.store import list_corpora
+
+    with suppress(MotionMindError, OSError):
+        return list_corpora(context.params.get("home"))
+    return {}
+
+
+def _names(context: click.Context, corpus: str) -> _Names:
+    """Return the names of a corpus."""
+    from motionmind.corpus import store
+
+    folder = _folders(context).get(corpus)
+    if folder is None:
+        return _Names([], [], [])
+    manifest = learned = _manifest(folder)
+    if "skeleton" not in manifest:  # a corpus that people wrote: its joints are in what was learned from it last
+        kept = sorted(store.cache().glob(f"{folder.name}-*/{store.MANIFEST}"), key=lambda path: path.stat().st_mtime)
+        learned = _manifest(kept[-1].parent) if kept else {}
+    with suppress(TypeError, KeyError, AttributeError):
+        named = list(_scanned(folder, manifest.get("scores", [])))
+        clips = [
+            str(clip["name"]) for clip in learned.get("clips", []) if not (clip.get("mirrored") or clip.get("corpus"))
+        ]
+        return _Names(
+            list(dict.fromkeys(name for kind, name in named if kind == "posture")),
+            clips or [name for kind, name in named if kind == "clip"],
+            [str(name) for name in learned.get("skeleton", {}).get("names", [])],
+        )
+    return _Names([], [], [])
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    from motionmind.corpus.store import MANIFEST
+
+    with suppress(OSError, ValueError, RecursionError):
+        found = json.loads((folder / MANIFEST).read_bytes())
+        if isinstance(found, dict):
+            return found
+    return {}
+
+
+def _scanned(folder: Path, scores: list[str]) -> Iterator[tuple[str, str]]:
+    """Yield ("posture", name) and ("clip", name) for the lines of scores, and of those that they include."""
+    waiting = [folder / str(score) for score in scores]
+    for path in waiting:  # the list grows during the loop
+        lines: list[str] = []
+        with suppress(OSError, ValueError):
+            lines = path.read_text("utf-8").splitlines()
+        for line in lines:
+            found = _NAMED.match(line)
+            if found and found[1] != "include":
+                yield found[1], found[2]
+            elif found and " as " not in line and len(waiting) < _MOST_SCORES:
+                included = path.parent / found[2]
+                waiting += [] if included in waiting else [included]
