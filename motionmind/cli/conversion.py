@@ -114,10 +114,11 @@ def convert(
 ) -> None:
     """Convert movement from one format to another.
 
-    IN may be .bvh, .amc with its .asf, .glb or .gltf, .vrm or .vrma, .json, .npz as in AMASS, or .txt in the notation
-    of the papers, or a clip or posture of a score or a corpus, as ballet/adagio. OUT may be .bvh, .json, .glb (a
-    skinned body, for Blender and the like), .vrma (a VRM animation), .npz (on SMPL's joints), or .txt, which is on
-    human23 (or human44, if IN is) and holds orientations only. A note lists whatever OUT has no place for.
+    IN may be .bvh, .amc with its .asf, .glb or .gltf, .vrm or .vrma, .json, .npz as in AMASS, .pkl as in AIST++, .npy
+    as in FineDance, .txt in the notation of the papers, or a clip or posture of a score or a corpus, as ballet/adagio.
+    OUT may be .bvh, .json, .glb (a skinned body, for Blender and the like), .vrma (a VRM animation), .npz (on SMPL's
+    joints), or .txt, which is on human23 (or human44, if IN is) and holds orientations only. A note lists whatever OUT
+    has no place for.
     """
     from motionmind.formats import lossy_fields, write_motion
     from motionmind.formats.papers import write_papers

@@ -240,8 +240,8 @@ def reading(function: _Function) -> _Function:
             section=Section.INPUT,
             advanced=True,
             type=RATE,
-            help="Set the frames per second of BVH, .amc, .npz and .txt  "
-            "[default: what the file states; .amc 120, .txt 1]",
+            help="Set the frames per second of BVH, .amc, .npz, .pkl, .npy and .txt  "
+            "[default: what the file states; .amc 120, .pkl 60, .npy 30, .txt 1]",
         ),
         option(
             "--asf",

@@ -6,6 +6,8 @@
 | `.bvh` | motion | motion, posture as one frame |
 | `.amc` | motion, with the `.asf` beside it | |
 | `.npz` | motion on SMPL's joints (AMASS) | motion of people, posture as one frame |
+| `.pkl` | motion on SMPL's joints (AIST++) | |
+| `.npy` | motion on SMPL's joints (FineDance) | |
 | `.txt` | the notation of the papers | the notation of the papers |
 | `.glb` | motion, or posture without animation | the same |
 | `.gltf`, `.vrm` | as `.glb` | |
@@ -30,7 +32,11 @@ __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "w
 __getattr__ = renamed(__name__, {"lost": "lossy_fields"})
 
 _GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", *_GLTF)
+_READABLE = (".json", ".bvh", ".amc", ".txt", ".npz", ".pkl", ".npy", *_GLTF)
+_REFUSED = {
+    ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
+    ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
+}
 _WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")
 
 
@@ -50,7 +56,8 @@ def read_motion(
             Other formats define their own.
         asf: AMC's skeleton (`read_amc`); None finds it beside the file.
         fps: frames per second: of AMC (default 120) and the papers' notation (default 1), which do not record them, and
-            of BVH and `.npz` in place of those that the file states. JSON's frames have times of their own.
+            of AIST++ and FineDance (default 60 and 30), and of BVH and `.npz` in place of those that the file states.
+            Frames of JSON and glTF have times of their own.
         skeleton: the body of the papers' notation, which names joints only; None infers it from their names.
 
     Returns:
@@ -81,16 +88,22 @@ def read_motion(
             from motionmind.formats.papers import read_papers
 
             return read_papers(path, skeleton=skeleton, rate=1.0 if fps is None else fps)
-        case ".npz":
-            from motionmind.formats.npz import read_npz
-
-            return read_npz(path, fps=fps)
+        case ".npz" | ".pkl" | ".npy" as suffix:
+            return _read_smpl(path, suffix, fps)
         case ".json":
             return _read_json(path)
         case _:
             from motionmind.formats.gltf import read_gltf
 
             return read_gltf(path, unit=unit)
+
+
+def _read_smpl(path: FilePath, suffix: str, fps: float | None) -> Motion:
+    """Read a motion on SMPL's joints, by the format of the suffix."""
+    from motionmind.formats.npz import read_npz
+    from motionmind.formats.smpl_data import read_aist, read_finedance
+
+    return {".npz": read_npz, ".pkl": read_aist, ".npy": read_finedance}[suffix](path, fps=fps)
 
 
 def _read_json(path: FilePath) -> Motion:
@@ -223,5 +236,6 @@ def _suffix(path: FilePath, known: tuple[str, ...], verb: str) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in known:
         message = f"suffix {suffix!r} is unknown; files that can be {verb} end in {', '.join(known)}"
+        message = _REFUSED.get(suffix, message) if verb == "read" else message
         raise FormatError(message, path=path) if verb == "read" else MotionMindError(f"{path}: {message}")
     return suffix

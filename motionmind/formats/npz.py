@@ -23,7 +23,7 @@ import io
 import logging
 import math
 import zipfile
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,12 +135,12 @@ def _read_arrays(path: FilePath) -> dict[str, Floats]:
             for name in ("poses", "trans", *_RATES):
                 if name in file:
                     _check_claim(file.zip, members.get(name) or members[f"{name}.npy"], name, len(data), path)
-                    found[name] = _numbers(file[name], name, path)
+                    found[name] = checked_numbers(file[name], repr(name), path)
     except FormatError:
         raise
     except Exception as error:  # zipfile's, zlib's, lzma's, numpy's and its parser's errors, two dozen classes
         what = f"{name!r} cannot be read" if name else "cannot be read"
-        raise FormatError(f"{what}: {_in_one_line(error)}", path=path) from error
+        raise FormatError(f"{what}: {in_one_line(error)}", path=path) from error
     return found
 
 
@@ -150,23 +150,34 @@ def _check_claim(archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str, s
     No more is unpacked than is claimed: zipfile ends a member at its size, numpy an array at its shape.
     """
     with archive.open(member) as stream:
-        version = np.lib.format.read_magic(stream)
-        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, _ = read_header(stream)
-    most = min(max(_LARGE_ARRAY, 2 * size), _LARGEST_ARRAY)
-    if 8 * math.prod(shape) > most or member.file_size > 2 * most:
-        raise FormatError(f"{name!r} is too large to be movement: {list(shape)}", path=path)
+        check_array(stream, size, repr(name), path)
+    if member.file_size > 2 * _most(size):
+        raise FormatError(f"{name!r} is too large to be movement", path=path)
 
 
-def _numbers(array: NDArray[np.generic], name: str, path: FilePath) -> Floats:
+def check_array(stream: IO[bytes], size: int, what: str, path: FilePath) -> None:
+    """Raise FormatError if the header of an array says that it is too large for a file of `size` bytes."""
+    version = np.lib.format.read_magic(stream)
+    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, _ = read_header(stream)
+    if 8 * math.prod(shape) > _most(size):
+        raise FormatError(f"{what} is too large to be movement: {list(shape)}", path=path)
+
+
+def _most(size: int) -> int:
+    """Return the bytes that an array in a file of `size` bytes may take."""
+    return min(max(_LARGE_ARRAY, 2 * size), _LARGEST_ARRAY)
+
+
+def checked_numbers(array: NDArray[np.generic], what: str, path: FilePath) -> Floats:
     """Return the array as floats; FormatError names an element that is not a number in range."""
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        raise FormatError(f"{name!r} holds no numbers", path=path)
+        raise FormatError(f"{what} holds no numbers", path=path)
     numbers = array.astype(np.float64, copy=False)
     bad = np.argwhere(~(np.abs(numbers) <= LARGEST))  # NaN too
     if len(bad):
         value = numbers[tuple(bad[0])]
-        raise FormatError(f"{name!r}{bad[0].tolist()} is {value:g}, not a place or an angle", path=path)
+        raise FormatError(f"{what}{bad[0].tolist()} is {value:g}, not a place or an angle", path=path)
     return numbers
 
 
@@ -177,10 +188,10 @@ def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float
         raise FormatError(f"no array {_RATES[0]!r}: say how many frames per second there are", path=path)
     rate = arrays.get(name, np.array(fps, dtype=np.float64))
     if rate.size != 1 or not 1.0 / LARGEST <= rate.item() <= FASTEST:
-        raise FormatError(f"{name!r} must be one number of frames per second, not {_in_one_line(rate)}", path=path)
+        raise FormatError(f"{name!r} must be one number of frames per second, not {in_one_line(rate)}", path=path)
     return float(rate.item())
 
 
-def _in_one_line(what: object) -> str:
+def in_one_line(what: object) -> str:
     """Return an error's words, or an array's numbers, in one line of at most 200 characters."""
     return " ".join(str(what).split())[:200] or type(what).__name__

@@ -14,6 +14,7 @@ import base64
 import faulthandler
 import io
 import json
+import pickle
 import random
 import shutil
 import signal
@@ -33,6 +34,7 @@ from pathlib import Path
 import numpy as np
 
 from motionmind import Engine, Motion, human23, read_motion, vary, write_motion, write_posture, write_variation
+from motionmind._typing import Floats
 from motionmind.body.anatomy_file import read_body
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.corpus.store import load, read_manifest
@@ -226,6 +228,22 @@ def _moving(frames: int) -> Motion:
     return Motion(body, rotations, np.linspace([0, 1, 0], [1, 1, 0], frames), np.arange(frames) / 30.0, "clip")
 
 
+def _pickled(motion: Motion, protocol: int) -> bytes:
+    """Return a motion's path, with SMPL at rest, as AIST++ has movement."""
+    poses = np.zeros((len(motion), 72))
+    held = {"smpl_poses": poses, "smpl_trans": motion.root, "smpl_scaling": np.array([1.0]), "smpl_loss": 0.5}
+    return pickle.dumps(held, protocol)
+
+
+def _array(array: Floats) -> bytes:
+    """Return an array as numpy writes it, with rotations that can be."""
+    if array.shape[1] == 315:
+        array[:, 3:] = np.tile(np.eye(2, 3).ravel(), 52)
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
 def _text_of(glb: bytes) -> bytes:
     """Return a GLB as text, its numbers in base64, and some of them as curves and jumps."""
     (length,) = struct.unpack_from("<I", glb, 12)
@@ -260,6 +278,8 @@ def readers(folder: Path) -> list[Reader]:
         Reader("npz", "a.npz", [made["npz"]], _movement, mutate=damaged_archive),
         Reader("GLB", "a.glb", [made["glb"], made["vrma"]], _movement),
         Reader("glTF, text", "a.gltf", [_text_of(made["vrma"])], _movement),
+        Reader("AIST++'s pickle", "a.pkl", [_pickled(motion, protocol) for protocol in (0, 2, 5)], _movement),
+        Reader("FineDance's array", "a.npy", [_array(np.zeros((4, 159))), _array(np.ones((3, 315)))], _movement),
         Reader("papers' notation", "a.txt", [seeds["braces.txt"], seeds["lines.txt"], made["txt"]], _papers),
         Reader("AMC", "toy_01.amc", [seeds["toy.amc"]], _movement, {"toy.asf": seeds["toy.asf"]}),
         Reader(
