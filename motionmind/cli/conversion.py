@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import MOVEMENT, check_outputs, evened, note_lossy_fields, read_mapping, write_all
+from motionmind.cli.files import (
+    MOVEMENT,
+    check_outputs,
+    evened,
+    note_lossy_fields,
+    question_clock,
+    read_mapping,
+    write_all,
+)
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
@@ -133,6 +141,8 @@ def convert(
         raise MotionMindError(f"--out-unit {out_unit}: only BVH has no unit of its own, and {output} is not BVH")
     taker = program_for(program, output) if program else None
     motion = read_part(named, None, home, raw=True, **options)
+    if named.source.kind == "file":
+        question_clock(named.source.paths[0], motion)
     if skeleton == "human23" or joints or (suffix == ".txt" and not is_human44(motion.skeleton)):
         motion = to_human23(motion, read_mapping(joints))
     fps = fps or (taker.rates[suffix] if taker else None)

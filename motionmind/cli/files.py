@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionmind.cli.printing import note
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.files import all_or_none, as_text
 from motionmind.render import PICTURES
 
@@ -26,6 +27,20 @@ def read(path: Path, unit: str | None, asf: Path | None, source_fps: float | Non
     from motionmind.formats import read_motion
 
     return read_motion(path, unit=unit, asf=asf, fps=source_fps)
+
+
+def question_clock(path: Path, motion: Motion) -> None:
+    """Warn if the movement of a person in a file contradicts the file's clock; on any joints that map to human23."""
+    from motionmind.body.tempo import question_tempo
+    from motionmind.retarget.retarget import own_skeleton
+
+    try:
+        doubt = question_tempo(own_skeleton(motion))
+    except SkeletonError:  # its zero pose does not show how it stands
+        return
+    if doubt:
+        message = f"{path}: seems to play {doubt} (check the frames per second, --source-fps, and the unit)"
+        warnings.warn(message, MotionMindWarning, stacklevel=2)
 
 
 def write(path: Path, movement: Motion | Posture) -> None:

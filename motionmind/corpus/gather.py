@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count, pairwise
@@ -16,9 +17,10 @@ from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.tempo import question_tempo
 from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, JointRepair, subdivide_times
 from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
-from motionmind.errors import CorpusError, SkeletonError
+from motionmind.errors import CorpusError, MotionMindWarning, SkeletonError, enumerated
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
 
@@ -98,6 +100,9 @@ def gather(
 
     Returns:
         The corpus.
+
+    Warns:
+        MotionMindWarning: recordings contradict their clocks (`question_tempo`).
 
     Raises:
         CorpusError: nothing is left to learn from, recordings or corpora differ in their joints or cannot be brought to
@@ -274,6 +279,7 @@ def _take_recordings(
     faults: list[JointFlip] = []
     names: set[str] = set()
     rates: set[float] = set()
+    doubts: list[str] = []
     first: Motion | None = None
     for recording in motions:
         first = first or recording
@@ -287,6 +293,8 @@ def _take_recordings(
             raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
         motion = replace(recording.slice(skip, len(recording)), name=_free_name(recording.name or "clip", names))
         names.add(motion.name)
+        if doubt := question_tempo(motion):
+            doubts.append(f"{motion.name} ({doubt})")
         found, cuts = find_flips(motion, flip_degrees), list[int]()
         repairs: tuple[JointRepair, ...] = ()
         if found and flips == "repair":
@@ -299,6 +307,11 @@ def _take_recordings(
         if wanted is not None:
             rates.add(wanted)
         pieces += _cut(motion, cuts, wanted, _later(repairs, skip))
+    if doubts:
+        message = (
+            f"frames per second, or the unit, are doubtful where people move as nobody can: {enumerated(doubts, 3)}"
+        )
+        warnings.warn(message, MotionMindWarning, stacklevel=3)
     return _Recordings(pieces, tuple(faults), max(rates, default=None), first.skeleton if first else None)
 
 

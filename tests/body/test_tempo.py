@@ -1,0 +1,127 @@
+"""Clocks that movement contradicts, by falls, flights and steps; and recordings, which are taken at their word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionmind import read_motion
+from motionmind.body.human import human23, human44
+from motionmind.body.motion import Motion
+from motionmind.body.tempo import question_tempo
+from motionmind.corpus.gather import gather
+from motionmind.errors import MotionMindWarning
+from motionmind.geometry import rotations as rot
+from motionmind.retarget.retarget import own_skeleton
+
+BODY = human23()
+FPS = 60.0
+
+
+def at_rest(seconds: float) -> Motion:
+    """Standing still, with the soles on the floor."""
+    frames = int(seconds * FPS)
+    root = np.tile([0.0, -BODY.rest[:, 1].min(), 0.0], (frames, 1))
+    return Motion(BODY, np.tile(rot.IDENTITY, (frames, 23, 1)), root, np.arange(frames) / FPS, name="a")
+
+
+def jump(height: float = 0.3, gravity: float = 9.81) -> Motion:
+    """A stiff body that is thrown up after a second and falls back."""
+    still = at_rest(3.0)
+    half = np.sqrt(2.0 * height / gravity)
+    lift = (height - 0.5 * gravity * (still.times - 1.0 - half) ** 2).clip(0.0)
+    return replace(still, root=still.root + lift[:, None] * [0.0, 1.0, 0.0])
+
+
+def walk(rate: float = 1.8, step: float = 0.65) -> Motion:
+    """Legs that swing from the hips, `rate` steps a second of `step` metres."""
+    still = at_rest(4.0)
+    swing = 0.4 * np.sin(np.pi * rate * still.times)
+    rotations = still.rotations.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        rotations[:, BODY.index(f"{side}_hip")] = rot.from_axis_angle([1.0, 0.0, 0.0], sign * swing)
+    return replace(still, rotations=rotations, root=still.root + (rate * step * still.times)[:, None] * [0.0, 0.0, 1.0])
+
+
+def played(motion: Motion, speed: float) -> Motion:
+    return replace(motion, times=motion.times / speed)
+
+
+@pytest.mark.parametrize("made", [jump, walk, lambda: at_rest(3.0)])
+def test_the_right_clock_is_not_questioned(made: Callable[[], Motion]) -> None:
+    assert question_tempo(made()) == ""
+
+
+@pytest.mark.parametrize(
+    ("speed", "said"),
+    [
+        (2.0, "about 2 times too fast: in the air it falls at 39 m/s2, gravity is 9.8"),
+        (0.5, "about 2 times too slow: in the air it falls at 2.5 m/s2, gravity is 9.8"),
+        (1.5, "about 1.5 times too fast: in the air it falls at 22 m/s2, gravity is 9.8"),
+    ],
+)
+def test_flights(speed: float, said: str) -> None:
+    assert question_tempo(played(jump(), speed)) == said
+
+
+def test_falls_on_the_floor() -> None:
+    """Knee bends, 1.2 a second: nobody leaves the floor, and at 2.6 times the speed nobody could stay there."""
+    still = at_rest(8.0)
+    bend = 0.7 * (0.5 - 0.5 * np.cos(2.0 * np.pi * 1.2 * still.times))
+    rotations = still.rotations.copy()
+    for side in ("left", "right"):
+        for joint, share in (("hip", -1.0), ("knee", 2.0), ("ankle", -1.0)):
+            rotations[:, BODY.index(f"{side}_{joint}")] = rot.from_axis_angle([1.0, 0.0, 0.0], share * bend)
+    low = BODY.positions_and_tips(rotations, np.zeros((len(still), 3)))[..., 1].min(axis=1)
+    bends = replace(still, rotations=rotations, root=-low[:, None] * [0.0, 1.0, 0.0])
+    assert question_tempo(bends) == ""
+    assert "times too fast: it falls at 2" in question_tempo(played(bends, 2.6))
+
+
+def test_steps() -> None:
+    assert (
+        question_tempo(played(walk(), 2.0))
+        == "about 2 times too fast: it walks with 3.6 steps a second, and never runs"
+    )
+    assert question_tempo(played(walk(step=0.2), 2.0)) == ""  # small steps may be as quick
+
+
+def test_what_cannot_be_told() -> None:
+    fast = played(jump(), 2.0)
+    assert question_tempo(replace(fast, keyframed=True)) == ""
+    assert question_tempo(fast.resample(15.0)) == ""
+    assert question_tempo(fast.slice(0, 20)) == ""
+    other = Motion(human44(), np.tile(rot.IDENTITY, (len(fast), 44, 1)), fast.root, fast.times)
+    assert question_tempo(other) == ""
+
+
+def test_a_corpus_questions_its_recordings() -> None:
+    with pytest.warns(MotionMindWarning, match=r"are doubtful where .*: leap \(about 2 times too fast: .*\)$"):
+        gather("a", [walk(), replace(played(jump(), 2.0), name="leap")])
+
+
+@pytest.mark.parametrize(
+    ("recording", "doubled", "halved"),
+    [
+        ("cmu-05/05_08.bvh", "fast", "slow"),
+        ("cmu-05/05_12.bvh", "", ""),  # tendus on the floor
+        ("cmu-16/16_01.amc", "fast", "slow"),
+        ("cmu-16/16_12.amc", "walks", ""),
+        ("cmu-16/16_36.amc", "fast", ""),
+        ("indian/15.bvh", "fast", "slow"),
+        ("bandai/run_normal_001.bvh", "", ""),
+        ("bandai/dance-short_normal_001.bvh", "fast", ""),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::motionmind.MotionMindWarning")
+def test_recordings(recording: str, doubled: str, halved: str, shared_data: Path) -> None:
+    motion = own_skeleton(read_motion(shared_data / recording))
+    assert question_tempo(motion) == ""
+    for speed, said in ((2.0, doubled), (0.5, halved)):
+        found = question_tempo(played(motion, speed))
+        assert said in found
+        assert bool(said) == bool(found)
