@@ -33,6 +33,11 @@ _WINDOW, _FRAMES = 0.15, 5  # seconds, and frames at least, over which an accele
 _SHARE = 99.0  # percentile of the accelerations downwards
 _FALLS = 19.5  # metres a second squared: in the recordings 17 at most, with hips that were recorded badly
 
+_STRAIGHT, _DRAWN = (
+    1e-4,
+    0.5,
+)  # of the longest step, the least turn in a frame; share of moving frames without
+
 _LIFTED, _SHORTEST = 0.04, 0.12  # metres off the floor, and seconds: a flight
 _CLEAR, _HIGH = 0.1, 0.05  # metres that feet come off the floor, and the mass above its chord, in one that counts
 _PARABOLA = 0.1  # share of that height by which it may be off a parabola
@@ -51,7 +56,7 @@ def question_tempo(motion: Motion) -> str:
     """Say how a person's movement contradicts its clock; "" if it does not, or nothing can be told.
 
     Args:
-        motion: movement on human23; other bodies and keyframes are not questioned.
+        motion: movement on human23; other bodies are not questioned, nor are keyframes and lines between them.
 
     Returns:
         A phrase such as "about 2 times too fast: it falls at 39 m/s2, gravity is 9.8".
@@ -64,7 +69,7 @@ def question_tempo(motion: Motion) -> str:
         return ""
     part = motion.slice(begin, len(motion))
     mass = centre_of_mass(part.skeleton, part.rotations, part.root)
-    return "" if mass is None else _question(part, mass[:, 1])
+    return "" if mass is None or _is_drawn(part) else _question(part, mass[:, 1])
 
 
 def _question(motion: Motion, heights: Floats) -> str:
@@ -81,6 +86,15 @@ def _question(motion: Motion, heights: Floats) -> str:
         rate = cadence / np.sqrt(leg / GRAVITY)
         return _phrase(cadence / _STRIDES, f"it walks with {rate:.2g} steps a second, and never runs")
     return ""
+
+
+def _is_drawn(motion: Motion) -> bool:
+    """Return whether the root goes in straight lines from keyframe to keyframe, at whose corners no mass could turn."""
+    steps = np.diff(motion.root, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    least = _STRAIGHT * lengths.max()
+    turns = np.linalg.norm(np.diff(steps, axis=0), axis=1)[lengths[1:] > least]
+    return len(turns) > 0 and bool(np.mean(turns <= least) > _DRAWN)
 
 
 def _phrase(speed: float, evidence: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 
 from motionmind import read_motion
 from motionmind.body.human import human23, human44
@@ -44,7 +45,9 @@ def walk(rate: float = 1.8, step: float = 0.65) -> Motion:
     rotations = still.rotations.copy()
     for side, sign in (("left", 1.0), ("right", -1.0)):
         rotations[:, BODY.index(f"{side}_hip")] = rot.from_axis_angle([1.0, 0.0, 0.0], sign * swing)
-    return replace(still, rotations=rotations, root=still.root + (rate * step * still.times)[:, None] * [0.0, 0.0, 1.0])
+    bob = 0.02 * np.cos(2.0 * np.pi * rate * still.times)
+    way = np.stack([0.0 * bob, bob, rate * step * still.times], axis=1)
+    return replace(still, rotations=rotations, root=still.root + way)
 
 
 def played(motion: Motion, speed: float) -> Motion:
@@ -97,6 +100,12 @@ def test_what_cannot_be_told() -> None:
     assert question_tempo(fast.slice(0, 20)) == ""
     other = Motion(human44(), np.tile(rot.IDENTITY, (len(fast), 44, 1)), fast.root, fast.times)
     assert question_tempo(other) == ""
+
+
+def test_lines_between_keyframes_are_not_questioned() -> None:
+    fast = played(jump(), 2.0)
+    assert question_tempo(fast.resample(8.0).resample(60.0)) == ""
+    assert question_tempo(ballet_clip("jump").resample(30.0)) == ""
 
 
 def test_a_corpus_questions_its_recordings() -> None:

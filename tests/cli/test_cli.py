@@ -483,7 +483,7 @@ def test_convert_resamples_and_takes_units(run: Run) -> None:
     assert read_motion("out.json").fps == pytest.approx(10.0)
     for unit, factor in (("mm", 0.1), ("cm", 1.0), ("0.02", 2.0)):
         ran = run("convert", "in.bvh", "out.json", "--unit", unit)
-        assert ("seems to play" in ran.err) == (factor == 2.0)  # twice as large, it falls twice as fast
+        assert ran.err == ""
         assert read_motion("out.json").root[0, 1] == pytest.approx(clip().root[0, 1] * factor, abs=1e-5)
 
 
