@@ -17,7 +17,6 @@ from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.tempo import question_tempo
 from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, JointRepair, subdivide_times
 from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
 from motionmind.errors import CorpusError, MotionMindWarning, SkeletonError, enumerated
@@ -275,6 +274,8 @@ def _take_recordings(
     motions: Iterable[Motion], rate: Rate, skip: int, flips: Flips, flip_degrees: float
 ) -> _Recordings:
     """Skip frames, repair recordings or cut them at faults, and take their postures at `rate`."""
+    from motionmind.body.tempo import question_tempo  # a tween from a built corpus does not need it
+
     pieces: list[_Piece] = []
     faults: list[JointFlip] = []
     names: set[str] = set()
