@@ -26,6 +26,7 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
 
 _RATE = 60.0  # frames a second that are looked at, at most
+_UNEVEN = 0.01  # of a frame: a clock that states frames a second is even
 _SLOWEST = 20.0  # frames a second below which accelerations are not seen
 _BEGINS = 0.25  # seconds that are left out: a T-pose may have been added there
 _LONG = 0.5  # seconds, at least, that are looked at
@@ -62,6 +63,8 @@ def question_tempo(motion: Motion) -> str:
         A phrase such as "about 2 times too fast: it falls at 39 m/s2, gravity is 9.8".
     """
     if human23().difference(motion.skeleton) is not None or motion.keyframed or motion.fps < _SLOWEST:
+        return ""
+    if np.ptp(np.diff(motion.times)) > _UNEVEN / motion.fps:  # each frame has a time of its own
         return ""
     motion = motion.resample(min(_RATE, motion.fps))
     begin = int(_BEGINS * motion.fps)
