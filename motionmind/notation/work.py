@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from motionmind.notation.score import Where
 
-MAX_WORK = 1_000_000  # lines read and postures made while the clips of a score are played: some seconds
+MAX_WORK = 600_000  # lines read and postures made while the clips of a score are played; a long score takes 2 a posture
 LONG = 64  # characters of a line that count as one piece of work
 
 _T = TypeVar("_T")
