@@ -186,6 +186,14 @@ def test_a_body_without_two_sides_is_refused_and_the_joint_named(
         mirrored(tumble(body_of(TRUNK | rows), 0))
 
 
+@pytest.mark.parametrize("axis", [0, 2])
+def test_sides_so_near_each_other_that_several_axes_fit_lie_along_the_one_that_parts_them(axis: int) -> None:
+    near = {
+        f"{side}_hand": ("root", tuple(sign * 0.01 * np.eye(3)[axis])) for side, sign in (("left", 1), ("right", -1))
+    }
+    assert find_sides(body_of(TRUNK | near)).axis == axis
+
+
 def test_what_has_no_sides_and_no_breadth_is_its_own_image() -> None:
     snake = body_of({"head": ("", (0.0, 0.0, 0.0)), "neck": ("head", (0.0, 0.0, -1.0)), "tail": ("neck", (0.0, 0, -1))})
     assert find_sides(snake).partners.tolist() == [0, 1, 2]

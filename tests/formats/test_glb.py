@@ -340,6 +340,7 @@ def test_the_nose_and_the_knee_turn_with_their_joints(tmp_path: Path) -> None:
         (("Hips", "LeftUpLeg", "LeftToe", "RightUpLeg"), (-1, 0, 1, 0), (MIDDLE, LEFT, LEFT, RIGHT)),
         (("root", "thigh.R", "thigh.L", "end"), (-1, 0, 0, 1), (MIDDLE, RIGHT, LEFT, RIGHT)),
         (("rail", "lift"), (-1, 0), (MIDDLE, MIDDLE)),
+        (("root", "left wing", "tip"), (-1, 0, 1), (MIDDLE, LEFT, LEFT)),  # without a right one
     ],
 )
 def test_sides_by_names(names: tuple[str, ...], parents: tuple[int, ...], sides: tuple[str, ...]) -> None:

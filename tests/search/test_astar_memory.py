@@ -147,6 +147,21 @@ def test_more_memory_never_gave_a_worse_answer_on_these_bodies(monkeypatch: pyte
             assert found[-1].status == "optimal"
 
 
+def test_all_numbers_of_moves_together_take_no_more_expansions_than_are_allowed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(bounding, "PAIR_CHAIN_SWEEPS", 0)
+    spent = 0
+    for seed in SEEDS:
+        toy = random_toy(seed, frustrated=True)
+        for budget in (10, 30, 100):
+            found = solution(toy.problem(toy.rules(1, 6, budget, sweeps=1)))
+            if found is not None:
+                assert found.expansions <= budget
+                spent += found.expansions == budget
+    assert spent > 5
+
+
 @pytest.mark.parametrize("budget", [30, 45, 70])
 def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_stays(budget: int) -> None:
     """Or all but the way to the node that is being expanded: so forgetting is paid for by the nodes then made anew."""
@@ -168,6 +183,7 @@ def test_when_memory_is_full_a_quarter_of_it_is_forgotten_and_what_is_proven_sta
         assert astar._forget(nodes, current)
         opened = nodes.heap[: nodes.tally[astar._HEAPED]]
         assert nodes.tally[astar._NODES] <= max(astar.KEPT * budget, case.depth)
+        assert nodes.tally[astar._NODES] > astar.KEPT * budget - case.depth  # a leaf more, and its way, are too many
         assert nodes.tally[astar._NODES] + nodes.tally[astar._FREE] == budget
         assert min(nodes.key[opened]) == min(before)
         assert {float(key) for key in nodes.key[opened]} <= before

@@ -20,6 +20,7 @@ from motionmind.search.heuristic import Heuristic
 from motionmind.search.pair_chain_tables import PairChains
 from motionmind.search.polish import polish
 from motionmind.search.problem import Model, Problem, Rules, costs_to_go, with_waits
+from motionmind.search.segments import Piece, Segments
 from motionmind.search.solve import Certificate
 from motionmind.search.trellis import Trellis, locate
 from motionmind.tween.engine import Engine
@@ -478,6 +479,23 @@ def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
 
 
 # --- edges of the problem --------------------------------------------------------------------------------------------
+
+
+def test_nothing_is_proven_beyond_the_cost_that_paths_are_to_be_cheaper_than() -> None:
+    """Dearer ones were cut off, and what is proven of the rest does not hold of them."""
+    trellis = trellis_of(a_body(), MOVES)
+    chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
+    trws.tighten(trellis, trws.no_messages(trellis), chosen, 2, np.inf)
+    state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), -100.0)
+    state.update(1e3, chosen)
+    assert (state.lower_bound, state.found, state.closed) == (-100.0, False, True)
+
+
+def test_what_was_proven_of_a_piece_stays_proven() -> None:
+    segments, none = Segments(np.array([[[np.inf, 1.0, 7.0]]]), 1, []), np.zeros((0, 2), dtype=np.int32)
+    for bound, proven in ((5.0, 5.0), (3.0, 5.0), (9.0, 7.0)):
+        segments.update(Piece(0, 0, 1), bound, np.inf, none)
+        assert segments.lower_bound() == proven
 
 
 def test_without_any_edge_a_body_can_only_wait_where_it_is() -> None:
