@@ -119,8 +119,9 @@ def realise(
             longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
-    detail, detailed = _detail(walk, clock, corpus, carriage)
-    rotations = rot.mul(corpus.from_chains(walk.chains(corpus, clock.frames)), rot.exp(detail))
+    smooth, most = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
+    detail, detailed = _detail(walk, clock, corpus, carriage, smooth, most)
+    rotations = rot.mul(smooth, rot.exp(detail))
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     # Once so that feet find places to stand at, and once for where they have been put.
     keep_apart = _keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
@@ -251,11 +252,14 @@ def _bend_to_states(
     return walk._replace(poses=poses, headings=headings)
 
 
-def _detail(walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage) -> tuple[Floats, Ints]:
+def _detail(
+    walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carriage, smooth: Floats, fastest: Floats | None
+) -> tuple[Floats, Ints]:
     """Return the corpus's fine detail of a walk, rotation vectors [N, J, 3], and the moves that it comes from.
 
     Each joint has it as far as it is trusted to the corpus's walks, to the power of LINGERS, and less or more of it
-    where the body moves slower than in the moves that it comes from (`share_of_detail`).
+    where the body moves slower than in the moves that it comes from (`share_of_detail`): never so much more that a
+    joint of the `smooth` movement [N, J, 4] is too fast.
     """
     between, joints = corpus.detail.shape[1], walk.poses.shape[1]
     if not between:
@@ -263,12 +267,21 @@ def _detail(walk: Expectation, clock: Timeline, corpus: Corpus, carriage: Carria
     orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
     moves = likest_moves(corpus.moves, orientations, poses)
     of_legs, of_others = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
-    share = np.repeat(of_others[:, None], joints, axis=1)
-    share[:, [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]] = of_legs[:, None]
-    scale = np.repeat(share * walk.trust[::2] ** LINGERS, between + 1, axis=0)
-    times, detail = subdivide_times(at, between), detail_of(corpus, moves)
-    detail = detail * np.concatenate([scale, scale[-1:]])[..., None]
-    return natural_spline(times, detail, clock.frames), moves
+    times, own = subdivide_times(at, between), detail_of(corpus, moves)
+
+    def scaled(share: Floats) -> Floats:
+        scale = np.repeat(share[:, None] * walk.trust[::2] ** LINGERS, between + 1, axis=0)
+        return natural_spline(times, own * np.concatenate([scale, scale[-1:]])[..., None], clock.frames)
+
+    calm, lively = scaled(of_legs), scaled(of_others)
+    kept = [joint for leg, _ in find_legs(corpus.skeleton)[1] for joint in leg]
+    lively[:, kept] = calm[:, kept]
+    if fastest is not None:
+        made = rot.mul(smooth, rot.exp(lively))
+        speeds = rot.angle(made[:-1], made[1:]) / np.diff(clock.frames)[:, None]
+        quick = np.any(speeds > fastest[:joints], axis=0)
+        lively[:, quick] = calm[:, quick]
+    return lively, moves
 
 
 def _with_rates(
