@@ -681,8 +681,8 @@ def test_vary_from_a_corpus_to_every_kind_of_file(run: Run, tmp_path: Path) -> N
     assert "the variation's original" in done.err
     np.testing.assert_allclose(read_motion("again.bvh").root, read_motion("out.bvh").root, atol=1e-4)
     report = run("review", "out.json", "--json").json
-    assert run(*common, "-o", "again.json", "--json").json == report
-    assert run(*common, "-o", "again.json", "--report", "-").json == report
+    assert run(*common, "-o", "again.json", "--json").json | {"motion_sha256": None} == report
+    assert run(*common, "-o", "again.json", "--report", "-").json | {"motion_sha256": None} == report
     assert json.loads((tmp_path / "report.json").read_text()) | {"motion_sha256": None} == report
 
 
