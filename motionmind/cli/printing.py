@@ -256,8 +256,10 @@ def print_review(report: dict[str, Any]) -> None:
     click.echo(
         f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
     )
+    leaves = counts["seams"] / max(counts["postures"] - 1, 1)
     click.echo(
-        f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')}: {counts['inserted']} with an "
+        f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')} ({leaves:.0%} of steps): "
+        f"{counts['inserted']} with an "
         f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
     if counts["stays"]:

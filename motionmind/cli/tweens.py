@@ -148,7 +148,7 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
         raise click.UsageError("Missing option '--corpus': no corpus names A or B.", context)
     if len(set(corpora)) > 1:
         a, b = map(displayed, corpora)
-        raise MotionMindError(f"A is a posture of {a} and B of {b}: say by --corpus how to move between them")
+        raise MotionMindError(f"A is a posture of {a} and B of {b}: say in which to move, --corpus {a} or --corpus {b}")
     return corpora[0]
 
 

@@ -23,7 +23,7 @@ from motionmind.cli.printing import (
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
-from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Point, Whole
+from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Number, Point, Whole
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
 from motionmind.files import all_or_none, sha256_of
@@ -108,6 +108,13 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
     help="Begin the variation's trajectory this far from the piece's; 0 gives the piece back.",
 )
 @option(
+    "--depart",
+    section=Section.TRAJECTORY,
+    type=Number(0, 1),
+    metavar="SHARE",
+    help="Let this share of steps leave the piece's order: take the smallest nudge that comes within 0.05 of it.",
+)
+@option(
     "--skip",
     section=Section.TRAJECTORY,
     type=NATURAL,
@@ -187,8 +194,12 @@ def vary(
     check_outputs(files, [*named.source.paths, *via_files(options, home)])
     flow = flow_of(attractor, **parse_parameters(parameter))
     request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
-    trajectory = {key: options.pop(key) for key in ("start", "skip", "step", "transient", "length", "alternatives")}
+    trajectory = {
+        key: options.pop(key) for key in ("depart", "start", "skip", "step", "transient", "length", "alternatives")
+    }
     nudge = options.pop("nudge")
+    if trajectory["depart"] is not None and given_option(context, ["nudge"]):
+        raise click.UsageError("--depart seeks a nudge, and --nudge gives one; leave out one of them", context)
     piece, engine = _read_piece(context, named, corpus, home, **options)
     with Interruption() as interruption:
         variation = make_variation(
@@ -202,7 +213,7 @@ def vary(
             **request,
         )
     print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
-    _print_advice(variation, engine)
+    _print_advice(variation, engine, trajectory["depart"])
     if not as_json:
         print_written([path for path, _ in files])
     if interruption.is_requested:
@@ -317,10 +328,15 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
     return motion_sha256
 
 
-def _print_advice(variation: Variation, engine: Engine | None) -> None:
-    """Note what to change if a variation does not leave the piece, is not smoothed, or stands still."""
+def _print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
+    """Note what to change if a variation does not leave the piece by enough, is not smoothed, or stands still."""
+    from motionmind.variation.departure import WITHIN, departure
+
+    reached = departure(variation.order)
+    if depart is not None and abs(reached - depart) > WITHIN:
+        note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
     if not variation.seams:
-        note("the variation does not leave the piece's order: try a larger --nudge or --length")
+        note("the variation does not leave the piece's order: try --depart 0.25, or a larger --length")
     elif engine is None:
         note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
     counts = variation.report()["counts"]

@@ -50,12 +50,14 @@ class Engine(LearnedCorpus):
     >>> tween = engine.tween(motion.posture(0), motion.posture(3), moves=3)
     >>> tween.status, tween.moves
     ('optimal', 3)
+    >>> engine.tween("ballet/arabesque", "ballet/fifth").moves
+    6
     """
 
     def tween(
         self,
-        a: Posture,
-        b: Posture,
+        a: Posture | str,
+        b: Posture | str,
         request: TweenRequest | None = None,
         *,
         before: Motion | None = None,
@@ -66,8 +68,8 @@ class Engine(LearnedCorpus):
         """Find the best movement from posture `a` to posture `b` in the style of the corpus.
 
         Args:
-            a: where the motion starts, exactly.
-            b: where the motion ends, exactly.
+            a: where the motion starts, exactly; a posture, or its name, such as "ballet/arabesque" and "clip.bvh@240".
+            b: where the motion ends, exactly, in the same way.
             request: what is asked beside the two postures; None asks for nothing more.
             before: frames that lead up to `a`, which shows how the body moves as it leaves: the last of them is `a`,
                 wherever it stands. Frames beyond a flip, where a joint was recorded badly, do not count. None where it
@@ -80,20 +82,21 @@ class Engine(LearnedCorpus):
         Raises:
             NoPathError: nothing joins them under these rules; the message is the diagnosis.
             SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
-            MotionMindError: an option is out of its range, or asks for what cannot be; `before` does not end in `a`,
-                `after` does not begin in `b`, or one of them has a single frame.
+            MotionMindError: an option is out of its range, or asks for what cannot be; no posture has such a name;
+                `before` does not end in `a`, `after` does not begin in `b`, or one of them has a single frame.
             TypeError: there is no such option.
         """
         request = TweenRequest.of(request, **options)
+        start, end = _posture(a), _posture(b)
         began = perf_counter()
-        formulation = formulate(self, a, b, request, before, after)
+        formulation = formulate(self, start, end, request, before, after)
         formulated = perf_counter()
         certificate = self._find_path(formulation, watch)
         what_if: tuple[WhatIf, ...] = ()
         if request.what_if:
 
             def answer(other: TweenRequest) -> Answer:
-                freed = formulate(self, a, b, other, before, after)
+                freed = formulate(self, start, end, other, before, after)
                 return Answer(other, freed.searched, self._find_path(freed, watch))
 
             what_if = find_what_if(Answer(request, formulation.searched, certificate), answer)
@@ -112,8 +115,8 @@ class Engine(LearnedCorpus):
 
     def alternatives(
         self,
-        a: Posture,
-        b: Posture,
+        a: Posture | str,
+        b: Posture | str,
         count: int,
         request: TweenRequest | None = None,
         *,
@@ -309,6 +312,16 @@ class Engine(LearnedCorpus):
     def check(self, pairs: int = 2000, seed: int = 0) -> dict[str, Any]:
         """Measure how well the corpus hangs together, as plain values: see `motionmind.learned.summary.CorpusCheck`."""
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
+
+
+def _posture(posture: Posture | str) -> Posture:
+    """Return a posture, or the one of a name."""
+    if isinstance(posture, Posture):
+        return posture
+    # Imported here, for scores are slow to import, and most postures are no names.
+    from motionmind.names.finding import find_posture
+
+    return find_posture(posture)
 
 
 def _no_other_path(request: TweenRequest, most: float) -> NoPathError:

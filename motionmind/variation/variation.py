@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from motionmind._typing import Ints
 from motionmind.body.motion import Motion
@@ -20,6 +21,7 @@ from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
 from motionmind.variation.course import Course
+from motionmind.variation.departure import find_nudge
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -218,6 +220,7 @@ def vary(
     *,
     flow: Flow = FLOWS["lorenz"],
     nudge: float | Sequence[float] = NUDGE,
+    depart: float | None = None,
     start: Sequence[float] | None = None,
     skip: int = SKIP,
     step: float | None = None,
@@ -240,6 +243,8 @@ def vary(
         flow: the flow whose trajectories order the postures.
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
             coordinate, or one for each [d].
+        depart: the share of steps that are to leave the piece's order, in place of a nudge: the smallest nudge of the
+            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for `nudge` as it is.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
         skip: points of the trajectories to leave out between two postures.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
@@ -262,7 +267,7 @@ def vary(
     on_progress = take_renamed(options, "told", "on_progress", on_progress)
     check_asked(alternatives, options)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    course, order = _order_postures(len(piece), flow, nudge, start, skip, step, transient, length)
+    course, order = _order_postures(len(piece), flow, nudge, depart, start, skip, step, transient, length)
     variation = Variation(piece, course, order)
     if engine is None:
         return variation
@@ -283,6 +288,7 @@ def _order_postures(
     count: int,
     flow: Flow,
     nudge: float | Sequence[float],
+    depart: float | None,
     start: Sequence[float] | None,
     skip: int,
     step: float | None,
@@ -297,11 +303,18 @@ def _order_postures(
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
     start = check_numbers("start", flow.start if start is None else start)
+
+    def reorder(nudge: ArrayLike) -> Ints:
+        """Return the order of postures that a nudge gives [L]."""
+        return itinerary(
+            flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient
+        ).indices
+
+    nudge = nudge if depart is None else find_nudge(reorder, check_number("depart", depart))
     offset = check_numbers("nudge", nudge)
     if np.ndim(nudge) == 0:
         offset += (0.0,) * (len(flow.start) - 1)
-    found = itinerary(flow, count, length, nudge=offset, start=start, every=skip + 1, step=step, transient=transient)
     # With the flow's own step at least: tiny steps do not reach the attractor in so many.
     exponent = largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step))
     course = Course(flow.name, dict(flow.parameters), start, offset, skip, step, transient, round(exponent, 4))
-    return course, found.indices
+    return course, reorder(offset)

@@ -219,7 +219,10 @@ def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
         assert ran.code in (0, 3), ran.err  # of karate, for nothing says otherwise
     mixed = run("tween", "karate/yoi", "ballet/fifth", "-o", "out.json")
     assert mixed.code == 2
-    assert "A is a posture of karate and B of ballet: say by --corpus" in mixed.err
+    assert (
+        "A is a posture of karate and B of ballet: say in which to move, --corpus karate or --corpus ballet"
+        in mixed.err
+    )
     assert tween(run, "karate/yoi", "ballet/fifth").code == 0
     alone = run("tween", FIFTH, FIFTH)
     assert alone.code == 2

@@ -1,0 +1,49 @@
+"""The share of a piece's order that a variation leaves, and the nudge that makes it leave so much."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from motionmind._typing import Ints
+from motionmind.errors import MotionMindError
+
+WITHIN = 0.05  # of the share that is sought
+_NUDGES = np.geomspace(1e-4, 10.0, 51)  # ten to a power of ten; the attractors are some tens across
+
+
+def departure(order: Ints) -> float:
+    """Return the share of the steps of an order of postures [L] that neither go on in the piece nor stay."""
+    steps = np.diff(order)
+    return float(np.mean((steps != 1) & (steps != 0))) if len(steps) else 0.0
+
+
+def find_nudge(order: Callable[[float], Ints], share: float) -> float:
+    """Find the smallest nudge by which a variation departs from its piece in a share of its steps.
+
+    Args:
+        order: returns the order of postures that a nudge gives; MotionMindError if its trajectory leads nowhere.
+        share: the share, from 0 to 1.
+
+    Returns:
+        The smallest nudge that comes within 0.05 of the share; if none does, the one that comes nearest.
+
+    Raises:
+        MotionMindError: the share is not from 0 to 1, or no nudge gives an order.
+    """
+    if not 0.0 <= share <= 1.0:
+        raise MotionMindError(f"the share of steps that depart must be from 0 to 1, not {share}")
+    nearest, off = float(_NUDGES[0]), np.inf
+    for nudge in map(float, _NUDGES):
+        try:
+            found = abs(departure(order(nudge)) - share)
+        except MotionMindError:
+            if off == np.inf:  # it is no matter of the nudge
+                raise
+            break
+        if found < off:
+            nearest, off = nudge, found
+        if off <= WITHIN:
+            break
+    return nearest

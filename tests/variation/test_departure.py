@@ -1,0 +1,87 @@
+"""The share of steps by which a variation leaves its piece, and the nudge that is sought for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from bundled_clips import ballet_clip
+from command_line import Run
+
+from motionmind._typing import Ints
+from motionmind.chaos.flows import flow_of
+from motionmind.errors import MotionMindError
+from motionmind.formats import write_motion
+from motionmind.variation.departure import WITHIN, departure, find_nudge
+from motionmind.variation.variation import vary
+
+
+@pytest.mark.parametrize(
+    ("order", "share"),
+    [([0, 1, 2, 3], 0.0), ([0, 0, 1, 1], 0.0), ([0, 2, 3, 4, 5], 0.25), ([3, 2, 1], 1.0), ([5], 0.0)],
+)
+def test_steps_that_go_on_or_stay_do_not_depart(order: list[int], share: float) -> None:
+    assert departure(np.array(order)) == share
+
+
+def stepping(share: Callable[[float], float]) -> Callable[[float], Ints]:
+    """Orders of 101 postures that depart in a share of their steps, given the nudge."""
+
+    def order(nudge: float) -> Ints:
+        leaves = np.arange(100) < round(100 * share(nudge))
+        return np.concatenate([[0], np.cumsum(np.where(leaves, 2, 1))])
+
+    return order
+
+
+def test_the_smallest_nudge_that_comes_near_is_taken() -> None:
+    rising = stepping(lambda nudge: min(nudge, 1.0))
+    for share in (0.1, 0.25, 0.6, 1.0):
+        nudge = find_nudge(rising, share)
+        assert abs(departure(rising(nudge)) - share) <= WITHIN
+        assert abs(departure(rising(nudge / 10**0.1)) - share) > WITHIN
+    assert find_nudge(rising, 0.0) == pytest.approx(1e-4)
+    assert find_nudge(stepping(lambda nudge: 0.5 if nudge > 2.0 else 0.1), 0.9) == pytest.approx(10**0.4)
+
+
+def test_nudges_that_lead_nowhere_end_the_search() -> None:
+    def diverging(nudge: float) -> Ints:
+        if nudge > 1.0:
+            raise MotionMindError("the trajectory diverges")
+        return stepping(lambda nudge: 0.3)(nudge)
+
+    assert find_nudge(diverging, 1.0) == pytest.approx(1e-4)
+
+    def nowhere(nudge: float) -> Ints:
+        raise MotionMindError("the trajectory diverges")
+
+    with pytest.raises(MotionMindError, match="diverges"):
+        find_nudge(nowhere, 0.3)
+    for share in (-0.1, 1.1, float("nan")):
+        with pytest.raises(MotionMindError, match="must be from 0 to 1"):
+            find_nudge(diverging, share)
+
+
+@pytest.mark.parametrize("clip", ["promenade", "adagio"])  # of 44 and 68 postures
+@pytest.mark.parametrize("flow", ["lorenz", "rossler"])
+def test_a_variation_departs_as_asked_however_long_its_piece_is(clip: str, flow: str) -> None:
+    piece = ballet_clip(clip)
+    found = vary(piece, flow=flow_of(flow), depart=0.25)
+    assert abs(departure(found.order) - 0.25) <= WITHIN
+    again = vary(piece, flow=flow_of(flow), nudge=found.course.nudge[0])
+    np.testing.assert_array_equal(again.order, found.order)
+    assert found.course.start == vary(piece, flow=flow_of(flow)).course.start
+
+
+def test_the_command_line_says_what_was_reached(run: Run) -> None:
+    write_motion("piece.json", ballet_clip("promenade"))
+    ran = run("vary", "piece.json", "--depart", 0.25, "-o", "v.json")
+    assert ran.code == 0
+    assert any(f" seams ({share}% of steps): " in ran.out for share in range(20, 31))
+    assert "no nudge was found" not in ran.err
+    ran = run("vary", "piece.json", "--depart", 1, "-o", "v.json")
+    assert "note: no nudge was found by which 100% of steps leave the piece's order; the nearest is " in ran.err
+    ran = run("vary", "piece.json", "--depart", 0.3, "--nudge", 1, "-o", "w.json")
+    assert ran.code == 2
+    assert "--depart seeks a nudge, and --nudge gives one; leave out one of them" in ran.err
