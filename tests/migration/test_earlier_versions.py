@@ -163,7 +163,7 @@ def test_the_newest_of_these_corpora_is_what_this_version_writes(today: Engine, 
     kept = store.load(unpacked(CORPORA[-1], tmp_path) / "corpora" / "piece")
     today.save(tmp_path / "today")
     now = store.load(tmp_path / "today")
-    assert kept.manifest.keys() == now.manifest.keys()
+    assert kept.manifest.keys() <= now.manifest.keys()  # a key that may lack is no other form
     assert kept.manifest["version"] == now.manifest["version"]
     assert list(kept.manifest["arrays"]) == list(now.manifest["arrays"])
     assert set(MOVEMENT) < set(FORMS) == set(now.arrays)
