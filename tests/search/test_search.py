@@ -481,6 +481,18 @@ def test_a_chain_with_one_state_parts_those_below_it_from_those_above() -> None:
 # --- edges of the problem --------------------------------------------------------------------------------------------
 
 
+def test_the_best_path_is_in_the_trellis_of_what_is_hardly_dearer(kind: dict[str, bool]) -> None:
+    kept = 0
+    for seed in range(30):
+        toy = random_toy(seed, **kind)
+        found = answer(toy, toy.rules(MOVES, MOVES))
+        if found is not None:
+            trellis = trellis_of(toy, MOVES, found.cost - MOVES * toy.per_move + 1e-6)
+            assert locate(trellis, found.path).min() >= 0
+            kept += len(trellis.dom) < len(trellis_of(toy, MOVES).dom)
+    assert kept > 3
+
+
 def test_nothing_is_proven_beyond_the_cost_that_paths_are_to_be_cheaper_than() -> None:
     """Dearer ones were cut off, and what is proven of the rest does not hold of them."""
     trellis = trellis_of(a_body(), MOVES)
