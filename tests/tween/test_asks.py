@@ -546,7 +546,7 @@ def test_everything_can_be_asked_on_the_command_line(run: Run, engine: Engine) -
     )
     drawn = join(engine, sample=True, seed=3, coordination="none")
     assert lively.json["path"] == drawn.path.tolist()
-    table = run("tween", A, B, "--corpus", "ballet", *asked).out
+    table = run("tween", A, B, "--corpus", "ballet", *asked, "--details").out
     assert "\nvia 1     at move 4, " in table
 
 

@@ -247,7 +247,7 @@ def test_a_detour_goes_on_from_its_beginning_and_comes_to_its_end_as_the_corpus_
 
 
 def test_the_report_and_the_summary_say_why_it_takes_so_long(run: Run) -> None:
-    ran = run("tween", A, B, "--corpus", "ballet", "--duration", 0.3, "--report", "r.json")
+    ran = run("tween", A, B, "--corpus", "ballet", "--duration", 0.3, "--report", "r.json", "--details")
     assert "note: faster than anything in the corpus" in ran.err
     line = next(line for line in ran.out.splitlines() if line.startswith("pace "))
     assert "the corpus takes about 2.3" in line
