@@ -179,6 +179,8 @@ class Dancers:
         postures = [posture for posture, _ in self.ends]
         rotations, root = np.stack([p.rotations for p in postures]), np.stack([p.root for p in postures])
         alone = stands_alone(self.body, rotations, root)
+        # In the air, too, one limb is the lowest; nothing stands on it.
+        alone[[_is_airborne(posture, floor) for posture, floor in self.ends]] = -1
         return {int(limb): np.flatnonzero(alone == limb) for limb in np.unique(alone) if limb >= 0}
 
 
@@ -209,10 +211,11 @@ def nearer(a: Posture, b: Posture, metres: float) -> Posture:
     return b if far <= metres else Posture(b.skeleton, b.rotations, b.root - way * (1.0 - metres / far))
 
 
-def on_the_same_spot(a: Posture, b: Posture) -> Posture:
-    """Posture `b`, turned about the vertical and moved level so that the leg that it stands on is where that of `a` is.
+def on_the_same_spot(a: Posture, b: Posture, up: float) -> Posture:
+    """Posture `b`, turned about the vertical and moved so that the leg that it stands on is where that of `a` is.
 
-    The two stand on the same leg; its foot points the same way then, by the bone above its lowest joint.
+    The two stand on the same leg; its foot points the same way then, by the bone above its lowest joint. It is moved
+    `up` by so many metres as the floor of `a` is above its own.
     """
     body = a.skeleton
     places = [body.positions(p.rotations, p.root) for p in (a, b)]
@@ -222,7 +225,7 @@ def on_the_same_spot(a: Posture, b: Posture) -> Posture:
     turn = rot.about_vertical(np.array(headings[0] - headings[1]))
     rotations = b.rotations.copy()
     rotations[0] = rot.mul(turn, rotations[0])
-    moved = (places[0][low] - places[1][low]) * np.array([1.0, 0.0, 1.0])
+    moved = (places[0][low] - places[1][low]) * np.array([1.0, 0.0, 1.0]) + up * np.array([0.0, 1.0, 0.0])
     return Posture(body, rotations, rot.mul_vec(turn, b.root - places[1][low]) + places[1][low] + moved)
 
 

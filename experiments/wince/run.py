@@ -50,7 +50,10 @@ def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: 
     bounces: dict[str, list[Floats]] = {maker: [] for maker in MAKERS}
     for number, (kind, i, k) in enumerate(asked):
         (a, floor_a), (b, floor_b) = danced.ends[i], danced.ends[k]
-        b = {"far": b, "one leg": on_the_same_spot(a, b), "jump": nearer(a, b, LEAP)}[kind]
+        if kind == "one leg":  # and on one floor: that of recordings differs by up to a decimetre
+            b, floor_b = on_the_same_spot(a, b, floor_a - floor_b), floor_a
+        elif kind == "jump":
+            b = nearer(a, b, LEAP)
         try:
             tween = found.tween(a, b, node_budget=BUDGET, fps=float(FPS))
         except NoPathError:
