@@ -34,10 +34,8 @@ _WINDOW, _FRAMES = 0.15, 5  # seconds, and frames at least, over which an accele
 _SHARE = 99.0  # percentile of the accelerations downwards
 _FALLS = 19.5  # metres a second squared: in the recordings 17 at most, with hips that were recorded badly
 
-_STRAIGHT, _DRAWN = (
-    1e-4,
-    0.5,
-)  # of the longest step, the least turn in a frame; share of moving frames without
+_STRAIGHT = 1e-4  # of the longest step: the least turn in a frame
+_DRAWN = 0.5  # share of moving frames without a turn, from which movement was drawn
 
 _LIFTED, _SHORTEST = 0.04, 0.12  # metres off the floor, and seconds: a flight
 _CLEAR, _HIGH = 0.1, 0.05  # metres that feet come off the floor, and the mass above its chord, in one that counts
@@ -57,12 +55,15 @@ def question_tempo(motion: Motion) -> str:
     """Say how a person's movement contradicts its clock; "" if it does not, or nothing can be told.
 
     Args:
-        motion: movement on human23; other bodies are not questioned, nor are keyframes and lines between them.
+        motion: movement on human23; other bodies are not questioned, nor are keyframes and lines between them, nor
+            movement in which the engine made frames: its clock is right.
 
     Returns:
         A phrase such as "about 2 times too fast: it falls at 39 m/s2, gravity is 9.8".
     """
-    if human23().difference(motion.skeleton) is not None or motion.keyframed or motion.fps < _SLOWEST:
+    if human23().difference(motion.skeleton) is not None or motion.fps < _SLOWEST:
+        return ""
+    if motion.keyframed or motion.insertions:
         return ""
     if np.ptp(np.diff(motion.times)) > _UNEVEN / motion.fps:  # each frame has a time of its own
         return ""

@@ -12,7 +12,7 @@ from bundled_clips import ballet_clip
 
 from motionmind import read_motion
 from motionmind.body.human import human23, human44
-from motionmind.body.motion import Motion
+from motionmind.body.motion import Insertion, Motion
 from motionmind.body.tempo import question_tempo
 from motionmind.corpus.gather import gather
 from motionmind.errors import MotionMindWarning
@@ -101,6 +101,12 @@ def test_what_cannot_be_told() -> None:
     assert question_tempo(fast.at(np.delete(fast.times, 9))) == ""
     other = Motion(human44(), np.tile(rot.IDENTITY, (len(fast), 44, 1)), fast.root, fast.times)
     assert question_tempo(other) == ""
+
+
+def test_what_the_engine_made_is_not_questioned() -> None:
+    quick = played(jump(), 2.0)
+    assert question_tempo(quick)
+    assert question_tempo(replace(quick, insertions=(Insertion(quick.times[10:20]),))) == ""
 
 
 def test_lines_between_keyframes_are_not_questioned() -> None:
