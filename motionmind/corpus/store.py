@@ -28,6 +28,7 @@ VERSIONS = {FORMAT: (1,), BUILT: (1, 2)}  # that can be read; the last is writte
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
+_ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_typing.py", "display.py", "errors.py", "files.py", "jit.py"),
@@ -284,7 +285,7 @@ def load(folder: Path) -> Stored:
                 shapes = manifest.get("arrays")
                 if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
                     shapes = dict.fromkeys(shapes)  # as the first corpora of 0.1 listed them, without their shapes
-                if not isinstance(shapes, dict):
+                if not isinstance(shapes, dict) or not all(map(_ARRAY_NAME.fullmatch, shapes)):
                     raise FormatError(f"does not say which arrays there are; {remedy(folder)}", path=path)
                 identity = _identity(data, [_array_file(place, name) for name in shapes])
                 return Stored(manifest, _open_arrays(folder, place, shapes), place, identity)
