@@ -14,6 +14,7 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 
@@ -48,6 +49,10 @@ class Posture:
     def __post_init__(self) -> None:
         _freeze_checked(self, (len(self.skeleton), 4), (3,))
 
+    def __repr__(self) -> str:
+        x, y, z = self.root
+        return f"<Posture on {displayed(self.skeleton.name)}, root at {x:.2f}, {y:.2f}, {z:.2f} m>"
+
     def as_motion(self) -> Motion:
         """This posture as a motion of one frame at time 0."""
         return Motion(self.skeleton, self.rotations[None], self.root[None], np.zeros(1))
@@ -79,6 +84,10 @@ class Insertion:
                 raise MotionMindError(f"an insertion of {len(times) - 1} moves has no move {move}, bridged by {joint}")
         times.setflags(write=False)
         object.__setattr__(self, "times", times)
+
+    def __repr__(self) -> str:
+        start, end = self.times[[0, -1]]
+        return f"<Insertion from {start:.2f} to {end:.2f} s: moves {len(self.times) - 1}, bridged {len(self.bridged)}>"
 
     def renamed(self, joints: Mapping[str, str]) -> Insertion:
         """Return the same insertion with joints renamed by `joints` (old -> new); joints not in it are left out."""
@@ -136,6 +145,11 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def __repr__(self) -> str:
+        lasts = self.times[-1] - self.times[0]
+        name, body = displayed(self.name or "without a name"), displayed(self.skeleton.name)
+        return f"<Motion {name} on {body}: frames {len(self)} in {lasts:.2f} s, insertions {len(self.insertions)}>"
 
     def posture(self, frame: int) -> Posture:
         """Return the posture at index `frame`; negative indices count from the end.

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from motionmind._typing import Floats, Indices
+from motionmind.display import displayed
 from motionmind.errors import SkeletonError, suggestion
 from motionmind.geometry import rotations as rot
 
@@ -78,6 +79,9 @@ class Skeleton:
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<Skeleton {displayed(self.name)}: {len(self)} joints from {displayed(self.names[0])}>"
 
     def index(self, joint: str) -> int:
         """Return the index of the joint called `joint`.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -196,6 +197,10 @@ class Corpus:
 
     def __len__(self) -> int:
         return len(self.rotations)
+
+    def __repr__(self) -> str:
+        name, body = displayed(self.name), displayed(self.skeleton.name)
+        return f"<Corpus {name} on {body}: postures {len(self)}, clips {len(self.clips)}, facing {self.facing}>"
 
     @cached_property
     def moves(self) -> Moves:

@@ -14,6 +14,7 @@ import numpy as np
 from motionmind._typing import Bools, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
+from motionmind.display import displayed
 from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
@@ -53,6 +54,11 @@ class Engine(LearnedCorpus):
     >>> engine.tween("ballet/arabesque", "ballet/fifth").moves
     6
     """
+
+    def __repr__(self) -> str:
+        corpus = self.corpus
+        name, body = displayed(corpus.name), displayed(corpus.skeleton.name)
+        return f"<Engine of {name} on {body}: postures {len(corpus)}, clips {len(corpus.clips)}>"
 
     def tween(
         self,

@@ -100,6 +100,13 @@ class Tween:
     after: float | None
     plausibility: Plausibility
 
+    def __repr__(self) -> str:
+        return (
+            f"<Tween: moves {self.moves}, {self.status} at {self.cost:.3f} nats, at least {self.lower_bound:.3f}\n"
+            f" attested {self.attested:.1%}, bridges {len(self.bridges)}, waits {len(self.waits)}\n"
+            f" {self.motion!r}>"
+        )
+
     @property
     def moves(self) -> int:
         """Number of moves T; the path has T + 1 postures."""

@@ -16,6 +16,7 @@ from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary
 from motionmind.chaos.trajectories import largest_exponent
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
@@ -80,6 +81,11 @@ class Variation:
         order.setflags(write=False)
         object.__setattr__(self, "order", order)
         _ = self._state  # raises if an edit does not fit
+
+    def __repr__(self) -> str:
+        piece = displayed(self.piece.motion.name or "a piece without a name")
+        counts = f"postures {len(self.postures)}, seams {len(self.seams)}, edits {len(self.edits)}"
+        return f"<Variation of {piece} by {displayed(self.course.flow)}: {counts}>"
 
     @cached_property
     def _state(self) -> ReviewState:
