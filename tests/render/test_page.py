@@ -336,6 +336,68 @@ def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> N
     assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · bridged: left_elbow"
 
 
+CONTRASTS = """
+(() => {
+  const pen = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  const light = colour => {
+    pen.clearRect(0, 0, 1, 1);
+    pen.fillStyle = colour;
+    pen.fillRect(0, 0, 1, 1);
+    const [r, g, b, alpha] = pen.getImageData(0, 0, 1, 1).data;
+    const linear = [r, g, b].map(v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return [0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2], alpha];
+  };
+  const behind = one => light(getComputedStyle(one).backgroundColor)[1] ? one : behind(one.parentElement);
+  const words = [...document.querySelectorAll('body *')].filter(one => one.getClientRects().length > 0
+    && [...one.childNodes].some(node => node.nodeType === 3 && node.textContent.trim()));
+  return words.map(one => {
+    const [a] = light(getComputedStyle(one).color), [b] = light(getComputedStyle(behind(one)).backgroundColor);
+    return [one.id || one.className || one.tagName, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)];
+  });
+})()
+"""  # of every element with words in it, to what is behind it: WCAG 2.2, "contrast ratio"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_words_can_be_read(show: Callable[..., Opened], scheme: str) -> None:
+    tab = show(bridged(), color_scheme=scheme)
+    tab.get("motionmind.player.seek(0.5)")
+    found = dict(tab.get(CONTRASTS))
+    assert {"h1", "frame", "inserted", "bridged", "front", "quarter"} <= {name.lower() for name in found}
+    assert {name: ratio for name, ratio in found.items() if ratio < 4.5} == {}
+
+
+def test_it_is_dark_where_the_system_is_until_it_is_switched(show: Callable[..., Opened]) -> None:
+    tab = show(still(2), color_scheme="dark")
+    dark = tab.picture()
+    tab.press("d")
+    light = tab.picture()
+    tab.page.emulate_media(color_scheme="light")
+    tab.page.emulate_media(color_scheme="dark")
+    assert np.array_equal(tab.picture(), light)
+    tab.click("dark")
+    assert np.array_equal(tab.picture(), dark)
+    corner = (5, 5)
+    for picture, shown in ((dark, "dark"), (light, "light")):
+        if shown == "light":
+            tab.press("d")
+        paper = tab.get("getComputedStyle(document.body).backgroundColor")
+        np.testing.assert_allclose(picture[corner], [int(v) for v in re.findall(r"\d+", paper)], atol=1)
+    assert light[corner].min() > 200 > 60 > dark[corner].max()
+    grown = np.abs(dark - dark[corner]).max(axis=-1) > 4  # floor, shadow and body are seen on either
+    assert grown.mean() > 0.1
+    assert near(dark, COLOURS["left"]).sum() > 500
+
+
+def test_it_follows_the_system_while_nobody_switches(show: Callable[..., Opened]) -> None:
+    tab = show(still(2))
+    light = tab.picture()
+    tab.page.emulate_media(color_scheme="dark")
+    assert tab.picture()[5, 5].max() < 60
+    tab.page.emulate_media(color_scheme="light")
+    assert np.array_equal(tab.picture(), light)
+
+
 # --- what one can do --------------------------------------------------------------------------------------------------
 
 

@@ -29,7 +29,16 @@ import {
   Vector3,
 } from "three";
 
-export const PAPER = [0.98, 0.976, 0.969];
+/** What bodies are drawn on, as `--paper` in player.css, the floor's grid on that, and the lightest of both. */
+export const PAPERS = {
+  light: { paper: [0.98, 0.976, 0.969], lit: [0.98, 0.976, 0.969], grid: [0.875, 0.868, 0.857] },
+  dark: { paper: [0.106, 0.102, 0.118], lit: [0.25, 0.246, 0.262], grid: [0.25, 0.246, 0.262] },
+};
+
+/** Uniforms of the paper, for all materials on one stage. */
+export function paperUniforms() {
+  return { paper: { value: new Vector3() }, lit: { value: new Vector3() }, grid: { value: new Vector3() } };
+}
 
 /** Segments about a solid's axis, and from its pole to its widest circle, or to that where cone and ball touch. */
 export const FINE = { cone: { around: 12, cap: 3 }, ball: { around: 16, cap: 5 } };
@@ -145,10 +154,10 @@ const PASSES = {
         gl_Position = projectionMatrix * viewMatrix * vec4(place.x + spread.x, 0.0, place.z + spread.y, 1.0);
       }`,
     fragment: /* glsl */ `
-      uniform vec3 paper;
+      uniform vec3 lit;
       varying float vDark;
       void main() {
-        gl_FragColor = vec4(paper * (1.0 - vDark * vec3(0.50, 0.51, 0.52)), 1.0);
+        gl_FragColor = vec4(lit * (1.0 - vDark * vec3(0.50, 0.51, 0.52)), 1.0);
       }`,
     options: {
       side: BackSide, // flattened, what looked down looks up
@@ -170,8 +179,9 @@ export class Figures {
    * @param {number} count of bodies, at most
    * @param {object} mesh FINE or COARSE
    * @param {object} colours ink, bridged, and palettes by name: paint -> [red, green, blue], 0 to 255
+   * @param {object} papers what paperUniforms made
    */
-  constructor(body, count, mesh, colours) {
+  constructor(body, count, mesh, colours, papers) {
     this.body = body;
     this.palettes = {};
     for (const [name, palette] of Object.entries({ given: colours.given, inserted: colours.inserted })) {
@@ -185,7 +195,7 @@ export class Figures {
       middle: { value: new Vector3() },
       width: { value: 0 },
       ink: { value: new Vector3(...colours.ink).divideScalar(255) },
-      paper: { value: new Vector3(...PAPER) },
+      ...papers,
     };
     const ahead = body.cones.map((_, i) => (AHEAD * body.size * i) / body.cones.length);
     this.cones = new Instances("cone", count, mesh, this.uniforms, { step: steps(body.cones, body.size), ahead });

@@ -4,6 +4,7 @@ import { Body } from "motionmind/body";
 import { Motion } from "motionmind/motion";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
+import { Theme } from "motionmind/theme";
 import { Timeline } from "motionmind/timeline";
 
 const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
@@ -29,7 +30,16 @@ function start() {
     describe(player);
   };
   player.addEventListener("change", refresh);
-  bind(player, stage, refresh);
+  const theme = new Theme();
+  const colour = () => {
+    stage.dark = theme.dark;
+    timeline.draw();
+    $("dark").setAttribute("aria-pressed", String(theme.dark));
+    stale = true;
+  };
+  theme.addEventListener("change", colour);
+  colour();
+  bind(player, stage, theme, refresh);
 
   let last = performance.now();
   const draw = (now) => {
@@ -50,7 +60,7 @@ function start() {
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
   requestAnimationFrame(draw);
 
-  window.motionmind = { motion, body, player, stage, timeline, solids: (frame) => solids(motion, body, frame) };
+  window.motionmind = { motion, body, player, stage, theme, timeline, solids: (frame) => solids(motion, body, frame) };
 }
 
 /** The stage; undefined, and a message on the page, where the browser cannot draw it. */
@@ -68,7 +78,7 @@ function makeStage(...things) {
 }
 
 /** Buttons and keys. */
-function bind(player, stage, refresh) {
+function bind(player, stage, theme, refresh) {
   const switched = (id) => () => {
     $(id).setAttribute("aria-pressed", String(!pressed(id)));
     refresh();
@@ -86,6 +96,7 @@ function bind(player, stage, refresh) {
     onion: switched("onion"),
     ends: switched("ends"),
     reset: look("quarter"),
+    dark: () => theme.toggle(),
     ...Object.fromEntries(VIEWS.map((view) => [view, look(view)])),
   };
   for (const [id, action] of Object.entries(actions)) {
@@ -110,6 +121,7 @@ function bind(player, stage, refresh) {
     o: actions.onion,
     a: actions.ends,
     r: actions.reset,
+    d: actions.dark,
     ...Object.fromEntries(VIEWS.map((view, i) => [String(i + 1), actions[view]])),
   };
   document.addEventListener("keydown", (event) => {

@@ -15,7 +15,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/OrbitControls";
-import { COARSE, Figures, FINE, Marks, PAPER } from "motionmind/figure";
+import { COARSE, Figures, FINE, Marks, paperUniforms, PAPERS } from "motionmind/figure";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const SHARPEST = 2; // device pixels to a CSS pixel, at most
@@ -50,16 +50,17 @@ export class Stage {
     this.software = drawnInSoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software && window.devicePixelRatio < SHARPEST });
     this.renderer.autoClear = false;
-    this.renderer.setClearColor(new Color().setRGB(...PAPER, SRGBColorSpace));
+    this.papers = paperUniforms();
+    this.dark = false;
     this.#measure();
 
-    this.figure = new Figures(body, 1, FINE, colours);
-    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours);
+    this.figure = new Figures(body, 1, FINE, colours, this.papers);
+    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours, this.papers);
     this.marks = new Marks(body, colours.bridged, this.figure.uniforms);
     this.ghosts.uniforms.middle = this.figure.uniforms.middle;
     this.ghostsShown = "";
     this.layers = [new Scene(), new Scene(), new Scene()];
-    if (this.grounded) this.layers[0].add(floor(this.middle, this.reach, body.size), this.figure.shadows);
+    if (this.grounded) this.layers[0].add(floor(this.middle, this.reach, body.size, this.papers), this.figure.shadows);
     this.layers[1].add(this.ghosts.group);
     this.layers[2].add(this.figure.group, this.marks.group);
 
@@ -83,6 +84,13 @@ export class Stage {
       this.#resize();
       onChange();
     }).observe(canvas.parentElement);
+  }
+
+  /** Whether the paper is dark. */
+  set dark(value) {
+    const colours = value ? PAPERS.dark : PAPERS.light;
+    for (const [name, colour] of Object.entries(colours)) this.papers[name].value.fromArray(colour);
+    this.renderer.setClearColor(new Color().setRGB(...colours.paper, SRGBColorSpace));
   }
 
   /** Look from "front", "side", "top" or "quarter", so that the whole path is seen. */
@@ -227,8 +235,8 @@ function drawnInSoftware() {
   return SOFTWARE.test(name);
 }
 
-/** A grey disc with a grid of metres (or of a tenth, or of ten, as the body's size is) that fades into the paper. */
-function floor(middle, reach, size) {
+/** A disc with a grid of metres (or of a tenth, or of ten, as the body's size is) that fades into the paper. */
+function floor(middle, reach, size, papers) {
   const radius = 2.4 * reach + 2 * size;
   const step = 10 ** Math.round(Math.log10(size));
   const disc = new RingGeometry(0, radius, 48, 10).rotateX(-0.5 * Math.PI).translate(middle.x, 0, middle.z);
@@ -251,21 +259,21 @@ function floor(middle, reach, size) {
   }
   const grid = new BufferGeometry().setFromPoints(lines);
   const ground = new Group().add(
-    new Mesh(disc, fading(middle, radius, [0.035, 0.038, 0.042])),
-    new LineSegments(grid, fading(middle, radius, [0.105, 0.108, 0.112])),
+    new Mesh(disc, fading(middle, radius, 0.35, papers)),
+    new LineSegments(grid, fading(middle, radius, 1, papers)),
   );
   ground.renderOrder = -1; // before the shadow
   return ground;
 }
 
-/** A material by so much darker than paper, the less the nearer to the edge of the floor. */
-function fading(middle, radius, grey) {
+/** A material with a `share` of the contrast that the grid has with paper, the less the nearer to the edge of the floor. */
+function fading(middle, radius, share, papers) {
   return new ShaderMaterial({
     uniforms: {
       middle: { value: middle },
       radius: { value: radius },
-      grey: { value: new Vector3(...grey) },
-      paper: { value: new Vector3(...PAPER) },
+      share: { value: share },
+      ...papers,
     },
     vertexShader: /* glsl */ `
       uniform vec3 middle;
@@ -276,10 +284,11 @@ function fading(middle, radius, grey) {
         gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0);
       }`,
     fragmentShader: /* glsl */ `
-      uniform vec3 grey, paper;
+      uniform vec3 paper, grid;
+      uniform float share;
       varying float vFade;
       void main() {
-        gl_FragColor = vec4(paper - vFade * grey, 1.0);
+        gl_FragColor = vec4(mix(paper, grid, vFade * share), 1.0);
       }`,
     depthTest: false,
     depthWrite: false,

@@ -48,9 +48,10 @@ export class Timeline {
       pen.fillStyle = colour;
       pen.fillRect(x(from), top, Math.max(x(to) - x(from), least), tall);
     };
-    box("#dcd8d2", this.motion.start, this.motion.end, TRACK, 0);
+    const grey = getComputedStyle(this.canvas).color;
+    box(grey, this.motion.start, this.motion.end, TRACK, 0);
     if (width / this.motion.length >= APART) {
-      pen.fillStyle = "#c4bfb8";
+      pen.fillStyle = grey;
       for (const time of this.motion.times) pen.fillRect(x(time) - 0.5, TRACK.top - 5, 1, 3);
     }
     for (const { times, bridged } of this.motion.insertions) {

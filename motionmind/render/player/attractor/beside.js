@@ -16,7 +16,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/OrbitControls";
-import { PAPER } from "motionmind/figure";
+import { PAPERS } from "motionmind/figure";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const AIR = 1.1; // by how much the picture is larger than the attractor at first
@@ -29,8 +29,9 @@ class Attractor {
   /**
    * @param {object} data what README.md describes
    * @param {Player} player
+   * @param {Theme} theme
    */
-  constructor(data, player) {
+  constructor(data, player, theme) {
     this.player = player;
     this.every = data.every;
     this.order = data.order;
@@ -64,7 +65,6 @@ class Attractor {
       this.head,
     );
     this.renderer = new WebGLRenderer({ canvas: $("space"), antialias: true });
-    this.renderer.setClearColor(new Color().setRGB(...PAPER, SRGBColorSpace));
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.camera = new PerspectiveCamera(FIELD, 1, 0.01, 100);
     this.camera.position.set(0, 0, AWAY);
@@ -72,6 +72,13 @@ class Attractor {
     this.controls = new OrbitControls(this.camera, $("space"));
     this.controls.addEventListener("change", () => (this.stale = true));
     player.addEventListener("change", () => this.follow());
+    const colour = () => {
+      const { paper } = theme.dark ? PAPERS.dark : PAPERS.light;
+      this.renderer.setClearColor(new Color().setRGB(...paper, SRGBColorSpace));
+      this.stale = true;
+    };
+    theme.addEventListener("change", colour);
+    colour();
     new ResizeObserver(() => this.#resize()).observe($("attractor"));
     this.follow();
     const draw = () => {
@@ -203,5 +210,5 @@ function numbers(base64) {
 
 if (window.motionmind) {
   const data = JSON.parse($("data").textContent).beside;
-  window.motionmind.attractor = new Attractor(data, window.motionmind.player);
+  window.motionmind.attractor = new Attractor(data, window.motionmind.player, window.motionmind.theme);
 }
