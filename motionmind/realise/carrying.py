@@ -147,8 +147,9 @@ def carry(
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
             rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
-            rows += _reach_rows(skeleton, own.places, shape, bearing, floor, start, feet, fps)
-            rows += _knee_rows(skeleton, own.places, shape, bearing, floor, start, feet, freedom)
+            legs = _legs(skeleton, own.places, shape, bearing, floor, start, feet)
+            rows += _reach_rows(skeleton, legs, bearing, start, feet, fps)
+            rows += _knee_rows(skeleton, legs, bearing, start, feet, freedom)
             if balances:
                 points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
                 centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
@@ -334,10 +335,8 @@ def _sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
 
 def _reach_rows(
     skeleton: Skeleton,
-    places: Floats,
-    shape: Shape,
+    legs: list[tuple[Floats, Floats]],
     bearing: Bearing,
-    floor: Floats,
     root: Floats,
     feet: list[Foot],
     fps: float,
@@ -348,10 +347,8 @@ def _reach_rows(
 
     Args:
         skeleton: the body.
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
-        shape: the body.
+        legs: each leg in the movement, and as long as it must be, as `_legs` returns them.
         bearing: what bears it.
-        floor: height of the floor [N], metres.
         root: positions of the root [N, 3], metres.
         feet: its feet.
         fps: frames a second.
@@ -359,7 +356,7 @@ def _reach_rows(
     rows, every = [], np.arange(len(root))
     within = np.minimum(np.minimum(every, every[::-1]) / (SETTLES * fps), 1.0)
     for number, foot in enumerate(feet):
-        own, leg = _legs(skeleton, places, shape, bearing, floor, root, number, foot)
+        own, leg = legs[number]
         leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
         length = foot.length(skeleton)
         straight = rot.norm(own) / length
@@ -374,10 +371,8 @@ def _reach_rows(
 
 def _knee_rows(
     skeleton: Skeleton,
-    places: Floats,
-    shape: Shape,
+    legs: list[tuple[Floats, Floats]],
     bearing: Bearing,
-    floor: Floats,
     root: Floats,
     feet: list[Foot],
     freedom: Floats,
@@ -389,7 +384,7 @@ def _knee_rows(
     """
     rows, every = [], np.arange(len(root))
     for number, foot in enumerate(feet):
-        own, leg = _legs(skeleton, places, shape, bearing, floor, root, number, foot)
+        own, leg = legs[number]
         thigh, shank = foot.bones(skeleton)
         was, far = rot.norm(own), rot.norm(leg)
         bends = np.maximum(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
@@ -407,16 +402,28 @@ def _legs(
     bearing: Bearing,
     floor: Floats,
     root: Floats,
-    number: int,
-    foot: Foot,
-) -> tuple[Floats, Floats]:
-    """Return a leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place."""
-    hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
-    own = end - hip
-    leg = own - root
-    leg[:, [0, 2]] += bearing.targets[:, number]
-    leg[:, 1] += floor - shape.low[:, number]
-    return own, leg
+    feet: list[Foot],
+) -> list[tuple[Floats, Floats]]:
+    """Return each leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place.
+
+    Args:
+        skeleton: the body.
+        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+        shape: the body.
+        bearing: what bears it.
+        floor: height of the floor [N], metres.
+        root: positions of the root [N, 3], metres.
+        feet: its feet.
+    """
+    out = []
+    for number, foot in enumerate(feet):
+        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
+        own = end - hip
+        leg = own - root
+        leg[:, [0, 2]] += bearing.targets[:, number]
+        leg[:, 1] += floor - shape.low[:, number]
+        out.append((own, leg))
+    return out
 
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
