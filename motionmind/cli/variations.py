@@ -104,15 +104,16 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
     section=Section.TRAJECTORY,
     type=Point(),
     metavar="X[,Y,Z]",
-    default="0.1",
-    help="Begin the variation's trajectory this far from the piece's; 0 gives the piece back.",
+    help="Begin the variation's trajectory this far from the piece's; 0 gives the piece back  "
+    "[default: as --depart wants it; 0.1 with --start]",
 )
 @option(
     "--depart",
     section=Section.TRAJECTORY,
     type=Number(0, 1),
     metavar="SHARE",
-    help="Let this share of steps leave the piece's order: take the smallest nudge that comes within 0.05 of it.",
+    help="Let this share of steps leave the piece's order: take the smallest nudge that comes within 0.05 of it  "
+    "[default: 0.25, unless --nudge or --start is given]",
 )
 @option(
     "--skip",
@@ -184,6 +185,7 @@ def vary(
     Ctrl-C ends the smoothing: what has been found by then is written, and the exit code is 130.
     """
     from motionmind.chaos.flows import flow_of
+    from motionmind.variation.departure import share_sought
     from motionmind.variation.variation import vary as make_variation
 
     if report == Path("-"):
@@ -198,7 +200,7 @@ def vary(
         key: options.pop(key) for key in ("depart", "start", "skip", "step", "transient", "length", "alternatives")
     }
     nudge = options.pop("nudge")
-    if trajectory["depart"] is not None and given_option(context, ["nudge"]):
+    if trajectory["depart"] is not None and nudge is not None:
         raise click.UsageError("--depart seeks a nudge, and --nudge gives one; leave out one of them", context)
     piece, engine = _read_piece(context, named, corpus, home, **options)
     with Interruption() as interruption:
@@ -206,14 +208,14 @@ def vary(
             piece,
             engine,
             flow=flow,
-            nudge=nudge if len(nudge) > 1 else nudge[0],
+            nudge=nudge[0] if nudge is not None and len(nudge) == 1 else nudge,
             on_progress=interruption.on_progress,
             watch=interruption.watch,
             **trajectory,
             **request,
         )
     print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
-    _print_advice(variation, engine, trajectory["depart"])
+    _print_advice(variation, engine, share_sought(nudge, trajectory["depart"], trajectory["start"]))
     if not as_json:
         print_written([path for path, _ in files])
     if interruption.is_requested:

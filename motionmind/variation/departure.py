@@ -10,13 +10,21 @@ from motionmind._typing import Ints
 from motionmind.errors import MotionMindError
 
 WITHIN = 0.05  # of the share that is sought
-_NUDGES = np.geomspace(1e-4, 10.0, 51)  # ten to a power of ten; the attractors are some tens across
+DEPART = 0.25  # the share that is sought unless another is given
+# Ten to a power of ten; the attractors are some tens across. A piece of a thousand postures is left by a quarter of the
+# steps only if it is followed for hundreds of them, and so from a trajectory that is hardly beside its own.
+_NUDGES = np.geomspace(1e-12, 10.0, 131)
 
 
 def departure(order: Ints) -> float:
     """Return the share of the steps of an order of postures [L] that neither go on in the piece nor stay."""
     steps = np.diff(order)
     return float(np.mean((steps != 1) & (steps != 0))) if len(steps) else 0.0
+
+
+def share_sought(nudge: object | None, depart: float | None, start: object | None) -> float | None:
+    """Return the share of steps for which `vary` seeks a nudge, given its arguments; None if it does not seek one."""
+    return DEPART if nudge is None and depart is None and start is None else depart
 
 
 def find_nudge(order: Callable[[float], Ints], share: float) -> float:

@@ -22,7 +22,7 @@ from motionmind.search.solve import Watch
 from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
 from motionmind.variation.course import Course
-from motionmind.variation.departure import find_nudge
+from motionmind.variation.departure import find_nudge, share_sought
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -39,7 +39,7 @@ from motionmind.variation.review import (
 )
 from motionmind.variation.seams import OnProgress, Transition, check_asked, judge_and_smooth
 
-NUDGE = 0.1  # in a flow's own coordinates; with ten times as much a variation may not begin with the first posture
+NUDGE = 0.1  # of a trajectory that begins where it is told to, in a flow's own coordinates
 SKIP = 10
 ALTERNATIVES = 3
 EXPONENT_STEPS = 200_000
@@ -225,7 +225,7 @@ def vary(
     engine: Engine | None = None,
     *,
     flow: Flow = FLOWS["lorenz"],
-    nudge: float | Sequence[float] = NUDGE,
+    nudge: float | Sequence[float] | None = None,
     depart: float | None = None,
     start: Sequence[float] | None = None,
     skip: int = SKIP,
@@ -248,9 +248,10 @@ def vary(
         engine: the corpus that judges which transitions are abrupt, and smooths those; None leaves them as they are.
         flow: the flow whose trajectories order the postures.
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
-            coordinate, or one for each [d].
+            coordinate, or one for each [d]. None to seek it by `depart`.
         depart: the share of steps that are to leave the piece's order, in place of a nudge: the smallest nudge of the
-            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for `nudge` as it is.
+            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for 0.25, or, with a
+            `start`, for a nudge of 0.1.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
         skip: points of the trajectories to leave out between two postures.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
@@ -259,7 +260,8 @@ def vary(
         alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
 
     Raises:
-        MotionMindError: an argument is out of its range, or a trajectory diverges or settles.
+        MotionMindError: an argument is out of its range, a trajectory diverges or settles, or both a nudge and a share
+            are given.
         SkeletonError: the piece is on another skeleton than the corpus.
         TypeError: there is no such argument.
 
@@ -293,7 +295,7 @@ def vary(
 def _order_postures(
     count: int,
     flow: Flow,
-    nudge: float | Sequence[float],
+    nudge: float | Sequence[float] | None,
     depart: float | None,
     start: Sequence[float] | None,
     skip: int,
@@ -308,6 +310,9 @@ def _order_postures(
     length = check_whole("length", count if length is None else length, 1, LONGEST)
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
+    if nudge is not None and depart is not None:
+        raise MotionMindError("depart seeks a nudge, and nudge gives one: leave out one of them")
+    depart = share_sought(nudge, depart, start)
     start = check_numbers("start", flow.start if start is None else start)
 
     def reorder(nudge: ArrayLike) -> Ints:
@@ -316,7 +321,8 @@ def _order_postures(
             flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient
         ).indices
 
-    nudge = nudge if depart is None else find_nudge(reorder, check_number("depart", depart))
+    if nudge is None:
+        nudge = NUDGE if depart is None else find_nudge(reorder, check_number("depart", depart))
     offset = check_numbers("nudge", nudge)
     if np.ndim(nudge) == 0:
         offset += (0.0,) * (len(flow.start) - 1)

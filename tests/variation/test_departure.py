@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +12,13 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind._typing import Ints
-from motionmind.chaos.flows import flow_of
+from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
+from motionmind.tween.engine import Engine
 from motionmind.variation.departure import WITHIN, departure, find_nudge
 from motionmind.variation.variation import vary
+from motionmind.variation.variation_json import write_variation
 
 
 @pytest.mark.parametrize(
@@ -41,7 +45,7 @@ def test_the_smallest_nudge_that_comes_near_is_taken() -> None:
         nudge = find_nudge(rising, share)
         assert abs(departure(rising(nudge)) - share) <= WITHIN
         assert abs(departure(rising(nudge / 10**0.1)) - share) > WITHIN
-    assert find_nudge(rising, 0.0) == pytest.approx(1e-4)
+    assert find_nudge(rising, 0.0) == pytest.approx(1e-12)
     assert find_nudge(stepping(lambda nudge: 0.5 if nudge > 2.0 else 0.1), 0.9) == pytest.approx(10**0.4)
 
 
@@ -51,13 +55,15 @@ def test_nudges_that_lead_nowhere_end_the_search() -> None:
             raise MotionMindError("the trajectory diverges")
         return stepping(lambda nudge: 0.3)(nudge)
 
-    assert find_nudge(diverging, 1.0) == pytest.approx(1e-4)
+    assert find_nudge(diverging, 1.0) == pytest.approx(1e-12)
 
     def nowhere(nudge: float) -> Ints:
         raise MotionMindError("the trajectory diverges")
 
     with pytest.raises(MotionMindError, match="diverges"):
         find_nudge(nowhere, 0.3)
+    with pytest.raises(MotionMindError, match="depart seeks a nudge, and nudge gives one"):
+        vary(ballet_clip("jump"), nudge=0.1, depart=0.25)
     for share in (-0.1, 1.1, float("nan")):
         with pytest.raises(MotionMindError, match="must be from 0 to 1"):
             find_nudge(diverging, share)
@@ -71,7 +77,41 @@ def test_a_variation_departs_as_asked_however_long_its_piece_is(clip: str, flow:
     assert abs(departure(found.order) - 0.25) <= WITHIN
     again = vary(piece, flow=flow_of(flow), nudge=found.course.nudge[0])
     np.testing.assert_array_equal(again.order, found.order)
-    assert found.course.start == vary(piece, flow=flow_of(flow)).course.start
+    np.testing.assert_array_equal(vary(piece, flow=flow_of(flow)).order, found.order)  # a quarter is the default
+
+
+@pytest.mark.parametrize("flow", sorted(FLOWS))
+@pytest.mark.parametrize("count", [48, 200])
+def test_by_default_a_fifth_at_least_leaves_the_order_of_pieces_long_and_short(flow: str, count: int) -> None:
+    clip = ballet_clip("adagio")
+    frames = np.arange(count) % len(clip)
+    step = clip.times[1] - clip.times[0]
+    piece = replace(clip, rotations=clip.rotations[frames], root=clip.root[frames], times=step * np.arange(count))
+    assert departure(vary(piece, flow=flow_of(flow)).order) >= 0.2
+
+
+# As runs of the piece's postures, (the first, how many): what a nudge of 0.1 has always given.
+OF_OLD = {
+    "lorenz": [(0, 45), (20, 2), (47, 8), (49, 1), (26, 1), (60, 1), (52, 2), (36, 1), (18, 2), (14, 1), (46, 1)],
+    "rossler": [(0, 11), (43, 5), (16, 1), (49, 1), (18, 15), (22, 3), (36, 2), (27, 1), (39, 3), (64, 4), (25, 4)],
+    "duffing": [(0, 13), (60, 4), (65, 2), (0, 6), (44, 23), (58, 3), (22, 1), (4, 3), (45, 3), (49, 1), (49, 8)],
+}
+
+
+@pytest.mark.parametrize("flow", sorted(OF_OLD))
+def test_a_trajectory_that_is_given_gives_the_same_piece_as_ever_byte_for_byte(flow: str, tmp_path: Path) -> None:
+    piece = ballet_clip("adagio")
+    engine = Engine.load("ballet")
+    order = np.concatenate([np.arange(first, first + count) for first, count in OF_OLD[flow]])
+    nudged = vary(piece, flow=flow_of(flow), nudge=0.1)
+    np.testing.assert_array_equal(nudged.order[: len(order)], order)
+    started = vary(piece, flow=flow_of(flow), start=flow_of(flow).start)  # to name a start is to take its own nudge
+    for options in ({"nudge": 0.1}, {"start": flow_of(flow).start}):
+        judged = vary(piece, engine, flow=flow_of(flow), watch=lambda _: True, **options)  # type: ignore[arg-type]
+        np.testing.assert_array_equal(judged.postures, nudged.order)
+    for name, one in (("nudged", nudged), ("started", started)):
+        write_variation(tmp_path / f"{name}.json", one)
+    assert (tmp_path / "nudged.json").read_bytes() == (tmp_path / "started.json").read_bytes()
 
 
 def test_the_command_line_says_what_was_reached(run: Run) -> None:
