@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from io import BytesIO
 from itertools import combinations
@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from numpy.typing import ArrayLike
+from pages import SCREENS, reachable_controls, readable_words
 from PIL import Image
 from scipy.spatial import cKDTree
 
@@ -350,21 +352,42 @@ def test_names_that_xml_cannot_hold_are_written_as_it_can() -> None:
 # --- the page ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_page_follows_the_variation_on_its_attractor(browser: Any, tmp_path: Path) -> None:
-    variation = varied("rossler", 40, length=60)
-    write_attractor(tmp_path / "page.html", variation)
-    context = browser.new_context(viewport={"width": 900, "height": 500}, reduced_motion="reduce")
-    tab = context.new_page()
+@pytest.fixture(scope="module")
+def danced() -> Variation:
+    return varied("rossler", 40, length=60)
+
+
+@pytest.fixture
+def show(browser: Any, tmp_path: Path, danced: Variation) -> Iterator[Callable[..., Any]]:
+    """A function that opens the page of `danced`; afterwards, that it neither complained nor asked for anything."""
     said: list[str] = []
     asked: list[str] = []
-    tab.on("console", lambda message: said.append(message.text))
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto((tmp_path / "page.html").as_uri())
-    for _ in range(500):
-        if tab.evaluate("!!window.motionmind?.attractor"):
-            break
-        tab.wait_for_timeout(20)
+    contexts: list[Any] = []
+    write_attractor(tmp_path / "page.html", danced)
+
+    def show(**options: Any) -> Any:
+        usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce"}
+        contexts.append(browser.new_context(**(usual | options)))
+        tab = contexts[-1].new_page()
+        tab.on("console", lambda message: said.append(message.text))
+        tab.on("pageerror", lambda error: said.append(str(error)))
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto((tmp_path / "page.html").as_uri())
+        for _ in range(500):
+            if tab.evaluate("!!window.motionmind?.attractor"):
+                break
+            tab.wait_for_timeout(20)
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert [line for line in said if not re.search("GPU stall|WebGL context could not", line)] == []
+    assert [url for url in asked if not url.startswith(("data:", "file:"))] == []
+
+
+def test_the_page_follows_the_variation_on_its_attractor(show: Callable[..., Any], danced: Variation) -> None:
+    variation, tab = danced, show()
     times = variation.motion().times[variation.arrange().frames]
     found = tab.evaluate(
         "motionmind.attractor.times.map(time => (motionmind.player.seek(time), motionmind.attractor.posture))"
@@ -394,13 +417,60 @@ def test_the_page_follows_the_variation_on_its_attractor(browser: Any, tmp_path:
         assert len(cell) > 20
         assert (cKDTree(sites).query(cell)[1] == variation.order[n]).mean() > 0.99  # floats of half the length
         assert tab.inner_text("#site") == str(variation.order[n])
-        assert f"posture {variation.order[n]} of the piece, at {n} of 59" in tab.inner_text("#reading")
+        assert f"posture {variation.order[n]}, at {n} of 59" in tab.inner_text("#reading")
     shot = np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB")).astype(int)
     for ink in (PIECE, VARIATION):
         assert (np.abs(shot - ink).max(axis=-1) < 40).sum() > 50
-    context.close()
-    assert [line for line in said if not re.search("GPU stall|WebGL context could not", line)] == []
-    assert [url for url in asked if not url.startswith(("data:", "file:"))] == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("screen", SCREENS)
+def test_the_page_fits_every_screen_and_can_be_read(
+    show: Callable[..., Any], danced: Variation, screen: str, scheme: str
+) -> None:
+    tab = show(color_scheme=scheme, **SCREENS[screen])
+    controls = reachable_controls(tab, 44 if SCREENS[screen].get("has_touch") else 32)
+    assert {"space", "canvas", "timeline", "play", "front", "dark", "help"} <= controls
+    # Numbers as long as they become, and an attractor that has to be as large at all times.
+    jump = max(portrait_of(danced).jumps)
+    tab.evaluate("motionmind.player.seek(motionmind.attractor.times[0])")
+    room = tab.locator("#space").bounding_box()
+    tab.evaluate(f"motionmind.player.seek(motionmind.attractor.times[{jump}])")
+    assert tab.locator("#space").bounding_box() == room
+    assert min(room["width"], room["height"]) > 150
+    assert "jumped from" in tab.inner_text("#reading")
+    assert tab.evaluate("(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth)(reading)")
+    assert {"flow", "reading", "piece", "other", "cell", "site", "h1"} <= readable_words(tab)
+    # Lines and dots need a contrast of 3: WCAG 2.2, 1.4.11.
+    paper = np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB"))[2, 2]
+    for name in ("piece", "other"):
+        line = f"document.querySelector('#attractor .{name}')"
+        ink = tab.evaluate(f"getComputedStyle({line}, '::before').backgroundColor")
+        light, dark = sorted([luminance(paper), luminance([int(v) for v in re.findall(r"\d+", ink)])], reverse=True)
+        assert (light + 0.05) / (dark + 0.05) > 3.0
+
+
+def luminance(colour: ArrayLike) -> float:
+    """Relative luminance of an sRGB colour, 0 to 255 (WCAG 2.2)."""
+    share = np.asarray(colour) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_keys_turn_the_picture_that_has_the_focus(show: Callable[..., Any]) -> None:
+    tab = show()
+    places = "[motionmind.attractor, motionmind.stage].map(one => one.camera.position.toArray())"
+    before = tab.evaluate(places)
+    tab.focus("#space")
+    tab.keyboard.press("Shift+ArrowLeft")
+    turned = tab.evaluate(places)
+    assert turned[0] != before[0]
+    assert turned[1] == before[1]
+    tab.focus("#canvas")
+    tab.keyboard.press("Shift+ArrowLeft")
+    again = tab.evaluate(places)
+    assert again[0] == turned[0]
+    assert again[1] != turned[1]
 
 
 def test_a_variation_that_is_longer_than_its_piece_stays_with_it_to_its_end(sketchy: None) -> None:

@@ -15,6 +15,7 @@ from bundled_clips import ballet_clip
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from pages import SCREENS, reachable_controls, readable_words
 from PIL import Image
 
 from motionmind._typing import Bools, Floats, Indices, Int16s
@@ -88,7 +89,7 @@ class Opened:
     def picture(self) -> Int16s:
         """The canvas's pixels [H, W, 3], when the picture is that of now."""
         self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        shot = self.page.locator("#canvas").screenshot(style="header, #views { visibility: hidden }")
+        shot = self.page.locator("#canvas").screenshot(style="#state, #legend { visibility: hidden }")
         return np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
 
     @property
@@ -336,35 +337,57 @@ def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> N
     assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · bridged: left_elbow"
 
 
-CONTRASTS = """
-(() => {
-  const pen = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
-  const light = colour => {
-    pen.clearRect(0, 0, 1, 1);
-    pen.fillStyle = colour;
-    pen.fillRect(0, 0, 1, 1);
-    const [r, g, b, alpha] = pen.getImageData(0, 0, 1, 1).data;
-    const linear = [r, g, b].map(v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
-    return [0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2], alpha];
-  };
-  const behind = one => light(getComputedStyle(one).backgroundColor)[1] ? one : behind(one.parentElement);
-  const words = [...document.querySelectorAll('body *')].filter(one => one.getClientRects().length > 0
-    && [...one.childNodes].some(node => node.nodeType === 3 && node.textContent.trim()));
-  return words.map(one => {
-    const [a] = light(getComputedStyle(one).color), [b] = light(getComputedStyle(behind(one)).backgroundColor);
-    return [one.id || one.className || one.tagName, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)];
-  });
-})()
-"""  # of every element with words in it, to what is behind it: WCAG 2.2, "contrast ratio"
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_all_words_can_be_read(show: Callable[..., Opened], scheme: str) -> None:
     tab = show(bridged(), color_scheme=scheme)
     tab.get("motionmind.player.seek(0.5)")
-    found = dict(tab.get(CONTRASTS))
-    assert {"h1", "frame", "inserted", "bridged", "front", "quarter"} <= {name.lower() for name in found}
-    assert {name: ratio for name, ratio in found.items() if ratio < 4.5} == {}
+    tab.press("c")
+    box = tab.page.locator("#timeline").bounding_box()
+    tab.page.mouse.move(box["x"] + 50, box["y"] + 10)
+    seen = {"h1", "frame", "inserted", "bridged", "front", "quarter", "summary", "li", "label", "speed", "hint"}
+    assert seen <= readable_words(tab.page)
+    tab.press("?")
+    assert {"keys", "kbd", "dd"} <= readable_words(tab.page)
+
+
+def test_the_legend_has_the_colours_that_are_seen(show: Callable[..., Opened]) -> None:
+    paints: dict[str, list[tuple[int, int, int]]] = {
+        "left": [COLOURS["left"]],
+        "right": [COLOURS["right"]],
+        "front": [COLOURS["mark"]],
+        "inserted": [INSERTED[side] for side in ("left", "right", "middle")],
+        "bridged": [BRIDGED],
+        "A and B": [COLOURS[side] for side in ("left", "right", "middle")],
+    }
+    unbridged = still(12, (Insertion(np.array([0.1, 0.2])),))
+    for motion, wanted in (
+        (bridged(), set(paints)),
+        (unbridged, set(paints) - {"bridged"}),
+        (bridged().slice(3, 6), set(paints) - {"A and B"}),
+        (still(2), {"left", "right", "front"}),
+        (hexapod(), {"left", "right"}),
+    ):
+        tab = show(motion, viewport={"width": 1000, "height": 700})
+        assert tab.page.is_visible("#legend ul")
+        lines = dict(
+            tab.get(
+                "[...document.querySelectorAll('#legend li')].map(line => [line.innerText.trim(), "
+                "[...line.querySelectorAll('i')].map(one => getComputedStyle(one).backgroundColor)])"
+            )
+        )
+        found = {name: colours for line, colours in lines.items() for name in paints if line.startswith(name)}
+        assert len(found) == len(lines)
+        assert found == {name: [f"rgb{colour}" for colour in paints[name]] for name in wanted}
+        tab.press("c")
+        assert not tab.page.is_visible("#legend ul")
+
+
+def test_a_small_page_begins_without_the_legend(show: Callable[..., Opened]) -> None:
+    tab = show(bridged(), **SCREENS["lying"])
+    assert not tab.page.is_visible("#legend ul")
+    tab.page.tap("#legend summary")
+    assert tab.page.is_visible("#legend ul")
+    assert "li" in readable_words(tab.page)
 
 
 def test_it_is_dark_where_the_system_is_until_it_is_switched(show: Callable[..., Opened]) -> None:
@@ -526,19 +549,106 @@ def test_without_webgl_it_says_so(show: Callable[..., Opened]) -> None:
     tab.said.clear()  # three.js says it too
 
 
-def test_it_fits_a_phone(show: Callable[..., Opened]) -> None:
-    tab = show(bridged(), viewport={"width": 360, "height": 640}, device_scale_factor=3, has_touch=True, is_mobile=True)
-    assert tab.get("document.documentElement.scrollWidth") == 360
-    assert tab.get("document.documentElement.scrollHeight") == 640
-    assert tab.get("document.getElementById('canvas').width") == 720  # two pixels to one of CSS are sharp enough
+@pytest.mark.parametrize("screen", SCREENS)
+def test_it_fits_every_screen(show: Callable[..., Opened], screen: str) -> None:
+    tab = show(replace(bridged(), name="x" * 60), **SCREENS[screen])
+    controls = reachable_controls(tab.page, 44 if SCREENS[screen].get("has_touch") else 32)
+    assert {"canvas", "timeline", "play", "speed", "apart", "front", "dark", "help", "Colours"} <= controls
+    room = "(({ clientWidth, clientHeight }) => [clientWidth, clientHeight])(document.getElementById('canvas'))"
+    size = tab.get(room)
+    assert size[1] > 180
+    for time in (0.0, 0.3, 0.5, 1.1):  # words come and go, and the picture stays as large
+        tab.get(f"motionmind.player.seek({time})")
+        assert tab.get(room) == size
+
+
+def test_a_telephone_has_enough_of_two_pixels_to_one(show: Callable[..., Opened]) -> None:
+    tab = show(bridged(), **SCREENS["upright"], device_scale_factor=3)
+    assert tab.get("document.getElementById('canvas').width") == 780
     tab.page.tap("#top")
     assert tab.get("motionmind.stage.view") == "top"
 
 
 def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:
     tab = show(bridged())
-    tab.get("controls = [...document.querySelectorAll('button, select, [role=slider], [role=group]')]")
-    assert tab.get("controls.filter(one => !one.ariaLabel && !one.innerText.trim()).map(one => one.id)") == []
+    tab.get(
+        "controls = [...document.querySelectorAll('button, summary, canvas[tabindex], [role=slider], [role=group]')]"
+    )
+    assert tab.get("controls.filter(one => !one.ariaLabel && !one.textContent.trim()).map(one => one.id)") == []
+    labels = "[...document.querySelectorAll('select')].map(one => [...one.labels].map(l => l.firstChild.data.trim()))"
+    assert tab.get(labels) == [["Speed"], ["Apart"]]  # words that are seen
+
+
+def test_the_sheet_of_keys_holds_all_that_act_and_each_acts(show: Callable[..., Opened]) -> None:
+    tab = show(bridged())
+    tab.press("?")
+    shown = tab.get(
+        "[...document.querySelectorAll('#sheet dt')].map(one => [...one.querySelectorAll('kbd')].map(k => k.innerText))"
+    )
+    assert tab.page.is_visible("#sheet")
+    tab.press("End")  # belongs to the sheet now
+    assert tab.time == 0.0
+    closed = "!document.getElementById('sheet').contains(document.activeElement)"
+    tab.press("Escape")
+    tab.wait(closed)
+    assert not tab.page.is_visible("#sheet")
+
+    state = (
+        "JSON.stringify([motionmind.player.time, motionmind.player.playing, motionmind.player.loop, "
+        "motionmind.stage.camera.position.toArray(), document.getElementById('sheet').open, "
+        "document.getElementById('legend').open, document.activeElement.id || document.activeElement.className, "
+        "...[...document.querySelectorAll('[aria-pressed]')].map(one => one.ariaPressed)])"
+    )
+    names = {"Space": "Space", "←": "ArrowLeft", "→": "ArrowRight"}
+    for row in shown:
+        if row == ["Shift", "arrows"]:
+            presses = [f"Shift+Arrow{way}" for way in ("Left", "Right", "Up", "Down")]
+        else:
+            presses = [names.get(key, key) for key in row]
+        for press in presses:
+            tab.get("motionmind.player.pause(); motionmind.player.seek(0.55); motionmind.stage.look('quarter')")
+            if press in {"4", "R"}:
+                tab.press("1")
+            before = tab.get(state)
+            tab.press(press)
+            assert tab.get(state) != before, press
+            tab.press("Escape")
+            tab.wait(closed)
+    assert not tab.get("motionmind.player.playing")
+
+
+def test_keys_that_would_do_nothing_are_not_on_the_sheet(show: Callable[..., Opened]) -> None:
+    listed = "[...document.querySelectorAll('#sheet dt')].map(one => one.innerText)"
+    assert {"A", "N", "P", "Space", "1"} <= set(show(bridged()).get(listed))
+    assert {"A", "N", "P", "Space", "1"} & set(show(still(3)).get(listed)) == {"Space", "1"}
+    assert {"A", "N", "P", "Space", "1"} & set(show(still(1)).get(listed)) == {"1"}
+
+
+def test_keys_turn_the_camera_as_dragging_does(show: Callable[..., Opened]) -> None:
+    tab = show(still(2))
+    place = "motionmind.stage.camera.position.clone().sub(motionmind.stage.controls.target).toArray()"
+
+    def angles() -> tuple[float, float, float]:
+        x, y, z = tab.get(place)
+        far = float(np.linalg.norm([x, y, z]))
+        return float(np.degrees(np.arctan2(x, z))), float(np.degrees(np.arcsin(y / far))), far
+
+    before = angles()
+    tab.press("Shift+ArrowLeft")
+    turned = angles()
+    assert turned[0] == pytest.approx(before[0] - 7.5)
+    assert turned[1:] == pytest.approx(before[1:])
+    tab.press("Shift+ArrowRight")
+    assert angles() == pytest.approx(before)
+    tab.press("Shift+ArrowUp")
+    assert angles()[1] == pytest.approx(before[1] + 7.5)
+    tab.press("r")
+    tab.press("+")
+    assert angles()[2] == pytest.approx(0.9 * before[2])
+    tab.press("-")
+    assert angles() == pytest.approx(before)
+    assert tab.time == 0.0
+    assert tab.get("document.querySelectorAll('#views [aria-pressed=true]').length") == 0
 
 
 def test_a_part_has_only_the_ghosts_that_it_holds(show: Callable[..., Opened]) -> None:

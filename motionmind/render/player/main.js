@@ -1,7 +1,9 @@
 /** The page: what is on it, put together; buttons and keys. README.md describes `window.motionmind`. */
 
 import { Body } from "motionmind/body";
-import { Motion } from "motionmind/motion";
+import { listen, writeKeys } from "motionmind/keys";
+import { writeLegend } from "motionmind/legend";
+import { MOMENT, Motion } from "motionmind/motion";
 import { Player } from "motionmind/player";
 import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
@@ -9,6 +11,7 @@ import { Timeline } from "motionmind/timeline";
 
 const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
 const VIEWS = ["front", "side", "top", "quarter"];
+const ROOMY = "(min-width: 700px) and (min-height: 480px)"; // pages on which the legend is open at first
 
 const $ = (id) => document.getElementById(id);
 
@@ -24,6 +27,9 @@ function start() {
   const moving = motion.length > 1;
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
   $("ends").hidden = motion.insertions.every((insertion) => motion.ends(insertion).length === 0);
+  writeLegend($("legend").querySelector("ul"), motion, body, data.colours);
+  $("legend").open = matchMedia(ROOMY).matches;
+  writeKeys($("sheet").querySelector("dl"), motion);
 
   const refresh = () => {
     stale = true;
@@ -72,7 +78,7 @@ function makeStage(...things) {
     $("message").textContent =
       "This browser shows no 3D pictures (WebGL 2 is not available), so the movement cannot be shown. " +
       "Turn on hardware acceleration in its settings, or open the page in another browser.";
-    for (const element of document.querySelectorAll("footer, #views, #canvas")) element.hidden = true;
+    for (const element of document.querySelectorAll("footer, #views, #page, #legend, #canvas")) element.hidden = true;
     return undefined;
   }
 }
@@ -97,6 +103,7 @@ function bind(player, stage, theme, refresh) {
     ends: switched("ends"),
     reset: look("quarter"),
     dark: () => theme.toggle(),
+    help: () => $("sheet").showModal(),
     ...Object.fromEntries(VIEWS.map((view) => [view, look(view)])),
   };
   for (const [id, action] of Object.entries(actions)) {
@@ -111,26 +118,20 @@ function bind(player, stage, theme, refresh) {
   $("speed").addEventListener("change", () => (player.speed = Number($("speed").value)));
   $("apart").addEventListener("change", refresh);
 
-  const keys = {
-    " ": actions.play,
-    ArrowLeft: actions.back,
-    ArrowRight: actions.forward,
-    Home: () => player.seek(player.motion.start),
-    End: () => player.seek(player.motion.end),
-    l: actions.loop,
-    o: actions.onion,
-    a: actions.ends,
-    r: actions.reset,
-    d: actions.dark,
-    ...Object.fromEntries(VIEWS.map((view, i) => [String(i + 1), actions[view]])),
-  };
-  document.addEventListener("keydown", (event) => {
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-    const taken = event.target.closest("select") || (key === " " && event.target.closest("button"));
-    if (taken || event.ctrlKey || event.metaKey || event.altKey || !Object.hasOwn(keys, key)) return;
-    event.preventDefault();
-    keys[key]();
-  });
+  const { motion } = player;
+  const starts = motion.insertions.map(({ times }) => times[0]);
+  listen(
+    {
+      ...actions,
+      home: () => player.seek(motion.start),
+      end: () => player.seek(motion.end),
+      previous: () => player.seek(starts.findLast((time) => time < player.time - MOMENT) ?? starts.at(-1)),
+      next: () => player.seek(starts.find((time) => time > player.time + MOMENT) ?? starts[0]),
+      legend: () => ($("legend").open = !$("legend").open),
+    },
+    motion,
+    stage.controls,
+  );
 }
 
 /** Say in words where the player is. */

@@ -1,6 +1,6 @@
 /** Movement on a skeleton: the frames that were stored, and the posture at any moment between them. */
 
-const MOMENT = 1e-6; // seconds: times that are no further apart are one
+export const MOMENT = 1e-6; // seconds: times that are no further apart are one
 
 export class Motion {
   /** @param {object} data what README.md describes */

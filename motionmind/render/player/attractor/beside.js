@@ -17,11 +17,14 @@ import {
 } from "three";
 import { OrbitControls } from "three/OrbitControls";
 import { PAPERS } from "motionmind/figure";
+import { orbit } from "motionmind/keys";
+import { MOMENT } from "motionmind/motion";
 
 const FIELD = 26; // degrees from the picture's lower edge to its upper one
 const AIR = 1.1; // by how much the picture is larger than the attractor at first
 const AWAY = 6; // attractor's radii from it to the viewer
-const MOMENT = 1e-6; // seconds: times that are no further apart are one
+const LIGHTER = 0.4; // share of white in both trajectories' colours on dark paper
+const SHEETS = [150, 144, 138];
 const $ = (id) => document.getElementById(id);
 
 /** A variation on its attractor, in the space [x, y, z] of the picture, where the attractor's radius is 1. */
@@ -44,18 +47,16 @@ class Attractor {
     this.cells = this.order.reduce((found, posture) => found.set(posture, []), new Map());
     cells.forEach((posture, i) => this.cells.get(posture)?.push(i));
 
-    const { piece, other } = data.colours;
-    document.documentElement.style.setProperty("--piece", `rgb(${piece.join()})`);
-    document.documentElement.style.setProperty("--other", `rgb(${other.join()})`);
     $("flow").textContent = data.flow;
 
+    const [piece, other] = [new Color(), new Color()];
     const behind = new BufferAttribute(this.other, 3);
     this.cell = dots(sheets, other, 2.6, 0.55);
     this.past = line(behind, other, 1);
     this.head = dots(new BufferAttribute(new Float32Array(3), 3), other, 11, 1);
     this.site = dots(new BufferAttribute(new Float32Array(3), 3), piece, 13, 1);
     this.scene = new Scene().add(
-      dots(sheets, [150, 144, 138], 1.4, 0.42),
+      dots(sheets, inked(new Color(), SHEETS), 1.4, 0.42),
       this.cell,
       line(behind, other, 0.3),
       line(new BufferAttribute(numbers(data.piece), 3), piece, 0.85),
@@ -75,11 +76,19 @@ class Attractor {
     const colour = () => {
       const { paper } = theme.dark ? PAPERS.dark : PAPERS.light;
       this.renderer.setClearColor(new Color().setRGB(...paper, SRGBColorSpace));
+      for (const [name, ink] of Object.entries({ piece, other })) {
+        const colour = data.colours[name].map((value) => (theme.dark ? value + LIGHTER * (255 - value) : value));
+        inked(ink, colour);
+        $("attractor").style.setProperty(`--${name}`, `rgb(${colour.join()})`);
+      }
       this.stale = true;
     };
     theme.addEventListener("change", colour);
     colour();
-    new ResizeObserver(() => this.#resize()).observe($("attractor"));
+    new ResizeObserver(() => this.#resize()).observe($("room"));
+    $("attractor").addEventListener("keydown", (event) => {
+      if (orbit(event, this.controls)) event.stopPropagation(); // or the body would turn too
+    });
     this.follow();
     const draw = () => {
       if (this.stale) this.#draw();
@@ -130,22 +139,22 @@ class Attractor {
       $("site").textContent = posture;
       $("site").hidden = false;
     }
-    const jump = this.jumps.has(n) ? ` · jumped here from ${this.order[n - 1]}` : "";
-    $("reading").textContent = `posture ${posture} of the piece, at ${n} of ${this.order.length - 1}${jump}`;
+    const jump = this.jumps.has(n) ? ` · jumped from ${this.order[n - 1]}` : "";
+    $("reading").textContent = `posture ${posture}, at ${n} of ${this.order.length - 1}${jump}`;
     this.stale = true;
   }
 
   #draw() {
     this.stale = false;
     this.renderer.render(this.scene, this.camera);
-    const { clientWidth: width, clientHeight: height } = $("attractor");
+    const { clientWidth: width, clientHeight: height } = $("room");
     const seen = new Vector3().fromArray(this.site.geometry.attributes.position.array).project(this.camera);
     $("site").style.left = `${(0.5 + 0.5 * seen.x) * width}px`;
     $("site").style.top = `${(0.5 - 0.5 * seen.y) * height}px`;
   }
 
   #resize() {
-    const { clientWidth: width, clientHeight: height } = $("attractor");
+    const { clientWidth: width, clientHeight: height } = $("room");
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
@@ -156,12 +165,17 @@ class Attractor {
   }
 }
 
+/** Make a colour that of [red, green, blue], 0 to 255; returns it. */
+function inked(colour, channels) {
+  return colour.setRGB(...channels.map((value) => value / 255), SRGBColorSpace);
+}
+
 /** Round dots, so many CSS pixels wide. */
 function dots(places, colour, size, opacity) {
   const material = new ShaderMaterial({
     uniforms: {
       size: { value: size * Math.min(window.devicePixelRatio, 2) },
-      colour: { value: new Vector3(...colour).divideScalar(255) },
+      colour: { value: colour },
       opacity: { value: opacity },
     },
     vertexShader: /* glsl */ `
@@ -176,6 +190,7 @@ function dots(places, colour, size, opacity) {
       void main() {
         if (length(gl_PointCoord - 0.5) > 0.5) discard;
         gl_FragColor = vec4(colour, opacity);
+        #include <colorspace_fragment>
       }`,
     transparent: true,
     depthTest: false,
@@ -188,13 +203,8 @@ function dots(places, colour, size, opacity) {
 
 /** A line through places. */
 function line(places, colour, opacity) {
-  const material = new LineBasicMaterial({
-    color: new Color().setRGB(...colour.map((value) => value / 255), SRGBColorSpace),
-    opacity,
-    transparent: true,
-    depthTest: false,
-    depthWrite: false,
-  });
+  const material = new LineBasicMaterial({ opacity, transparent: true, depthTest: false, depthWrite: false });
+  material.color = colour; // the same object, so that it changes with the paper
   const found = new Line(new BufferGeometry().setAttribute("position", places), material);
   found.frustumCulled = false;
   return found;

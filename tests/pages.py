@@ -1,0 +1,72 @@
+"""What is measured on the program's pages in a browser: whether words can be read, and buttons be met."""
+
+from __future__ import annotations
+
+from typing import Any
+
+# The sizes of a notebook computer and of a telephone, upright and lying; the latter are used by fingers.
+SCREENS: dict[str, dict[str, Any]] = {
+    "computer": {"viewport": {"width": 1280, "height": 800}},
+    "upright": {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True},
+    "lying": {"viewport": {"width": 844, "height": 390}, "has_touch": True, "is_mobile": True},
+}
+
+# Of every element with words in it: its name, the contrast to what is behind it (WCAG 2.2, "contrast ratio"), and
+# whether words lie on a drawing with nothing behind them.
+_CONTRASTS = """
+(() => {
+  const pen = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  const light = colour => {
+    pen.clearRect(0, 0, 1, 1);
+    pen.fillStyle = colour;
+    pen.fillRect(0, 0, 1, 1);
+    const [r, g, b, alpha] = pen.getImageData(0, 0, 1, 1).data;
+    const linear = [r, g, b].map(v => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return [0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2], alpha];
+  };
+  const behind = one => light(getComputedStyle(one).backgroundColor)[1] === 255 ? one : behind(one.parentElement);
+  const words = [...document.querySelectorAll('body *')].filter(one => one.checkVisibility({ visibilityProperty: true })
+    && (one.matches('select') || [...one.childNodes].some(node => node.nodeType === 3 && node.textContent.trim())));
+  const canvases = [...document.querySelectorAll('canvas')];
+  return words.map(one => {
+    const [a] = light(getComputedStyle(one).color), [b] = light(getComputedStyle(behind(one)).backgroundColor);
+    const range = document.createRange();
+    range.selectNodeContents(one);
+    const meets = (p, q) => p.left < q.right && q.left < p.right && p.top < q.bottom && q.top < p.bottom;
+    const drawn = canvases.some(canvas => behind(one).contains(canvas)
+      && [...range.getClientRects()].some(box => meets(box, canvas.getBoundingClientRect())));
+    const name = one.id || one.className || one.tagName.toLowerCase();
+    return [name, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), drawn];
+  });
+})()
+"""
+
+# Of every control that is seen: its name, whether it is whole, whether its middle is its own, and its size.
+_TARGETS = """
+[...document.querySelectorAll('button, select, summary, [role=slider], [tabindex="0"]')]
+  .filter(one => one.checkVisibility({ visibilityProperty: true }) && getComputedStyle(one).pointerEvents !== 'none')
+  .map(one => {
+    const { left, right, top, bottom, width, height } = one.getBoundingClientRect();
+    const met = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+    return [one.id || one.innerText, left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight,
+      one === met || one.contains(met), Math.min(width, height)];
+  })
+"""
+
+
+def readable_words(tab: Any) -> set[str]:
+    """Check that all words on a page have a contrast of 4.5 to what is behind them; return whose words these are."""
+    found = tab.evaluate(_CONTRASTS)
+    assert [name for name, _, drawn in found if drawn] == []
+    assert {name: ratio for name, ratio, _ in found if ratio < 4.5} == {}
+    return {name for name, _, _ in found}
+
+
+def reachable_controls(tab: Any, least: float) -> set[str]:
+    """Check that controls are whole, uncovered and `least` CSS pixels wide and high; return which there are."""
+    assert tab.evaluate("[document.documentElement.scrollWidth > innerWidth]") == [False]
+    found = tab.evaluate(_TARGETS)
+    assert [name for name, whole, _, _ in found if not whole] == []
+    assert [name for name, _, met, _ in found if not met] == []
+    assert {name: size for name, _, _, size in found if size < least} == {}
+    return {name for name, _, _, _ in found}
