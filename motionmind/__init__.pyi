@@ -18,6 +18,7 @@ from .errors import MotionMindError as MotionMindError
 from .errors import MotionMindWarning as MotionMindWarning
 from .errors import NoPathError as NoPathError
 from .errors import SkeletonError as SkeletonError
+from .errors import WrongTypeError as WrongTypeError
 from .formats import lossy_fields as lossy_fields
 from .formats import read_motion as read_motion
 from .formats import read_posture as read_posture
@@ -28,6 +29,7 @@ from .metrics.measure import Figure as Figure
 from .metrics.measure import measure as measure
 from .notation.compose import compose as compose
 from .notation.read import read_score as read_score
+from .plots.angles import angle_chart as angle_chart
 from .plots.attractor import write_attractor as write_attractor
 from .plots.joint_graph import write_joint_graph as write_joint_graph
 from .render.pictures import write_picture as write_picture
@@ -79,6 +81,8 @@ __all__ = [
     "TweenRequest",
     "Variation",
     "Wait",
+    "WrongTypeError",
+    "angle_chart",
     "compose",
     "contact_sheet",
     "explain",

@@ -25,6 +25,16 @@ class MotionMindError(Exception):
     """
 
 
+class WrongTypeError(MotionMindError, TypeError):
+    """A value of a type that its function does not take, or an option that there is not.
+
+    >>> from motionmind import write_motion
+    >>> write_motion("clip.bvh", "clip.glb")
+    Traceback (most recent call last):
+    motionmind.errors.WrongTypeError: motion must be a Motion, not 'clip.glb'
+    """
+
+
 class FormatError(MotionMindError):
     """A file that cannot be read as the format it claims to be.
 

@@ -30,8 +30,16 @@ SUBJECTS = {
     "Skeletons of your own": ("own_skeleton", "to_human23", "read_joint_mapping"),
     "States": ("make_discretization", "name_states", "write_library"),
     "Variations": ("vary", "Variation", "Piece", "Seam", "Flow", "flow_of", "read_variation", "write_variation"),
-    "Pictures": ("write_picture", "contact_sheet", "write_joint_graph", "write_attractor"),
-    "Errors": ("MotionMindError", "FormatError", "SkeletonError", "CorpusError", "NoPathError", "MotionMindWarning"),
+    "Pictures": ("write_picture", "contact_sheet", "angle_chart", "write_joint_graph", "write_attractor"),
+    "Errors": (
+        "MotionMindError",
+        "FormatError",
+        "SkeletonError",
+        "CorpusError",
+        "NoPathError",
+        "WrongTypeError",
+        "MotionMindWarning",
+    ),
 }
 
 # The types of files and reports.

@@ -8,15 +8,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
+from motionmind.arguments import (
+    as_floats,
+    check_flag,
+    check_integer,
+    check_items,
+    check_mapping,
+    check_real,
+    check_text,
+    check_type,
+)
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.tables import data_frame, data_set
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 _AT_ONCE = 4096  # frames that are interpolated at a time
 _MOMENT = 1e-6  # seconds: times no further apart count as equal
@@ -47,6 +63,7 @@ class Posture:
     root: Floats
 
     def __post_init__(self) -> None:
+        check_type("skeleton", self.skeleton, Skeleton)
         _freeze_checked(self, (len(self.skeleton), 4), (3,))
 
     def __repr__(self) -> str:
@@ -76,7 +93,8 @@ class Insertion:
     bridged: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
-        times = np.array(self.times, dtype=np.float64)
+        times = as_floats("times", self.times)
+        check_items("bridged", self.bridged, "pairs of a joint's name and a move", tuple)
         if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError("an insertion's times must be finite and increasing, one at least")
         for joint, move in self.bridged:
@@ -91,6 +109,7 @@ class Insertion:
 
     def renamed(self, joints: Mapping[str, str]) -> Insertion:
         """Return the same insertion with joints renamed by `joints` (old -> new); joints not in it are left out."""
+        check_mapping("joints", joints)
         return replace(self, bridged=tuple((joints[joint], move) for joint, move in self.bridged if joint in joints))
 
 
@@ -113,8 +132,8 @@ class Motion:
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
     >>> motion = Motion(human23(), np.stack([at_rest] * 3), np.zeros((3, 3)), np.array([0.0, 0.5, 1.0]))
-    >>> len(motion), len(motion.resample(10.0))
-    (3, 11)
+    >>> len(motion), len(motion.resample(10.0)), motion.positions().shape
+    (3, 11, (3, 23, 3))
     """
 
     skeleton: Skeleton
@@ -126,7 +145,11 @@ class Motion:
     keyframed: bool = False
 
     def __post_init__(self) -> None:
-        times = np.array(self.times, dtype=np.float64)
+        check_type("skeleton", self.skeleton, Skeleton)
+        check_text("name", self.name)
+        check_items("insertions", self.insertions, "insertions", Insertion)
+        check_flag("keyframed", self.keyframed)
+        times = as_floats("times", self.times)
         if times.ndim != 1 or len(times) == 0:
             raise MotionMindError(f"{self.name or 'motion'}: no frames")
         if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
@@ -157,6 +180,7 @@ class Motion:
         Raises:
             MotionMindError: there is no such frame; the message names those there are.
         """
+        check_integer("frame", frame)
         if not -len(self) <= frame < len(self):
             name = self.name or "the motion"
             raise MotionMindError(f"{name} has frames 0 to {len(self) - 1}, no frame {frame}")
@@ -164,6 +188,8 @@ class Motion:
 
     def slice(self, start: int, stop: int) -> Motion:
         """Return the frames from `start` up to, not including, `stop`, at unchanged times."""
+        check_integer("start", start)
+        check_integer("stop", stop)
         part = replace(
             self,
             rotations=self.rotations[start:stop],
@@ -215,6 +241,7 @@ class Motion:
         Raises:
             MotionMindError: the rate is out of that range, or gives too many frames (`check_size`).
         """
+        check_real("rate", rate)
         if not 0.0 < rate <= FASTEST:
             raise MotionMindError(
                 f"a rate must be a positive number of postures a second, {FASTEST:g} at most, not {rate}"
@@ -230,6 +257,7 @@ class Motion:
         Raises:
             MotionMindError: there are too many of them (`check_size`).
         """
+        times = as_floats("times", times)
         check_size(len(times), len(self.skeleton), self.name)
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
@@ -249,6 +277,39 @@ class Motion:
             times=times,
             keyframed=False,
         )
+
+    def positions(self) -> Floats:
+        """Return the joints' positions [T, J, 3], metres, by forward kinematics."""
+        return self.skeleton.positions(self.rotations, self.root)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the movement as a pandas table: a row a frame, by its time in seconds.
+
+        Columns are pairs of a joint and a value: `x`, `y` and `z` are where the joint is, in metres; `qx`, `qy`, `qz`
+        and `qw` its rotation, local to its parent; `degrees` is how far it is turned from rest, 0 to 180.
+        `table["left_knee", "degrees"]` is one curve, `table.xs("degrees", axis=1, level="value")` has those of all
+        joints.
+
+        Raises:
+            MotionMindError: pandas is not installed.
+        """
+        return data_frame(self.skeleton.names, self.times, self.positions(), self.rotations, self._about())
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the movement as an xarray data set.
+
+        Its variables are `position` (time, joint, axis), metres; `rotation` (time, joint, coefficient), unit
+        quaternions x, y, z, w, local to the parent; `turned` (time, joint), degrees from rest, 0 to 180; and `inserted`
+        (time), whether the engine made the frame.
+
+        Raises:
+            MotionMindError: xarray is not installed.
+        """
+        names, about = self.skeleton.names, self._about()
+        return data_set(names, self.times, self.positions(), self.rotations, self.inserted(), about)
+
+    def _about(self) -> dict[str, str]:
+        return {"name": self.name, "skeleton": self.skeleton.name}
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,7 +358,7 @@ def _freeze_checked(thing: Posture | Motion, rotations: tuple[int, ...], root: t
     """Check the shapes and values of a new object's arrays, then make them read-only."""
     name = getattr(thing, "name", "") or type(thing).__name__.lower()
     for what, shape in (("rotations", rotations), ("root", root)):
-        array = np.array(getattr(thing, what), dtype=np.float64)
+        array = as_floats(what, getattr(thing, what))
         if array.shape != shape:
             raise MotionMindError(f"{name}: {what} must have the shape {shape}, not {array.shape}")
         if not np.isfinite(array).all():

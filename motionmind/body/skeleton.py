@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 
 from motionmind._typing import Floats, Indices
+from motionmind.arguments import as_floats, check_integer, check_items, check_text, check_type
 from motionmind.display import displayed
 from motionmind.errors import SkeletonError, suggestion
 from motionmind.geometry import rotations as rot
@@ -41,9 +43,12 @@ class Skeleton:
     tips: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
+        check_text("name", self.name)
+        check_items("names", self.names, "joints' names", str)
+        check_items("parents", self.parents, "whole numbers", Integral)
         count = len(self.names)
-        offsets = np.array(self.offsets, dtype=np.float64)
-        tips = np.zeros((count, 3)) if len(self.tips) == 0 else np.array(self.tips, dtype=np.float64)
+        offsets, tips = as_floats("offsets", self.offsets), as_floats("tips", self.tips)
+        tips = np.zeros((count, 3)) if len(tips) == 0 else tips
         if count == 0:
             raise SkeletonError(f"skeleton {self.name!r} has no joints")
         if len(self.parents) != count or offsets.shape != (count, 3) or tips.shape != (count, 3):
@@ -89,12 +94,14 @@ class Skeleton:
         Raises:
             SkeletonError: there is no such joint; the message names those there are.
         """
+        check_text("joint", joint)
         if joint not in self.names:
             raise SkeletonError(f"no joint {joint!r} in {self.name}{suggestion(joint, self.names, 'its joints are')}")
         return self.names.index(joint)
 
     def children(self, joint: int) -> list[int]:
         """Return the indices of the joints whose parent is `joint`."""
+        check_integer("joint", joint)
         return [*self._children[joint]]
 
     @cached_property
@@ -109,6 +116,7 @@ class Skeleton:
 
         Proportions do not count: orientations mean the same on a taller body.
         """
+        check_type("other", other, Skeleton)
         mine, theirs = self._parent_names(), other._parent_names()
         missing = [name for name in mine if name not in theirs]
         extra = [name for name in theirs if name not in mine]
@@ -145,13 +153,13 @@ class Skeleton:
         """Return the orientation of each joint's frame in the world [..., J, 4], from local rotations [..., J, 4]."""
         from motionmind.body.kinematics import turn_with_parents  # numba is slow to import
 
-        out = np.array(rotations, dtype=np.float64, order="C")
+        out = np.ascontiguousarray(as_floats("rotations", rotations))
         turn_with_parents(out.reshape(-1, len(self), 4), np.array(self.parents))
         return out
 
     def local_rotations(self, turned: Floats) -> Floats:
         """Return local rotations [..., J, 4] from global ones [..., J, 4]: the inverse of `global_rotations`."""
-        parents = np.array(self.parents[1:], dtype=np.intp)
+        parents, turned = np.array(self.parents[1:], dtype=np.intp), as_floats("turned", turned)
         local = rot.inv_mul(turned[..., parents, :], turned[..., 1:, :])
         return np.concatenate([turned[..., :1, :], local], axis=-2)
 
@@ -184,6 +192,8 @@ class Skeleton:
         """
         from motionmind.body.kinematics import place_points  # numba is slow to import
 
+        root, points = as_floats("root", root), as_floats("points", points)
+        check_items("joints", joints, "joints' indices", Integral)
         turned, count = self.global_rotations(rotations), len(self) + len(joints)
         out = np.empty((*turned.shape[:-2], count, 3))
         out[..., 0, :] = root

@@ -14,6 +14,15 @@ from typing import Any
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.arguments import (
+    as_floats,
+    check_function,
+    check_integer,
+    check_items,
+    check_mapping,
+    check_real,
+    check_text,
+)
 from motionmind.errors import MotionMindError, suggestion
 
 Field = Callable[..., Any]
@@ -50,7 +59,16 @@ class Flow:
     about: str = ""
 
     def __post_init__(self) -> None:
-        start = tuple(float(x) for x in self.start)
+        check_text("name", self.name)
+        check_function("field", self.field)
+        check_real("step", self.step)
+        check_integer("transient", self.transient)
+        check_mapping("parameters", self.parameters)
+        check_items("dimensions", self.dimensions, "names", str)
+        check_text("about", self.about)
+        start = tuple(map(float, as_floats("start", self.start).ravel()))
+        for name, value in self.parameters.items():
+            check_real(f"parameter {name}", value)
         parameters = {name: float(value) for name, value in self.parameters.items()}
         if not start:
             raise MotionMindError(f"flow {self.name}: a start needs a coordinate at least")
@@ -85,6 +103,7 @@ def flow_of(name: str, **parameters: float) -> Flow:
     >>> flow_of("lorenz", rho=28.0).parameters["rho"]
     28.0
     """
+    check_text("name", name)
     if name not in FLOWS:
         raise MotionMindError(f"no flow {name!r}{suggestion(name, sorted(FLOWS))}")
     flow = FLOWS[name]

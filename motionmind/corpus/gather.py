@@ -7,12 +7,22 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count, pairwise
+from numbers import Real
 from typing import Literal, NamedTuple, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Ints
+from motionmind.arguments import (
+    check_flag,
+    check_integer,
+    check_items,
+    check_mapping,
+    check_real,
+    check_text,
+    check_type,
+)
 from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
@@ -108,6 +118,14 @@ def gather(
             one rate, or an option is out of range.
         SkeletonError: the body cannot be mirrored.
     """
+    check_text("name", name)
+    check_type("rate", rate, str, Real, wanted='"auto", None, or a number', or_none=True)
+    check_text("facing", facing)
+    check_flag("mirror", mirror)
+    check_mapping("about", about, or_none=True)
+    for key, value in (("title", title), ("author", author), ("source", source), ("licence", licence)):
+        check_text(key, value)
+    check_items("clips", motions, "motions")
     _check_options(skip, flips, flip_degrees, reverse)
     given = None if rate == "auto" else rate
     _check_mix(name, mix, given)
@@ -158,6 +176,10 @@ def gather(
 
 def _check_options(skip: int, flips: Flips, flip_degrees: float, reverse: float | None) -> None:
     """Raise CorpusError if an option is out of range."""
+    check_integer("skip", skip)
+    check_text("flips", flips)
+    check_real("flip_degrees", flip_degrees)
+    check_real("reverse", reverse, or_none=True)
     if skip < 0:
         raise CorpusError(f"the number of frames to skip must be at least 0, not {skip}")
     if flips not in get_args(Flips):
@@ -283,6 +305,7 @@ def _take_recordings(
     doubts: list[str] = []
     first: Motion | None = None
     for recording in motions:
+        check_type("a clip", recording, Motion)
         first = first or recording
         difference = first.skeleton.difference(recording.skeleton)
         if difference is not None:

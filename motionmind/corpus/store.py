@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import msgspec
 import platformdirs
 
+from motionmind.arguments import check_path
 from motionmind.corpus import versions
 from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError, suggestion
@@ -31,13 +32,14 @@ _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a chang
 _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
-    *("_typing.py", "display.py", "errors.py", "files.py", "jit.py"),
+    *("_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py"),
     *("geometry", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
 )
 
 
 def home(folder: str | os.PathLike[str] | None = None) -> Path:
     """Return the folder of a user's data: `folder`, else $MOTIONMIND_HOME, else the platform's data directory."""
+    check_path("folder", folder, or_none=True)
     chosen = folder or os.environ.get("MOTIONMIND_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("motionmind", appauthor=False))
 
@@ -59,7 +61,8 @@ def list_corpora(folder: str | os.PathLike[str] | None = None) -> dict[str, Path
 
 def locate(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Return the folder of the corpus with this name, or at this path; CorpusError names the known ones."""
-    corpora = list_corpora(folder)
+    check_path("name", name)
+    corpora, name = list_corpora(folder), os.fspath(name)
     if name in corpora:
         return corpora[name]
     with suppress(OSError, ValueError):  # not a possible path: too long, or with a zero byte

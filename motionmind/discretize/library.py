@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.arguments import check_path, check_type
 from motionmind.body.human import BODIES
 from motionmind.corpus.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
@@ -259,6 +260,8 @@ def write_library(path: FilePath, library: Library) -> None:
     >>> from motionmind import name_states, read_score, write_library
     >>> write_library("mine.toml", name_states([read_score("bends.score")], 12.0))
     """
+    check_path("path", path)
+    check_type("library", library, Library)
     write_atomically(path, format_library(library).encode())
 
 

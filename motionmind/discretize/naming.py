@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.arguments import check_flag, check_items, check_mapping
 from motionmind.body.anatomy import Anatomy, Joint
 from motionmind.discretize.library import Library
 from motionmind.discretize.protocol import check_range, per_joint_values
@@ -57,7 +58,11 @@ def name_states(
     >>> name_states([read_score("bends.score")], 12.0).skeleton
     'human23'
     """
+    check_mapping("per_joint", per_joint, or_none=True)
+    check_flag("stage", stage)
+    check_items("scores", scores, "scores")
     scores, per_joint = list(scores), per_joint or {}
+    check_items("scores", scores, "scores, as read_score reads", Score)
     check_range("tolerance in degrees", {"": tolerance, **per_joint}, 0.01, 180.0)
     if not any(score.clips for score in scores):
         paths = ", ".join(score.path for score in scores)

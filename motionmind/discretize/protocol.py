@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.arguments import check_real
 from motionmind.discretize.states import StateSpace, checked_rotations
 from motionmind.errors import MotionMindError, SkeletonError, did_you_mean
 
 SIDES = ("left_", "right_")
 
 
+@runtime_checkable
 class Discretization(Protocol):
     """A way to divide each joint's orientations into states."""
 
@@ -106,7 +107,7 @@ def check_range(what: str, values: Mapping[str, float], low: float, high: float)
         MotionMindError: a value is not a number, or out of range.
     """
     for joint, value in values.items():
-        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not number or not low <= value <= high:
-            of = f" of {joint}" if joint else ""
+        of = f" of {joint}" if joint else ""
+        check_real(f"the {what}{of}", value)
+        if not low <= value <= high:
             raise MotionMindError(f"the {what}{of} must be a number from {low:g} to {high:g}, not {value!r}")

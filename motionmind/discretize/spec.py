@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from typing import cast
 
+from motionmind.arguments import check_mapping, check_path
 from motionmind.discretize.codebook import Codebook
 from motionmind.discretize.expert import ExpertLibrary
 from motionmind.discretize.grids import EulerGrid, QuaternionGrid
@@ -46,7 +48,9 @@ def make_discretization(
     >>> make_discretization("codebook", tolerance=10.0, per_joint={"left_hip": 5.0}).tolerance
     10.0
     """
-    per_joint = dict(per_joint or {})
+    check_path("kind", kind)
+    check_mapping("per_joint", per_joint, or_none=True)
+    kind, per_joint = os.fspath(kind), dict(per_joint or {})
     if kind == "codebook":
         return Codebook(tolerance, per_joint)
     # Checked here, in degrees: a grid's message would be about a step that nobody wrote.

@@ -18,9 +18,11 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from pathlib import Path
 
 from motionmind._moved import renamed
+from motionmind.arguments import check_integer, check_path, check_real, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
@@ -74,6 +76,11 @@ def read_motion(
     >>> len(read_motion("rest.bvh"))
     1
     """
+    check_path("path", path)
+    check_path("asf", asf, or_none=True)
+    check_type("unit", unit, str, Real, wanted="the name of a unit, or its metres", or_none=True)
+    check_real("fps", fps, or_none=True)
+    check_type("skeleton", skeleton, Skeleton, or_none=True)
     # Formats are imported here, so a program loads only those it uses.
     match _suffix(path, _READABLE, "read"):
         case ".bvh":
@@ -153,6 +160,7 @@ def read_posture(
     >>> read_posture("rest.json").skeleton.name
     'human23'
     """
+    check_integer("frame", frame, or_none=True)
     motion = read_motion(path, unit=unit, asf=asf, skeleton=skeleton)
     if frame is None and len(motion) > 1:
         raise FormatError(
@@ -182,6 +190,9 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
     >>> write_motion("rest.bvh", posture.as_motion(), unit="m")
     """
+    check_path("path", path)
+    check_type("motion", motion, Motion)
+    check_type("unit", unit, str, Real, wanted="the name of a unit, or its metres")
     suffix = _suffix(path, _WRITABLE, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
@@ -223,6 +234,8 @@ def write_posture(path: FilePath, posture: Posture) -> None:
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
     >>> write_posture("rest.json", posture)
     """
+    check_path("path", path)
+    check_type("posture", posture, Posture)
     if _suffix(path, _WRITABLE, "written") == ".json":
         from motionmind.formats.posture_json import write_posture_json
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from motionmind.arguments import check_path, check_type
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
@@ -39,6 +40,9 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
     >>> lossy_fields(posture.as_motion(), "rest.txt")
     ['where the body is']
     """
+    check_type("motion", motion, Motion)
+    check_path("path", path)
+    check_path("source", source, or_none=True)
     suffix = Path(path).suffix.lower()
     lossy = []
     if source is not None and Path(source).suffix.lower() == ".json":

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motionmind.arguments import check_text
 from motionmind.grammar.coordination import fit_network
 from motionmind.learned.model import LearnedCorpus
 
@@ -29,6 +30,7 @@ def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
     """
     import networkx as nx
 
+    check_text("joint", joint)
     graph, chain = learned.grammar.transitions, learned.space.index(joint)
     first, last = graph.starts[chain], graph.starts[chain + 1]
     weights = graph.weights("conditional")

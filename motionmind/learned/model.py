@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Self, Unpack
 
+from motionmind.arguments import check_mapping, check_path, check_type
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import Gathering, gather
 from motionmind.discretize import Codebook, Discretization
 from motionmind.learned import persistence
 from motionmind.learned.learning import Learned, learn
+
+_DISCRETIZATION = "a Discretization, as make_discretization makes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +57,17 @@ class LearnedCorpus(Learned):
                 be held, or there is no such corpus to mix.
             SkeletonError: the body cannot be mirrored.
         """
+        check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION, or_none=True)
+        check_mapping("mix", mix, or_none=True)
+        check_path("home", home, or_none=True)
         others = [(persistence.load(other, home).corpus, weight) for other, weight in (mix or {}).items()]
         return cls.learn(gather(name, clips, mix=others, **options), discretization or Codebook(15.0))
 
     @classmethod
     def learn(cls, corpus: Corpus, discretization: Discretization) -> Self:
         """Learn from a corpus; see `motionmind.learned.learning.learn`."""
+        check_type("corpus", corpus, Corpus)
+        check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION)
         return cls._of(learn(corpus, discretization))
 
     @classmethod
@@ -76,6 +84,7 @@ class LearnedCorpus(Learned):
             CorpusError: there is no such corpus; the message names those there are.
             FormatError: it cannot be read.
         """
+        check_path("home", home, or_none=True)
         began = perf_counter()
         learned = persistence.load(name, home)
         return cls._of(learned, perf_counter() - began)
@@ -89,6 +98,7 @@ class LearnedCorpus(Learned):
         Raises:
             CorpusError: the folder cannot be written, or holds anything but a built corpus.
         """
+        check_path("folder", folder)
         persistence.save(self, folder)
 
     @classmethod

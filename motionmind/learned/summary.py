@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Int32s
+from motionmind.arguments import check_integer
 from motionmind.corpus.corpus import Clip, Corpus, Facing, Repair
 from motionmind.errors import MotionMindError
 from motionmind.grammar.grammar import Grammar
@@ -169,6 +170,8 @@ def check_corpus(corpus: Corpus, grammar: Grammar, states: Int32s, pairs: int = 
     Raises:
         MotionMindError: `pairs` or `seed` is out of its range.
     """
+    check_integer("pairs", pairs)
+    check_integer("seed", seed)
     if pairs < 1:
         raise MotionMindError(f"the number of pairs must be at least 1, not {pairs}")
     if seed < 0:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, States
+from motionmind.arguments import check_type
 from motionmind.body.contact import RATE, find_feet, find_floor, foot_slide, skating
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate
@@ -148,6 +149,9 @@ def measure(motion: Motion, learned: LearnedCorpus, path: States | None = None) 
     >>> figures["attested"].value
     1.0
     """
+    check_type("motion", motion, Motion)
+    check_type("learned", learned, LearnedCorpus, wanted="an Engine")
+    check_type("path", path, np.ndarray, wanted="an array of states", or_none=True)
     corpus = learned.corpus
     motion = _on(corpus.skeleton, motion)
     step = 1.0 / corpus.rate if corpus.rate else usual(learned.grammar.transitions)

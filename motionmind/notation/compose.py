@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
+from motionmind.arguments import check_text
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.contact import lowest_point
 from motionmind.body.motion import Motion, Posture
@@ -58,6 +59,7 @@ def compose(path: FilePath, clip: str | None = None) -> Motion:
     >>> len(motion)
     3
     """
+    check_text("clip", clip, or_none=True)
     score = read_score(path)
     names = [found.name for found in score.clips]
     if clip is None and len(names) != 1:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from unicodedata import normalize
 
+from motionmind.arguments import check_path
 from motionmind.body.anatomy import SIDES, Anatomy
 from motionmind.body.anatomy_file import HEADINGS, anatomy_named, read_body
 from motionmind.errors import FormatError, did_you_mean, enumerated, quoted
@@ -75,6 +76,7 @@ def read_score(path: FilePath) -> Score:
     >>> [clip.name for clip in read_score("bends.score").clips]
     ['bends']
     """
+    check_path("path", path)
     return _read(Path(path), (), {})
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from motionmind.arguments import check_path, check_type
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
@@ -54,6 +55,8 @@ def write_attractor(path: FilePath, variation: Variation) -> None:
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
     >>> write_attractor("attractor.svg", vary(motion, nudge=1.0))
     """
+    check_path("path", path)
+    check_type("variation", variation, Variation)
     suffix = Path(path).suffix.lower()
     if suffix not in ATTRACTORS:
         raise MotionMindError(f"{path}: an attractor is written as one of {', '.join(ATTRACTORS)}")

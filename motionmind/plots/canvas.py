@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from motionmind.arguments import check_path
+from motionmind.errors import MotionMindError
+from motionmind.files import FilePath, write_atomically
 from motionmind.plots.brush import Brush
 from motionmind.plots.marks import Mark
 from motionmind.render.markup import hexadecimal, xml_text
@@ -30,6 +34,17 @@ class Plate:
     marks: tuple[Mark, ...]
     headings: tuple[Mark, ...] = ()
     style: str = f'stroke-linejoin="round" stroke-linecap="round" {LETTERING}'
+
+    def save(self, path: FilePath) -> None:
+        """Write the picture; MotionMindError if the suffix is neither `.svg` nor `.png`, or it cannot be written."""
+        check_path("path", path)
+        suffix = Path(path).suffix.lower()
+        if suffix not in (".svg", ".png"):
+            raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; this picture is written as .svg or .png")
+        write_atomically(path, svg(self).encode() if suffix == ".svg" else png(self))
+
+    def _repr_svg_(self) -> str:
+        return svg(self)
 
 
 def svg(plate: Plate) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motionmind.arguments import check_path, check_type
 from motionmind.body.palette import Colour
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
@@ -53,6 +54,11 @@ def write_joint_graph(path: FilePath, engine: Engine, joint: str) -> nx.DiGraph:
     >>> graph.graph["joint"]
     'left_hip'
     """
+    # Imported here, for numba is slow to import, and graphs that were made already are drawn without it.
+    from motionmind.tween.engine import Engine
+
+    check_path("path", path)
+    check_type("engine", engine, Engine)
     graph = engine.joint_graph(joint)
     write_graph(path, graph)
     return graph

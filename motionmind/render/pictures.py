@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from motionmind.arguments import check_integer, check_path, check_real, check_text, check_type
 from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
@@ -49,6 +50,12 @@ def write_picture(
     >>> posture = Posture(human23(), at_rest, np.zeros(3))
     >>> write_picture("rest.png", posture.as_motion(), view="front")
     """
+    check_path("path", path)
+    check_type("motion", motion, Motion)
+    check_real("fps", fps, or_none=True)
+    check_text("view", view, or_none=True)
+    check_integer("size", size, or_none=True)
+    check_integer("first", first)
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURES:
         raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; pictures end in {', '.join(PICTURES)}")

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from functools import cache
 from io import BytesIO
 from math import ceil, sqrt
+from numbers import Integral
 from typing import Literal
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from motionmind._typing import Floats, Pixels
+from motionmind.arguments import check_integer, check_items, check_text, check_type
 from motionmind.body.motion import Motion
 from motionmind.body.palette import Colour
 from motionmind.display import displayed
@@ -89,6 +91,14 @@ def contact_sheet(
     >>> contact_sheet(posture.as_motion()).mode
     'RGB'
     """
+    check_type("motion", motion, Motion)
+    check_integer("columns", columns, or_none=True)
+    check_text("side", side)
+    check_integer("first", first)
+    if frames is not None:
+        check_items("frames", frames, "whole numbers", Integral)
+    if captions is not None:
+        check_items("captions", captions, "words", str)
     if side not in ("right", "left") or (columns is not None and columns < 1):
         raise MotionMindError(f"a sheet has one column at least, and is seen from the right or left, not {side!r}")
     chosen = list(range(len(motion))) if frames is None else list(frames)

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from motionmind.arguments import check_path
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, SkeletonError
@@ -79,6 +80,7 @@ def read_joint_mapping(path: str | Path) -> dict[str, str]:
     >>> read_joint_mapping("rig.toml")
     {'Hips': 'pelvis'}
     """
+    check_path("path", path)
     path = Path(path)
     try:
         text = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")

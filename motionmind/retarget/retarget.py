@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from motionmind._typing import Floats, Indices
+from motionmind.arguments import check_mapping, check_text, check_type
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
@@ -87,6 +88,9 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     >>> len(to_human23(posture).skeleton)
     23
     """
+    check_type("movement", movement, Motion, Posture)
+    check_mapping("joints", joints, or_none=True)
+    check_text("up", up, or_none=True)
     if up not in (None, "y", "z"):
         raise MotionMindError(f'up must be "y" or "z", not {up!r}')
     if (
@@ -130,6 +134,8 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
     >>> own_skeleton(posture).skeleton.name
     'human23'
     """
+    check_type("movement", movement, Motion, Posture)
+    check_mapping("joints", joints, or_none=True)
     if joints is None and is_human44(movement.skeleton):
         return _turned_up(movement) if _lies(movement.skeleton) else movement
     known = joint_mapping(movement.skeleton) is not None

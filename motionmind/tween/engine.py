@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from motionmind._typing import Bools, Ints
+from motionmind.arguments import check_function, check_integer, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
 from motionmind.display import displayed
@@ -90,10 +91,13 @@ class Engine(LearnedCorpus):
             SkeletonError: a posture or a movement is on another skeleton than the corpus, or has no such joint.
             MotionMindError: an option is out of its range, or asks for what cannot be; no posture has such a name;
                 `before` does not end in `a`, `after` does not begin in `b`, or one of them has a single frame.
-            TypeError: there is no such option.
+            WrongTypeError: an argument is of another type, or there is no such option.
         """
         request = TweenRequest.of(request, **options)
-        start, end = _posture(a), _posture(b)
+        start, end = _posture("a", a), _posture("b", b)
+        check_type("before", before, Motion, or_none=True)
+        check_type("after", after, Motion, or_none=True)
+        check_function("watch", watch, or_none=True)
         began = perf_counter()
         formulation = formulate(self, start, end, request, before, after)
         formulated = perf_counter()
@@ -159,6 +163,7 @@ class Engine(LearnedCorpus):
         >>> other.moves == best.moves, other.cost >= best.cost, min(other.differs) >= 0.2
         (True, True, True)
         """
+        check_integer("count", count)
         request = TweenRequest.of(request, **options)
         found: list[Tween] = []
         for number in range(count):
@@ -320,8 +325,9 @@ class Engine(LearnedCorpus):
         return summary.to_plain(summary.check_corpus(self.corpus, self.grammar, self.states, pairs, seed))
 
 
-def _posture(posture: Posture | str) -> Posture:
+def _posture(argument: str, posture: Posture | str) -> Posture:
     """Return a posture, or the one of a name."""
+    check_type(argument, posture, Posture, str, wanted="a Posture or the name of one")
     if isinstance(posture, Posture):
         return posture
     # Imported here, for scores are slow to import, and most postures are no names.

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from motionmind.arguments import check_type
 from motionmind.display import displayed
 from motionmind.tween.certificate import Source
 from motionmind.tween.report import TweenReport
@@ -118,6 +119,7 @@ def explain(tween: Tween | TweenReport) -> Explanation:
     >>> len(explanation.moves), explanation.moves[0].joints[0].joint
     (3, 'pelvis')
     """
+    check_type("tween", tween, Tween, TweenReport)
     report = tween if isinstance(tween, TweenReport) else report_of(tween)
     costs = report.costs
     moves = []

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from motionmind.arguments import check_path
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
@@ -162,6 +163,7 @@ def read_report(path: FilePath) -> TweenReport:
     >>> read_report("report.json").status
     'optimal'
     """
+    check_path("path", path)
     try:
         return msgspec.json.decode(read_bytes(path), type=TweenReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -8,12 +8,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from numbers import Integral
+from numbers import Integral, Real
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, get_args
 
+from motionmind.arguments import (
+    check_flag,
+    check_integer,
+    check_items,
+    check_mapping,
+    check_real,
+    check_text,
+    check_type,
+    described,
+)
 from motionmind.body.rates import FASTEST
-from motionmind.errors import MotionMindError, did_you_mean
+from motionmind.errors import MotionMindError, WrongTypeError, did_you_mean
 from motionmind.grammar.schemes import Scheme, Weights
 from motionmind.realise.corrections import Correction
 
@@ -79,6 +89,7 @@ class TweenRequest:
         fps: frames a second of the motion.
 
     Raises:
+        WrongTypeError: a value is of another type.
         MotionMindError: a value is out of its range, or two of them contradict each other.
 
     >>> from motionmind import TweenRequest
@@ -118,6 +129,7 @@ class TweenRequest:
     fps: float = 30.0
 
     def __post_init__(self) -> None:
+        self._check_types()
         # Copies, so that what is asked stays as it was when the caller's own lists change.
         object.__setattr__(self, "pin", MappingProxyType(dict(self.pin)))
         for name in ("hold", "avoid", "via", "unlike", "without"):
@@ -159,6 +171,26 @@ class TweenRequest:
             if move is not None and not _is_whole(move, 1, MOST_MOVES - 1):
                 raise MotionMindError(f"via {number}: the move must be a whole number from 1, not {move}")
 
+    def _check_types(self) -> None:
+        check_type("moves", self.moves, Real, tuple, wanted="a whole number, or a pair of them", or_none=True)
+        if isinstance(self.moves, tuple) and len(self.moves) != 2:
+            raise WrongTypeError(f"moves must be a whole number, or a pair of them, not {len(self.moves)} of them")
+        check_integer("memory", self.memory, or_none=True)
+        check_integer("seed", self.seed)
+        check_real("duration", self.duration, or_none=True)
+        for name in ("pace", "differ", "novelty", "lambda_", "beta", "tau", "bridge_price", "guide", "fps"):
+            check_real(name.rstrip("_"), getattr(self, name))
+        for name in ("what_if", "sample", "strict", "posturewise"):
+            check_flag(name, getattr(self, name))
+        for name in ("weights", "coordination"):
+            check_text(name, getattr(self, name))
+        check_mapping("pin", self.pin)
+        check_items("hold", self.hold, "joints' names", str)
+        check_items("without", self.without, "corrections' names", str)
+        check_items("avoid", self.avoid, "pairs of a joint's name and a state", tuple, list)
+        check_items("via", self.via, "postures, or pairs of a posture and a move")
+        check_items("unlike", self.unlike, "tweens")
+
     def _check_combinations(self) -> None:
         if self.unlike:
             self._check_unlike()
@@ -185,13 +217,14 @@ class TweenRequest:
         """Return `request` (the default one if None) with some options changed.
 
         Raises:
-            TypeError: there is no such option.
+            WrongTypeError: there is no such option, or `request` is none.
             MotionMindError: as for the constructor.
         """
+        check_type("request", request, TweenRequest, or_none=True)
         known = [one.name for one in fields(cls)]
         for name in options:
             if name not in known:
-                raise TypeError(f"a tween has no option {name!r}{did_you_mean(name, known)}")
+                raise WrongTypeError(f"a tween has no option {name!r}{did_you_mean(name, known)}")
         return replace(request, **options) if request is not None else cls(**options)
 
     @property
@@ -229,6 +262,7 @@ class TweenRequest:
 
     def nodes(self, chains: int) -> int:
         """Return how many nodes the search may hold, for a body of so many joint chains."""
+        check_integer("chains", chains)
         if self.memory is None:
             return self.node_budget
         from motionmind.search.astar import nodes_in  # numba is slow to import
@@ -259,7 +293,8 @@ class TweenRequest:
 
 def _check_count(name: str, value: object, most: int) -> None:
     if not _is_whole(value, 1, most):
-        raise MotionMindError(f"{name} must be a whole number from 1 to {most}, not {value}")
+        error = MotionMindError if isinstance(value, Integral) else WrongTypeError
+        raise error(f"{name} must be a whole number from 1 to {most}, not {described(value)}")
 
 
 def _check_choice(name: str, value: str, choices: Sequence[str]) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.errors import MotionMindError
+from motionmind.arguments import described
+from motionmind.errors import MotionMindError, WrongTypeError
 
 
 def check_whole(name: str, value: object, least: int | None = None, most: int | None = None) -> int:
@@ -21,30 +22,28 @@ def check_whole(name: str, value: object, least: int | None = None, most: int | 
         most: the largest number allowed; None for no limit.
 
     Raises:
-        MotionMindError: `value` is not a whole number, or out of range.
+        WrongTypeError: `value` is not a whole number.
+        MotionMindError: it is out of range.
     """
-    if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        number = int(value)
-        if (least is None or number >= least) and (most is None or number <= most):
-            return number
+    number = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else None
+    if number is not None and (least is None or number >= least) and (most is None or number <= most):
+        return number
     span = "".join(f" {word} {bound}" for word, bound in (("from", least), ("to", most)) if bound is not None)
-    raise MotionMindError(f"{name} must be a whole number{span}, not {value!r}")
+    raise _error(number is not None)(f"{name} must be a whole number{span}, not {described(value)}")
 
 
 def check_number(name: str, value: object) -> float:
-    """Return a finite number as a float; raise MotionMindError if it is not one."""
-    array = _finite(value)
-    if array is None or array.ndim:
-        raise MotionMindError(f"{name} must be a finite number, not {value!r}")
+    """Return a finite number as a float; WrongTypeError if it is no number, MotionMindError if it is not finite."""
+    wanted = "a finite number"
+    array = _numbers(name, value, wanted)
+    if array.ndim:
+        raise WrongTypeError(f"{name} must be {wanted}, not {described(value)}")
     return float(array)
 
 
 def check_numbers(name: str, value: object) -> tuple[float, ...]:
-    """Return finite numbers as floats [d], d = 1 for a single number; raise MotionMindError if any is not finite."""
-    array = _finite(value)
-    if array is None:
-        raise MotionMindError(f"{name} must be finite numbers, not {value!r}")
-    return tuple(map(float, array.reshape(-1)))
+    """Return finite numbers as floats [d], d = 1 for a single number; errors as of `check_number`."""
+    return tuple(map(float, _numbers(name, value, "finite numbers").reshape(-1)))
 
 
 def take_renamed(options: dict[str, Any], old: str, new: str, value: Any) -> Any:
@@ -60,21 +59,28 @@ def take_renamed(options: dict[str, Any], old: str, new: str, value: Any) -> Any
         What was given, by either name.
 
     Raises:
-        TypeError: both names were given.
+        WrongTypeError: both names were given.
     """
     if old not in options:
         return value
     if value is not None:
-        raise TypeError(f"{old} is the former name of {new}: give {new} alone")
+        raise WrongTypeError(f"{old} is the former name of {new}: give {new} alone")
     warnings.warn(f"the keyword {old} is deprecated: use {new}", DeprecationWarning, stacklevel=3)
     return options.pop(old)
 
 
-def _finite(value: object) -> Floats | None:
+def _numbers(name: str, value: object, wanted: str) -> Floats:
+    """Return finite numbers as an array of at most one dimension."""
     try:
         array = np.asarray(value)
+        is_numbers = array.dtype.kind in "iuf" and array.ndim <= 1
     except ValueError:  # rows of different lengths
-        return None
-    if array.dtype.kind not in "iuf" or array.ndim > 1 or not np.isfinite(array).all():
-        return None
+        is_numbers = False
+    if not is_numbers or not np.isfinite(array).all():
+        raise _error(is_numbers)(f"{name} must be {wanted}, not {described(value)}")
     return array.astype(np.float64)
+
+
+def _error(is_of_type: bool) -> type[MotionMindError]:
+    """Return the error for a value out of its range, or of another type."""
+    return MotionMindError if is_of_type else WrongTypeError

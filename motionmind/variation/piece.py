@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats, Ints
+from motionmind.arguments import as_integers, check_text, check_type
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.corpus.corpus import Facing
@@ -85,7 +86,9 @@ class Piece:
     facing: Facing = "free"
 
     def __post_init__(self) -> None:
-        frames = np.array(self.frames, dtype=np.int64)
+        check_type("motion", self.motion, Motion)
+        check_text("facing", self.facing)
+        frames = as_integers("frames", self.frames)
         last = len(self.motion) - 1
         if frames.ndim != 1 or len(frames) == 0 or (frames[0], frames[-1]) != (0, last) or (np.diff(frames) <= 0).any():
             raise MotionMindError(f"a piece's postures must be frames that increase from 0 to its last, {last}")
@@ -108,6 +111,7 @@ class Piece:
         Raises:
             MotionMindError: the rate or the facing is out of its range.
         """
+        check_type("motion", motion, Motion)
         if rate is None:
             return cls(motion, np.arange(len(motion)), facing)
         if not 0.0 < check_number("rate", rate) <= FASTEST:

@@ -18,7 +18,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.motion import Motion, Posture
-from motionmind.errors import NoPathError, SkeletonError, did_you_mean
+from motionmind.errors import NoPathError, SkeletonError, WrongTypeError, did_you_mean
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
 from motionmind.tween.certificate import Bridge, Wait, gap_of
@@ -245,13 +245,13 @@ def check_asked(alternatives: int, options: Mapping[str, Any]) -> None:
 
     Raises:
         MotionMindError: `alternatives` is out of its range.
-        TypeError: a name in `options` is no field of `TweenRequest`.
+        WrongTypeError: a name in `options` is no field of `TweenRequest`.
     """
     check_whole("alternatives", alternatives, 1)
     known = {field.name for field in fields(TweenRequest)} - {"unlike", "what_if"}
     for name in options:
         if name not in known:
-            raise TypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
+            raise WrongTypeError(f"seams are not smoothed by an argument {name!r}{did_you_mean(name, known)}")
 
 
 def judge_and_smooth(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motionmind._typing import Ints
+from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_type
 from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary
@@ -37,7 +38,7 @@ from motionmind.variation.review import (
     apply_edit,
     initial_state,
 )
-from motionmind.variation.seams import OnProgress, Transition, check_asked, judge_and_smooth
+from motionmind.variation.seams import JudgedTransition, OnProgress, Transition, check_asked, judge_and_smooth
 
 NUDGE = 0.1  # of a trajectory that begins where it is told to, in a flow's own coordinates
 SKIP = 10
@@ -75,7 +76,11 @@ class Variation:
     edits: tuple[Edit, ...] = ()
 
     def __post_init__(self) -> None:
-        order = np.array(self.order, dtype=np.int64)
+        check_type("piece", self.piece, Piece)
+        check_type("course", self.course, Course)
+        check_items("transitions", self.transitions, "transitions", JudgedTransition)
+        check_items("edits", self.edits, "edits", Approve, Discard, Replace, Cut, Smooth)
+        order = as_integers("order", self.order)
         if order.ndim != 1 or len(order) == 0 or order.min() < 0 or order.max() >= len(self.piece):
             raise MotionMindError(f"a variation's order must name postures of the piece, 0 to {len(self.piece) - 1}")
         order.setflags(write=False)
@@ -156,7 +161,7 @@ class Variation:
         Raises:
             MotionMindError: there are no such postures, or `before` is one of those that move.
         """
-        return self._after(Cut(*(check_whole("a posture's number", posture) for posture in (first, last, before))))
+        return self._after(Cut(check_whole("first", first), check_whole("last", last), check_whole("before", before)))
 
     def smooth(
         self,
@@ -185,9 +190,11 @@ class Variation:
         Raises:
             SkeletonError: the piece is on another skeleton than the corpus.
             MotionMindError: an argument is out of its range.
-            TypeError: there is no such argument.
+            WrongTypeError: an argument is of another type, or there is no such argument.
         """
         on_progress = take_renamed(options, "told", "on_progress", on_progress)
+        check_type("engine", engine, Engine)
+        _check_watchers(posturewise, on_progress, watch)
         check_asked(alternatives, options)
         inserted = {(seam.start, seam.end) for seam in self.seams if seam.insertion}
         known = {(seam.start, seam.end): seam.transition for seam in self.seams}  # once, however often it comes
@@ -214,6 +221,13 @@ class Variation:
     def _after(self, edit: Edit) -> Variation:
         after = replace(self, edits=(*self.edits, edit))
         return self if self._state.looks_like(after._state) else after
+
+
+def _check_watchers(posturewise: bool, on_progress: OnProgress | None, watch: Watch | None) -> None:
+    """Check the types of arguments that `vary` and `Variation.smooth` share."""
+    check_flag("posturewise", posturewise)
+    check_function("on_progress", on_progress, or_none=True)
+    check_function("watch", watch, or_none=True)
 
 
 def _check_seams(seams: tuple[int, ...]) -> tuple[int, ...]:
@@ -263,7 +277,7 @@ def vary(
         MotionMindError: an argument is out of its range, a trajectory diverges or settles, or both a nudge and a share
             are given.
         SkeletonError: the piece is on another skeleton than the corpus.
-        TypeError: there is no such argument.
+        WrongTypeError: an argument is of another type, or there is no such argument.
 
     >>> from motionmind import Engine, flow_of, vary
     >>> engine = Engine.load("ballet")
@@ -273,6 +287,9 @@ def vary(
     40
     """
     on_progress = take_renamed(options, "told", "on_progress", on_progress)
+    check_type("piece", piece, Motion, Piece)
+    check_type("engine", engine, Engine, or_none=True)
+    _check_watchers(posturewise, on_progress, watch)
     check_asked(alternatives, options)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
     course, order = _order_postures(len(piece), flow, nudge, depart, start, skip, step, transient, length)
@@ -304,8 +321,7 @@ def _order_postures(
     length: int | None,
 ) -> tuple[Course, Ints]:
     """The course that `vary` asks for, its arguments checked, and the order of `count` postures that it gives [L]."""
-    if not isinstance(flow, Flow):
-        raise MotionMindError(f"flow must be a Flow, such as flow_of('lorenz') gives, not {flow!r}")
+    check_type("flow", flow, Flow, wanted="a Flow, such as flow_of('lorenz') gives")
     skip = check_whole("skip", skip, 0, LONGEST)
     length = check_whole("length", count if length is None else length, 1, LONGEST)
     step = check_number("step", flow.step if step is None else step)

@@ -25,6 +25,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from motionmind.arguments import check_path, check_type
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Facing
 from motionmind.errors import FormatError, MotionMindError
@@ -84,6 +85,7 @@ def read_variation(path: FilePath) -> Variation:
     >>> len(read_variation("variation.json").order) == len(motion)
     True
     """
+    check_path("path", path)
     file = _read_motion(path)
     schema = _json.decode(bytes(file.variation), VariationSchema, path)
     skeleton = _json.to_skeleton(file.skeleton, path)
@@ -112,6 +114,8 @@ def write_variation(path: FilePath, variation: Variation) -> None:
     >>> motion = engine.corpus.motion(engine.corpus.clips[0])
     >>> write_variation("variation.json", vary(motion, nudge=1.0))
     """
+    check_path("path", path)
+    check_type("variation", variation, Variation)
     piece = variation.piece
     schema = VariationSchema(
         VERSION,

@@ -239,7 +239,7 @@ REFUSED: list[tuple[Callable[[Variation], object], str]] = [
     (lambda v: v.replace(inserted(v)[0], 9), "has alternatives 1 to"),
     (lambda v: v.cut(5, 200, 1), "cannot cut 5..200: postures are 0 to 89"),
     (lambda v: v.cut(9, 5, 1), "cannot cut 9..5"),
-    (lambda v: v.cut(1.5, 2, 5), "a posture's number must be a whole number, not 1.5"),  # type: ignore[arg-type]
+    (lambda v: v.cut(1.5, 2, 5), "first must be a whole number, not 1.5"),  # type: ignore[arg-type]
     (lambda v: v.approve(1, True), "a seam's number must be a whole number, not True"),
     (lambda v: v.discard(1.0), "a seam's number must be a whole number"),  # type: ignore[arg-type]
     (lambda v: v.replace(inserted(v)[0], "2"), "an alternative's number must be"),  # type: ignore[arg-type]
