@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motionmind._cells import html_of
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.arguments import (
     as_floats,
@@ -69,6 +70,9 @@ class Posture:
     def __repr__(self) -> str:
         x, y, z = self.root
         return f"<Posture on {displayed(self.skeleton.name)}, root at {x:.2f}, {y:.2f}, {z:.2f} m>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     def as_motion(self) -> Motion:
         """This posture as a motion of one frame at time 0."""
@@ -173,6 +177,9 @@ class Motion:
         lasts = self.times[-1] - self.times[0]
         name, body = displayed(self.name or "without a name"), displayed(self.skeleton.name)
         return f"<Motion {name} on {body}: frames {len(self)} in {lasts:.2f} s, insertions {len(self.insertions)}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     def posture(self, frame: int) -> Posture:
         """Return the posture at index `frame`; negative indices count from the end.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from motionmind._cells import html_of
 from motionmind._typing import Bools, Floats, States
 from motionmind.body.motion import Motion
 from motionmind.learned.plausibility import Plausibility, Sighting
@@ -106,6 +107,9 @@ class Tween:
             f" attested {self.attested:.1%}, bridges {len(self.bridges)}, waits {len(self.waits)}\n"
             f" {self.motion!r}>"
         )
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @property
     def moves(self) -> int:

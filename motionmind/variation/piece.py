@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from motionmind._cells import html_of
 from motionmind._typing import Floats, Ints
 from motionmind.arguments import as_integers, check_text, check_type
 from motionmind.body.motion import Insertion, Motion, Posture
@@ -129,6 +130,12 @@ class Piece:
 
     def __len__(self) -> int:
         return len(self.frames)
+
+    def __repr__(self) -> str:
+        return f"<Piece of {len(self)} postures, facing {self.facing}: {self.motion!r}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @cached_property
     def durations(self) -> Floats:

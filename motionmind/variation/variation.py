@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motionmind._cells import html_of
 from motionmind._typing import Ints
 from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_type
 from motionmind.body.motion import Motion
@@ -91,6 +92,9 @@ class Variation:
         piece = displayed(self.piece.motion.name or "a piece without a name")
         counts = f"postures {len(self.postures)}, seams {len(self.seams)}, edits {len(self.edits)}"
         return f"<Variation of {piece} by {displayed(self.course.flow)}: {counts}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @cached_property
     def _state(self) -> ReviewState:
