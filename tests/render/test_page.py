@@ -334,7 +334,7 @@ def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> N
         np.testing.assert_allclose([found[0], found[-1]], np.array(times) / 1.1, atol=0.01)
     box = tab.page.locator("#timeline").bounding_box()
     tab.page.mouse.move(box["x"] + box["width"] * 0.5 / 1.1, box["y"] + 10)
-    assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · bridged: left_elbow"
+    assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · insertion · move 3 of 4 · bridged: left_elbow"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -495,6 +495,83 @@ def test_dragging_the_timeline_scrubs(show: Callable[..., Opened]) -> None:
     tab.page.mouse.up()
     tab.page.mouse.move(box["x"], y)
     assert tab.time == pytest.approx(0.7, abs=0.01)
+
+
+def three_insertions() -> Motion:
+    """Standing for 4 s; in the middle of the three insertions two joints are bridged, one of them twice."""
+    bridges = (("left_elbow", 0), ("left_elbow", 1), ("right_hip", 1))
+    stretches = ([0.5, 0.9], [1.5, 2.0, 2.5], [3.0, 3.1, 3.2, 3.3])
+    return still(41, tuple(Insertion(np.array(at), bridges if len(at) == 3 else ()) for at in stretches))
+
+
+def test_insertions_are_named_where_the_pointer_is(show: Callable[..., Opened]) -> None:
+    tab = show(three_insertions(), viewport={"width": 360, "height": 480})
+    box = tab.page.locator("#timeline").bounding_box()
+    for time, words in (
+        (0.2, ""),
+        (0.7, "insertion 1 of 3 · move 1 of 1"),
+        (1.7, "insertion 2 of 3 · move 1 of 2 · bridged: left_elbow"),
+        (2.2, "insertion 2 of 3 · move 2 of 2 · bridged: left_elbow, right_hip"),
+        (2.7, ""),
+        (3.15, "insertion 3 of 3 · move 2 of 3"),
+    ):
+        x = box["x"] + box["width"] * time / 4.0
+        tab.page.mouse.move(x, box["y"] + 15)
+        assert tab.page.inner_text(".hint").partition(" · ")[2].partition(" · ")[2] == words
+        hint = tab.page.locator(".hint").bounding_box()
+        assert hint["x"] >= box["x"] - 1
+        assert hint["x"] + hint["width"] <= box["x"] + box["width"] + 1
+        marked = tab.get("[...document.querySelectorAll('.under')].map(one => one.getBoundingClientRect().toJSON())")
+        assert len(marked) == (words != "")
+        assert all(one["left"] <= x <= one["right"] for one in marked)
+    tab.page.mouse.down()  # on an insertion, and drags
+    assert tab.time == pytest.approx(3.15, abs=0.02)
+    tab.page.mouse.up()
+    tab.page.mouse.move(box["x"] + 10, 10)
+    assert not tab.page.is_visible(".hint")
+    assert tab.get("document.querySelectorAll('.under').length") == 0
+
+
+def test_keys_reach_each_insertion_and_go_there(show: Callable[..., Opened]) -> None:
+    motion = three_insertions()
+    tab = show(motion)
+    tab.page.focus("#timeline")
+    tab.press("Tab")
+    names = [
+        "insertion 1 of 3, 0.50 to 0.90 s, 1 move",
+        "insertion 2 of 3, 1.50 to 2.50 s, 2 moves, bridged: left_elbow, right_hip",
+        "insertion 3 of 3, 3.00 to 3.30 s, 3 moves",
+    ]
+    focused = "document.activeElement.ariaLabel"
+    for insertion, name in zip(motion.insertions, names, strict=True):
+        assert tab.get(focused) == name
+        assert tab.page.inner_text(".hint") == name.replace(", ", " · ").replace("w · r", "w, r")
+        before = tab.time
+        tab.press("ArrowRight")  # to the next one; frames stay
+        assert tab.time == before
+        if name != names[-1]:
+            tab.press("ArrowLeft")
+        tab.press("Enter")
+        assert tab.time == insertion.times[0]
+        tab.press("ArrowRight")
+    assert tab.get(focused) == names[-1]
+    tab.press("Home")
+    assert tab.get(focused) == names[0]
+    tab.press("Tab")  # one stop for all
+    assert tab.get("document.activeElement.id") == "back"
+    assert not tab.page.is_visible(".hint")
+    tab.press("Shift+Tab")
+    assert tab.get(focused) == names[0]
+    tab.get("motionmind.player.seek(2.2)")
+    spoken = tab.get("document.getElementById('timeline').ariaValueText")
+    assert spoken == "frame 22, 2.20 seconds, insertion 2 of 3, move 2 of 2"
+
+
+def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Opened]) -> None:
+    tab = show(three_insertions())
+    for key, time in (("n", 0.5), ("n", 1.5), ("n", 3.0), ("n", 0.5), ("p", 3.0), ("p", 1.5), ("End", 4.0), ("p", 3.0)):
+        tab.press(key)
+        assert tab.time == time
 
 
 # --- odd ones ---------------------------------------------------------------------------------------------------------
