@@ -1,8 +1,17 @@
-"""What is measured on the program's pages in a browser: whether words can be read, and buttons be met."""
+"""A page in a browser, and what is measured on it: pictures, whether words can be read, and buttons be met."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from io import BytesIO
 from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from motionmind._typing import Bools, Int16s
+
+SIZE = {"width": 640, "height": 480}  # of a page, where its size is all the same
 
 # The sizes of a notebook computer and of a telephone, upright and lying; the latter are used by fingers.
 SCREENS: dict[str, dict[str, Any]] = {
@@ -52,6 +61,51 @@ _TARGETS = """
       one === met || one.contains(met), Math.min(width, height)];
   })
 """
+
+
+@dataclass
+class Opened:
+    """A page in the browser, and what it did that no page should."""
+
+    page: Any
+    said: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+    def get(self, script: str) -> Any:
+        return self.page.evaluate(script)
+
+    def wait(self, script: str) -> None:
+        """Wait until this is so. The page forbids itself what Playwright's own waiting does."""
+        for _ in range(500):
+            if self.get(f"!!({script})"):
+                return
+            self.page.wait_for_timeout(20)
+        raise AssertionError(f"never so: {script}")
+
+    def press(self, key: str) -> None:
+        self.page.keyboard.press(key)
+
+    def click(self, button: str) -> None:
+        self.page.click(f"#{button}")
+
+    def picture(self) -> Int16s:
+        """The canvas's pixels [H, W, 3], when the picture is that of now."""
+        self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        shot = self.page.locator("#canvas").screenshot(style="#state, #legend { visibility: hidden }")
+        return np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
+
+    @property
+    def time(self) -> float:
+        return float(self.get("motionmind.player.time"))
+
+
+def near(picture: Int16s, colour: tuple[int, int, int], most: float = 0.06) -> Bools:
+    """Pixels [H, W] of a colour, whatever its brightness and haze: whose hue, as shares of the channels, is like it."""
+    pale = picture - picture.min(axis=-1, keepdims=True)
+    wanted = np.array(colour) - min(colour)
+    strong = pale.sum(axis=-1) > 0.45 * wanted.sum()
+    shares = pale / np.maximum(pale.sum(axis=-1, keepdims=True), 1)
+    return np.asarray(strong & (np.abs(shares - wanted / wanted.sum()).max(axis=-1) < most))
 
 
 def readable_words(tab: Any) -> set[str]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from bundled_clips import ballet_clip
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from pages import SCREENS, reachable_controls, readable_words
+from pages import SCREENS, SIZE, Opened, near, reachable_controls, readable_words
 from PIL import Image
 
-from motionmind._typing import Bools, Floats, Indices, Int16s
+from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
@@ -31,7 +32,6 @@ from motionmind.render.page import packed, page, write_page
 from motionmind.render.palette import BRIDGED, COLOURS, INSERTED
 
 CORPORA = Path(__file__).parents[2] / "corpora"
-SIZE = {"width": 640, "height": 480}
 seeds = st.integers(0, 2**32 - 1)
 
 
@@ -59,78 +59,6 @@ def bridged() -> Motion:
     """Standing: two frames, an insertion of four moves up to frame 8, in the third of which an elbow is bridged."""
     insertion = Insertion(np.array([0.1, 0.2, 0.4, 0.6, 0.8]), (("left_elbow", 2),))
     return still(12, (insertion,))
-
-
-@dataclass
-class Opened:
-    """A page in the browser, and what it did that no page should."""
-
-    page: Any
-    said: list[str] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
-
-    def get(self, script: str) -> Any:
-        return self.page.evaluate(script)
-
-    def wait(self, script: str) -> None:
-        """Wait until this is so. The page forbids itself what Playwright's own waiting does."""
-        for _ in range(500):
-            if self.get(f"!!({script})"):
-                return
-            self.page.wait_for_timeout(20)
-        raise AssertionError(f"never so: {script}")
-
-    def press(self, key: str) -> None:
-        self.page.keyboard.press(key)
-
-    def click(self, button: str) -> None:
-        self.page.click(f"#{button}")
-
-    def picture(self) -> Int16s:
-        """The canvas's pixels [H, W, 3], when the picture is that of now."""
-        self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        shot = self.page.locator("#canvas").screenshot(style="#state, #legend { visibility: hidden }")
-        return np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
-
-    @property
-    def time(self) -> float:
-        return float(self.get("motionmind.player.time"))
-
-
-@pytest.fixture
-def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
-    """A function that opens a motion's page; afterwards, that it neither complained nor asked for anything."""
-    opened: list[Opened] = []
-
-    def show(motion: Motion, ready: str = "window.motionmind", script: str = "", **options: Any) -> Opened:
-        path = tmp_path / f"{len(opened)}.html"
-        write_page(path, motion)
-        context = browser.new_context(**({"viewport": SIZE, "reduced_motion": "reduce"} | options))
-        tab = Opened(context.new_page())
-        tab.page.on("console", lambda message: tab.said.append(message.text))
-        tab.page.on("pageerror", lambda error: tab.said.append(str(error)))
-        tab.page.on("request", lambda request: tab.asked.append(request.url))
-        tab.page.add_init_script(script)
-        tab.page.goto(path.as_uri())
-        tab.wait(ready)
-        opened.append(tab)
-        return tab
-
-    yield show
-    for tab in opened:
-        tab.page.context.close()
-        assert [line for line in tab.said if not re.search("GPU stall|WebGL context could not", line)] == []
-        assert [url for url in tab.asked if not url.startswith(("data:", "file:"))] == []
-        assert len([url for url in tab.asked if url.startswith("file:")]) == 1
-
-
-def near(picture: Int16s, colour: tuple[int, int, int], most: float = 0.06) -> Bools:
-    """Pixels [H, W] of a colour, whatever its brightness and haze: whose hue, as shares of the channels, is like it."""
-    pale = picture - picture.min(axis=-1, keepdims=True)
-    wanted = np.array(colour) - min(colour)
-    strong = pale.sum(axis=-1) > 0.45 * wanted.sum()
-    shares = pale / np.maximum(pale.sum(axis=-1, keepdims=True), 1)
-    return np.asarray(strong & (np.abs(shares - wanted / wanted.sum()).max(axis=-1) < most))
 
 
 def middle(mask: Bools) -> Floats:
@@ -334,7 +262,7 @@ def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> N
         np.testing.assert_allclose([found[0], found[-1]], np.array(times) / 1.1, atol=0.01)
     box = tab.page.locator("#timeline").bounding_box()
     tab.page.mouse.move(box["x"] + box["width"] * 0.5 / 1.1, box["y"] + 10)
-    assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · bridged: left_elbow"
+    assert tab.page.inner_text(".hint") == "0.50 s · frame 5 · insertion · move 3 of 4 · bridged: left_elbow"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -495,6 +423,132 @@ def test_dragging_the_timeline_scrubs(show: Callable[..., Opened]) -> None:
     tab.page.mouse.up()
     tab.page.mouse.move(box["x"], y)
     assert tab.time == pytest.approx(0.7, abs=0.01)
+
+
+def three_insertions() -> Motion:
+    """Standing for 4 s; in the middle of the three insertions two joints are bridged, one of them twice."""
+    bridges = (("left_elbow", 0), ("left_elbow", 1), ("right_hip", 1))
+    stretches = ([0.5, 0.9], [1.5, 2.0, 2.5], [3.0, 3.1, 3.2, 3.3])
+    return still(41, tuple(Insertion(np.array(at), bridges if len(at) == 3 else ()) for at in stretches))
+
+
+def test_insertions_are_named_where_the_pointer_is(show: Callable[..., Opened]) -> None:
+    tab = show(three_insertions(), viewport={"width": 360, "height": 480})
+    box = tab.page.locator("#timeline").bounding_box()
+    for time, words in (
+        (0.2, ""),
+        (0.7, "insertion 1 of 3 · move 1 of 1"),
+        (1.7, "insertion 2 of 3 · move 1 of 2 · bridged: left_elbow"),
+        (2.2, "insertion 2 of 3 · move 2 of 2 · bridged: left_elbow, right_hip"),
+        (2.7, ""),
+        (3.15, "insertion 3 of 3 · move 2 of 3"),
+    ):
+        x = box["x"] + box["width"] * time / 4.0
+        tab.page.mouse.move(x, box["y"] + 15)
+        assert tab.page.inner_text(".hint").partition(" · ")[2].partition(" · ")[2] == words
+        hint = tab.page.locator(".hint").bounding_box()
+        assert hint["x"] >= box["x"] - 1
+        assert hint["x"] + hint["width"] <= box["x"] + box["width"] + 1
+        marked = tab.get("[...document.querySelectorAll('.under')].map(one => one.getBoundingClientRect().toJSON())")
+        assert len(marked) == (words != "")
+        assert all(one["left"] <= x <= one["right"] for one in marked)
+    tab.page.mouse.down()  # on an insertion, and drags
+    assert tab.time == pytest.approx(3.15, abs=0.02)
+    tab.page.mouse.up()
+    tab.page.mouse.move(box["x"] + 10, 10)
+    assert not tab.page.is_visible(".hint")
+    assert tab.get("document.querySelectorAll('.under').length") == 0
+
+
+def test_keys_reach_each_insertion_and_go_there(show: Callable[..., Opened]) -> None:
+    motion = three_insertions()
+    tab = show(motion)
+    tab.page.focus("#timeline")
+    tab.press("Tab")
+    names = [
+        "insertion 1 of 3, 0.50 to 0.90 s, 1 move",
+        "insertion 2 of 3, 1.50 to 2.50 s, 2 moves, bridged: left_elbow, right_hip",
+        "insertion 3 of 3, 3.00 to 3.30 s, 3 moves",
+    ]
+    focused = "document.activeElement.ariaLabel"
+    for insertion, name in zip(motion.insertions, names, strict=True):
+        assert tab.get(focused) == name
+        assert tab.page.inner_text(".hint") == name.replace(", ", " · ").replace("w · r", "w, r")
+        before = tab.time
+        tab.press("ArrowRight")  # to the next one; frames stay
+        assert tab.time == before
+        if name != names[-1]:
+            tab.press("ArrowLeft")
+        tab.press("Enter")
+        assert tab.time == insertion.times[0]
+        tab.press("ArrowRight")
+    assert tab.get(focused) == names[-1]
+    tab.press("Home")
+    assert tab.get(focused) == names[0]
+    tab.press("Tab")  # one stop for all
+    assert tab.get("document.activeElement.id") == "back"
+    assert not tab.page.is_visible(".hint")
+    tab.press("Shift+Tab")
+    assert tab.get(focused) == names[0]
+    tab.get("motionmind.player.seek(2.2)")
+    spoken = tab.get("document.getElementById('timeline').ariaValueText")
+    assert spoken == "frame 22, 2.20 seconds, insertion 2 of 3, move 2 of 2"
+
+
+def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Opened]) -> None:
+    tab = show(three_insertions())
+    for key, time in (("n", 0.5), ("n", 1.5), ("n", 3.0), ("n", 0.5), ("p", 3.0), ("p", 1.5), ("End", 4.0), ("p", 3.0)):
+        tab.press(key)
+        assert tab.time == time
+
+
+# --- in a frame -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rights", ["allow-scripts", "allow-scripts allow-downloads"])
+def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Path, rights: str) -> None:
+    frame = html.escape(page(bridged()), quote=True)
+    host = f'<!doctype html><iframe sandbox="{rights}" srcdoc="{frame}" style="width: 640px; height: 400px"></iframe>'
+    (tmp_path / "host.html").write_text(host, "utf-8")
+    context = browser.new_context(reduced_motion="reduce")
+    tab = context.new_page()
+    said: list[str] = []
+    asked: list[str] = []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto((tmp_path / "host.html").as_uri())
+    inner = next(one for one in tab.frames if one != tab.main_frame)
+    for _ in range(500):
+        if inner.evaluate("!!window.motionmind"):
+            break
+        tab.wait_for_timeout(20)
+    assert inner.evaluate("document.documentElement.scrollHeight") == 400
+    inner.click("#play")
+    inner.wait_for_timeout(300)
+    assert inner.evaluate("motionmind.player.time") > 0.0
+    tab.keyboard.press("Space")  # the clicked frame has the keys
+    assert not inner.evaluate("motionmind.player.playing")
+    inner.evaluate("motionmind.player.seek(0.5)")
+    tab.keyboard.press("?")
+    assert inner.is_visible("#sheet")
+    tab.keyboard.press("Escape")
+    shot = np.array(Image.open(BytesIO(inner.locator("#canvas").screenshot())).convert("RGB")).astype(np.int16)
+    assert near(shot, INSERTED["middle"]).sum() > 300
+    assert [line for line in said if "GPU stall" not in line] == []
+    files: list[str] = []
+    tab.on("download", lambda download: files.append(download.suggested_filename))
+    inner.click("#film")
+    for _ in range(500):
+        if inner.is_visible("#filming a"):
+            break
+        tab.wait_for_timeout(20)
+    assert inner.inner_text("#filming a") == "Save still.webm"
+    assert "open the page by itself" in inner.inner_text("#filming")
+    tab.wait_for_timeout(200)
+    assert files == (["still.webm"] if "downloads" in rights else [])
+    context.close()
+    assert [url for url in asked if not url.startswith(("data:", "file:", "about:", "blob:"))] == []
 
 
 # --- odd ones ---------------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ export const KEYS = [
   { keys: ["End"], shown: ["End"], does: "the end", action: "end", when: moving },
   { keys: ["p"], shown: ["P"], does: "the insertion before", action: "previous", when: inserted },
   { keys: ["n"], shown: ["N"], does: "the next insertion", action: "next", when: inserted },
+  { shown: ["Tab", "←", "→"], does: "on the line of time: from insertion to insertion, and Enter goes there", when: inserted },
   { keys: ["l"], shown: ["L"], does: "loop: from the end to the start", action: "loop", when: moving },
   { keys: ["1"], shown: ["1"], does: "from the front", action: "front" },
   { keys: ["2"], shown: ["2"], does: "from the side", action: "side" },

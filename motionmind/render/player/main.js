@@ -1,6 +1,7 @@
 /** The page: what is on it, put together; buttons and keys. README.md describes `window.motionmind`. */
 
 import { Body } from "motionmind/body";
+import { Filming } from "motionmind/filming";
 import { listen, writeKeys } from "motionmind/keys";
 import { writeLegend } from "motionmind/legend";
 import { MOMENT, Motion } from "motionmind/motion";
@@ -46,17 +47,16 @@ function start() {
   theme.addEventListener("change", colour);
   colour();
   bind(player, stage, theme, refresh);
+  const ghosts = () => ({ ends: pressed("ends"), onion: pressed("onion") ? Number($("apart").value) : 0 });
+  const filming = new Filming($("film"), $("filming"), stage, player, ghosts);
 
   let last = performance.now();
   const draw = (now) => {
     player.advance(Math.min((now - last) / 1000, LONGEST));
     last = now;
-    if (stale) {
+    if (stale && !filming.running) {
       stale = false;
-      stage.show(player.time, {
-        ends: pressed("ends"),
-        onion: pressed("onion") ? Number($("apart").value) : 0,
-      });
+      stage.show(player.time, ghosts());
       stage.render(player.playing);
     }
     requestAnimationFrame(draw);
@@ -107,11 +107,12 @@ function bind(player, stage, theme, refresh) {
     ...Object.fromEntries(VIEWS.map((view) => [view, look(view)])),
   };
   for (const [id, action] of Object.entries(actions)) {
-    $(id).addEventListener("click", (event) => {
-      action();
-      if (event.detail > 0) $(id).blur(); // clicked, not chosen by keys: the space bar goes on to play and pause
-    });
+    $(id).addEventListener("click", action);
   }
+  document.addEventListener("click", (event) => {
+    // Clicked, not chosen by keys: the space bar goes on to play and pause.
+    if (event.detail > 0) event.target.closest("button, summary")?.blur();
+  });
   stage.controls.addEventListener("start", () => {
     for (const name of VIEWS) $(name).setAttribute("aria-pressed", "false");
   });

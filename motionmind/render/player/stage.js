@@ -11,6 +11,7 @@ import {
   Scene,
   ShaderMaterial,
   SRGBColorSpace,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from "three";
@@ -43,6 +44,7 @@ export class Stage {
    * @param {function} onChange called when the picture must be drawn again
    */
   constructor(canvas, motion, body, colours, onChange) {
+    this.canvas = canvas;
     this.motion = motion;
     this.body = body;
     this.rotations = new Float64Array(motion.joints.length * 4);
@@ -137,6 +139,26 @@ export class Stage {
   /** Draw it; `moving` says that the next picture is to follow at once. */
   render(moving) {
     this.#sharpen(moving || this.dragged);
+    this.#draw();
+  }
+
+  /** Whether a film is made, whose pictures keep their shape, even if the page's becomes another. */
+  set filming(value) {
+    this.fixed = value;
+    if (!value) this.#resize();
+  }
+
+  /** Draw the body at `time` onto a canvas of the same shape, smoothed from twice as many pixels each way. */
+  shoot(pen, time, ghosts) {
+    const { width, height } = pen.canvas;
+    this.show(time, ghosts);
+    const ratio = (2 * width) / this.renderer.getSize(new Vector2()).x;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.#draw();
+    pen.drawImage(this.canvas, 0, 0, width, height);
+  }
+
+  #draw() {
     this.renderer.clear();
     for (const layer of this.layers) {
       this.renderer.clearDepth(); // ghosts are behind the body, wherever they are, and hide nothing of it
@@ -215,7 +237,7 @@ export class Stage {
 
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
-    if (width === 0 || height === 0) return;
+    if (width === 0 || height === 0 || this.fixed) return;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();

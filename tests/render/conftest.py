@@ -1,0 +1,41 @@
+"""What tests of pages share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pages import SIZE, Opened
+
+from motionmind.body.motion import Motion
+from motionmind.render.page import write_page
+
+
+@pytest.fixture
+def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
+    """A function that opens a motion's page; afterwards, that it neither complained nor asked for anything."""
+    opened: list[Opened] = []
+
+    def show(motion: Motion, ready: str = "window.motionmind", script: str = "", **options: Any) -> Opened:
+        path = tmp_path / f"{len(opened)}.html"
+        write_page(path, motion)
+        context = browser.new_context(**({"viewport": SIZE, "reduced_motion": "reduce"} | options))
+        tab = Opened(context.new_page())
+        tab.page.on("console", lambda message: tab.said.append(message.text))
+        tab.page.on("pageerror", lambda error: tab.said.append(str(error)))
+        tab.page.on("request", lambda request: tab.asked.append(request.url))
+        tab.page.add_init_script(script)
+        tab.page.goto(path.as_uri())
+        tab.wait(ready)
+        opened.append(tab)
+        return tab
+
+    yield show
+    for tab in opened:
+        tab.page.context.close()
+        assert [line for line in tab.said if not re.search("GPU stall|WebGL context could not", line)] == []
+        assert [url for url in tab.asked if not url.startswith(("data:", "file:"))] == []
+        assert len([url for url in tab.asked if url.startswith("file:")]) == 1
