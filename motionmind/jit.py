@@ -24,6 +24,7 @@ from numba.extending import register_jitable
 from motionmind.files import make_folder, replace_file
 
 _F = TypeVar("_F", bound=Callable[..., object])
+_HERE = Path(__file__).parent
 _HASH = 32  # bytes of a hash
 # Of numba's core, which is not typed.
 _normalise: Any = sigutils.normalize_signature
@@ -71,8 +72,31 @@ def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> A
 
 def is_compiled(package: str) -> bool:
     """Return whether compiled code of a subpackage such as "search" is on disk; the search takes half a minute."""
-    folder = _folder(Path(__file__).parent / package)
-    return folder is not None and next(folder.glob("*.nbc"), None) is not None
+    return any(name.startswith(f"{package}/") for name in compiled_names())
+
+
+def decorated_names() -> frozenset[str]:
+    """Return the functions of this package that are to be compiled, as "search/astar.search"; none need be loaded."""
+    return frozenset(
+        f"{source.parent.name}/{source.stem}.{name}"
+        for source in _HERE.glob("*/*.py")
+        for name in re.findall(r"^@jit\ndef (\w+)", source.read_text("utf-8"), re.M)
+    )
+
+
+def compiled_names() -> frozenset[str]:
+    """Return those of them whose compiled code is on disk."""
+    found = set()
+    for package in {name.partition("/")[0] for name in decorated_names()}:
+        if folder := _folder(_HERE / package):
+            found |= {f"{package}/{file.name.rsplit('-', 1)[0]}" for file in folder.glob("*.nbc")}
+    return frozenset(found)
+
+
+def place_of_code() -> Path | None:
+    """Return the folder that compiled code is kept in; None if there is none that can be written."""
+    folder = _folder(_HERE / "search")
+    return folder and folder.parent
 
 
 class _Kept:

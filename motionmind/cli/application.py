@@ -24,6 +24,7 @@ from motionmind.cli.shells import completion
 from motionmind.cli.streams import forgiving
 from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
+from motionmind.cli.warming import warm
 from motionmind.display import printable
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.files import pipes_kept
@@ -45,7 +46,7 @@ def app(context: click.Context) -> None:
 
 for _command in (
     *(tween, postures, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
-    *(vary, review, attractor, completion),
+    *(vary, review, attractor, warm, completion),
 ):
     app.add_command(_command)
 

@@ -25,6 +25,7 @@ from motionmind.cli.options import (
 )
 from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
+from motionmind.cli.warming import warm_once
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
@@ -155,6 +156,7 @@ def build(
     others = parse_mixture(mix)
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
     clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
+    warm_once()
     engine = Engine.fit(
         clips,
         name=name,

@@ -48,14 +48,6 @@ def progress(message: str) -> None:
         click.echo(message, err=True)
 
 
-def announce_compilation() -> None:
-    """Print on a terminal that the first search of all takes longer, if it is yet to come."""
-    from motionmind.jit import is_compiled
-
-    if not is_compiled("search"):
-        progress("compiling the search, which takes half a minute, once")
-
-
 def note(message: str) -> None:
     """Print a note to standard error, in place of a progress bar if one stands there."""
     clear = "\r\x1b[2K" if sys.stderr.isatty() else ""

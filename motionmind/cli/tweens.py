@@ -16,9 +16,10 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import MOVEMENT, check_outputs, numbered, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs
-from motionmind.cli.printing import Interruption, announce_compilation, note, print_alternatives, print_tween
+from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import FILE, Whole
+from motionmind.cli.warming import help_first_search
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.files import all_or_none, sha256_of
@@ -121,7 +122,7 @@ def tween(
     engine = Engine.load(corpus or _corpus_of(named, home), home)
     start, request["before"] = read_end(named[0], around[0], "before", home)
     end, request["after"] = read_end(named[1], around[1], "after", home)
-    announce_compilation()
+    help_first_search()
     with _diagnosing(files), Interruption() as interruption:
         results = _find_tweens(engine, (start, end), request, files.count, interruption)
     written, reports = files.write(results)

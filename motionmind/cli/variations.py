@@ -14,7 +14,6 @@ from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
     Interruption,
-    announce_compilation,
     format_stillness,
     note,
     print_review,
@@ -24,6 +23,7 @@ from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searc
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Number, Point, Whole
+from motionmind.cli.warming import help_first_search
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
 from motionmind.files import all_or_none, sha256_of
@@ -244,10 +244,10 @@ def attractor(variation: Path, output: Path) -> None:
 
 
 def load_engine(corpus: str, home: Path | None) -> Engine:
-    """Load what was learned from a corpus; print on a terminal that the first search of all takes longer."""
+    """Load what was learned from a corpus; the first search of all waits for its compilation."""
     from motionmind.tween.engine import Engine
 
-    announce_compilation()
+    help_first_search()
     return Engine.load(corpus, home)
 
 

@@ -1,0 +1,208 @@
+"""The command that compiles the inner loops ahead of time, and what a first search says and does about it.
+
+Compiling all in one process takes three quarters of a minute. Separate processes begin with different parts of the
+program, on real work, so that every loop is compiled for the arguments that it gets; each finds on disk what another
+has compiled by the time it comes there.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+from motionmind.cli.options import command
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.search.problem import Problem
+
+_LOOK = 0.2  # seconds between two looks at what is compiled
+
+
+@command("motionmind warm")
+def warm() -> None:
+    """Compile the inner loops, so that no search or film has to wait for it.
+
+    The first search does this on its own. It takes half a minute, once for each version of MotionMind and Python. What
+    is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
+    """
+    from motionmind.jit import compiled_names, place_of_code
+
+    if place_of_code() is None:
+        raise MotionMindError("compiled code can be kept neither in the user's cache directory nor in NUMBA_CACHE_DIR")
+    began = monotonic()
+    _compile()
+    click.echo(f"compiled {len(compiled_names())} functions in {monotonic() - began:.0f} s; the next search needs none")
+
+
+def warm_once() -> None:
+    """Compile all, unless something is compiled; say so, with a bar on a terminal, else in a line.
+
+    Nothing is done where compiled code cannot be kept: whatever needs it then compiles it.
+    """
+    from motionmind.jit import is_compiled, place_of_code
+
+    if not is_compiled("search") and place_of_code() is not None:
+        _say()
+        _compile()
+
+
+def help_first_search() -> None:
+    """Say that the first search takes longer, if it is yet to come; compile beside it what it comes to last.
+
+    What is still running when the command ends is ended with it.
+    """
+    from motionmind.jit import is_compiled, place_of_code
+
+    if is_compiled("search"):
+        return
+    _say()
+    if place_of_code() is not None and _processors() > 1:
+        helpers = _start([[realise], [draw]])
+        click.get_current_context().call_on_close(lambda: _end(helpers))
+
+
+def _say() -> None:
+    click.echo("compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)", err=True)
+
+
+def _compile() -> None:
+    """Compile all that the workers come by, with a bar on a terminal; side by side, where there are processors.
+
+    A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
+    """
+    from motionmind.jit import compiled_names, decorated_names
+
+    total, known = len(decorated_names()), 0
+    works = [search, realise, draw]
+    with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+        workers = _start([[work] for work in works] if _processors() > 1 else [works])
+        try:
+            while any(worker.poll() is None for worker in workers):
+                now = len(compiled_names())
+                bar.update(now - known)
+                known = now
+                sleep(_LOOK)
+        finally:
+            _end(workers)
+
+
+def _start(programs: Sequence[Sequence[Callable[[], None]]]) -> list[subprocess.Popen[bytes]]:
+    """Start a process for each program, with this package on its path, and without the working directory.
+
+    Args:
+        programs: functions of this module to call in turn, for each process.
+    """
+    root = str(Path(__file__).parents[2])
+    begin = f"import sys; sys.path.insert(0, {root!r}); from motionmind.cli import warming"
+    calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
+    return [
+        subprocess.Popen(
+            [sys.executable, "-P", "-c", f"{begin}; {call}"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for call in calls
+    ]
+
+
+def _end(workers: Sequence[subprocess.Popen[bytes]]) -> None:
+    """End processes that still run."""
+    for worker in workers:
+        with suppress(OSError):
+            worker.kill()
+        worker.wait()
+
+
+def _processors() -> int:
+    """Return the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def search() -> None:
+    """Find a path, bound it in the two ways that there are, and sample one."""
+    from motionmind.search.sample import sample_path
+    from motionmind.search.solve import solve
+
+    problem = _problem()
+    found = solve(problem)
+    rules = replace(problem.rules, shortest=len(found.path) - 1, longest=len(found.path) - 1, sweeps=0)
+    solve(replace(problem, rules=rules, tolls=None))
+    sample_path(problem, found, 0)
+
+
+def realise() -> None:
+    """Realise moves of the corpus, which no search has to find, and learn the corpus anew."""
+    from motionmind.body.motion import Velocity
+    from motionmind.discretize import make_discretization
+    from motionmind.realise.detail import likest_moves
+    from motionmind.realise.realise import realise as realise_path
+    from motionmind.tween.engine import Engine
+
+    engine = Engine.load("ballet")
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    path = engine.space.assign(engine.corpus.to_chains(clip.rotations))
+    none = np.zeros(len(engine.space), dtype=np.bool_)
+    realise_path(
+        path,
+        clip.posture(0),
+        clip.posture(len(clip) - 1),
+        engine.corpus,
+        engine.grammar,
+        engine.carriage,
+        np.radians(engine.space.tolerances),
+        none,
+        none,
+        30.0,
+        leaving=Velocity.at_start(clip),
+        fastest=engine.pace.fastest,
+    )
+    likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
+    Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
+
+
+def draw() -> None:
+    """Film a clip; search by A* alone, which a search comes to last; draw in all other ways."""
+    from motionmind.plots.attractor import write_attractor
+    from motionmind.render.pictures import write_picture
+    from motionmind.search import astar, trws
+    from motionmind.search.heuristic import Heuristic
+    from motionmind.search.pieces import Pieces
+    from motionmind.search.segments import Piece
+    from motionmind.tween.engine import Engine
+    from motionmind.variation.variation import vary
+
+    engine = Engine.load("ballet")
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
+        write_picture(Path(folder) / "clip.gif", clip.slice(0, 2))
+        problem = _problem()
+        trellis = Pieces(problem).trellis(Piece(0, 0, problem.rules.longest), np.inf)
+        chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
+        bound = Heuristic.of_messages(trws.no_messages(trellis))
+        astar.search(trellis, bound, np.inf, astar.SAME, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
+        write_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
+        write_attractor(Path(folder) / "attractor.png", vary(clip))
+
+
+def _problem() -> Problem:
+    """Return the problem of a movement between two postures of a bundled corpus."""
+    from motionmind.tween.engine import Engine
+    from motionmind.tween.formulate import formulate
+    from motionmind.tween.request import TweenRequest
+
+    engine = Engine.load("ballet")
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    return formulate(engine, clip.posture(0), clip.posture(9), TweenRequest()).searched

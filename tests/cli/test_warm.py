@@ -1,0 +1,78 @@
+"""Compiling ahead of time: everything is reached, and whoever waits is told for what."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import pytest
+from command_line import Run
+from numba.core.registry import CPUDispatcher
+
+from motionmind import jit
+from motionmind.cli import warming
+
+
+def dispatchers() -> dict[str, Any]:
+    """All functions that are compiled, of the modules that are loaded, by name."""
+    found = {}
+    for name, module in list(sys.modules.items()):
+        if name.startswith("motionmind."):
+            for thing in list(vars(module).values()):
+                if isinstance(thing, CPUDispatcher):
+                    package, stem = thing.py_func.__module__.split(".")[1:3]
+                    found[f"{package}/{stem}.{thing.py_func.__name__}"] = thing
+    return found
+
+
+def names_called(function: FunctionType) -> set[str]:
+    """The compiled functions that one calls, itself among them: they are compiled with it."""
+    found, left = set(), [function]
+    while left:
+        one = left.pop()
+        named = [one.__globals__.get(name) for name in one.__code__.co_names]
+        for other in [thing.py_func for thing in named if isinstance(thing, CPUDispatcher)] + [one]:
+            package, stem = other.__module__.split(".")[1:3]
+            if (name := f"{package}/{stem}.{other.__name__}") not in found:
+                found.add(name)
+                left.append(other)
+    return found
+
+
+def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
+    for work in (warming.search, warming.realise, warming.draw):
+        work()
+    reached = {name for one in dispatchers().values() if one.overloads for name in names_called(one.py_func)}
+    assert jit.decorated_names() - reached == set()
+
+
+def test_warm_says_what_it_did_and_a_second_time_has_little_to_do(run: Run) -> None:
+    for _ in range(2):
+        done = run("warm")
+        assert done.code == 0
+        assert done.out.startswith(f"compiled {len(jit.decorated_names())} functions in ")
+    assert jit.decorated_names() == jit.compiled_names()
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path: Path) -> None:
+    # From a posture to itself there is no move to search for, and so nothing is compiled while the test waits.
+    command = [sys.executable, "-m", "motionmind", "tween", "ballet/fifth", "ballet/fifth", "-o", "still.json"]
+    environment = os.environ | ({"NUMBA_CACHE_DIR": str(tmp_path)} if is_first else {})
+    if not is_first:
+        warming.search()
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert ("compiling" in done.stderr) == is_first
+    assert done.stderr.count("\n") <= 1
+
+
+def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "_folder", lambda source: None)
+    done = run("warm")
+    assert done.code == 2
+    assert done.err.count("\n") == 1
+    assert "NUMBA_CACHE_DIR" in done.err
