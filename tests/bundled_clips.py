@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from motionmind.body.motion import Motion
@@ -11,6 +12,7 @@ from motionmind.notation.read import read_score
 BALLET = Path(__file__).parents[1] / "corpora" / "ballet"
 
 
+@cache
 def ballet_clip(name: str) -> Motion:
     """A clip of the bundled ballet, a frame a posture."""
     for file in sorted(BALLET.glob("*.score")):

@@ -18,7 +18,6 @@ from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
-from motionmind.learned import persistence
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
 from motionmind.notation import compose
 from motionmind.notation.read import read_score
@@ -125,6 +124,8 @@ class _CorpusCollection(Collection):
 
     @cached_property
     def _corpus(self) -> Corpus:
+        from motionmind.learned import persistence  # numba is slow to import
+
         return persistence.load(self.word, self._home).corpus
 
     @cached_property

@@ -17,6 +17,7 @@ from motionmind.geometry import rotations as rot
 ON_BALL = 24.0  # degrees of a lifted heel from which the ball alone bears the weight
 MAX_ROUNDS = 60  # of moving the pelvis; each leaves about a fifth of the imbalance
 BALANCED = 1e-7  # metres of imbalance at which the rounds end
+HIGHEST = np.radians(120.0)  # to which a touching leg is raised
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,40 @@ class _Bones:
         self.heel = np.array(leg.heel)
 
 
+class _Leg:
+    """What stays as it is while the pelvis moves, of one side's legs in T postures; all of it mirrored for the right.
+
+    Attributes:
+        ankle: places of the ankles of legs that stand [T, 3], metres.
+        sole: rotations of their feet [T, 4].
+        lifted: rotations of their toes [T, 4].
+        reach: lengths from hip to ankle with the knee at its least bend [T], metres.
+        rows: postures in which the leg touches [R].
+        joints: local rotations of touching legs [R, ..., 4], the thigh's as it is turned about its own length.
+        axis: level axes about which they are raised [R, 3].
+        up, ahead: places of their feet's points while they hang down [R, P]: heights above the hip, and distances from
+            it in the direction that they reach in, metres.
+    """
+
+    def __init__(self, bones: _Bones, given: Floats, feet: Feet, side: int) -> None:
+        across = [1.0, 0.0, 0.0]
+        self.sole = rot.mul(rot.about_vertical(feet.turn[:, side]), rot.from_axis_angle(across, feet.heel[:, side]))
+        self.lifted = rot.from_axis_angle(across, -feet.heel[:, side])
+        self.ankle = _ball(bones, feet, side) - rot.mul_vec(self.sole, bones.toes)
+        knee = rot.from_axis_angle(across, feet.bend[:, side])
+        self.reach = np.linalg.norm(bones.knee + rot.mul_vec(knee, bones.ankle), axis=-1)
+        self.rows = np.flatnonzero(feet.touches[:, side])
+        joints, self.pelvis = given[np.ix_(self.rows, bones.indices[side])], given[self.rows, 0]
+        if side == 1:
+            joints, self.pelvis = rot.mirror(joints), rot.mirror(self.pelvis)
+        joints[:, 0] = rot.about_vertical(rot.heading(joints[:, 0]))
+        self.joints = joints
+        sine, cosine = np.sin(feet.towards[self.rows, side]), np.cos(feet.towards[self.rows, side])
+        self.axis = np.stack([-cosine, np.zeros(len(self.rows)), sine], axis=-1)
+        points = _foot_points(bones, joints)
+        self.up, self.ahead = points[..., 1], sine[:, None] * points[..., 0] + cosine[:, None] * points[..., 2]
+
+
 def place_legs(body: Anatomy, leg: Leg, rotations: Floats, feet: Feet) -> Stance:
     """Place the legs of postures as `feet` prescribes.
 
@@ -100,6 +135,7 @@ def place_legs(body: Anatomy, leg: Leg, rotations: Floats, feet: Feet) -> Stance
         The postures with their legs placed.
     """
     bones, out = _Bones(body, leg), rotations.copy()
+    legs = [_Leg(bones, rotations, feet, side) for side in (0, 1)]
     pelvis = rotations[:, 0]
     hips = rot.mul_vec(pelvis[:, None], bones.hips)  # [T, 2, 3] from the root
     middle = hips.mean(axis=1)
@@ -108,14 +144,15 @@ def place_legs(body: Anatomy, leg: Leg, rotations: Floats, feet: Feet) -> Stance
     shares = np.where(feet.stands, feet.weight, 0.0)
     total = shares.sum(axis=1, keepdims=True)
     shares = np.where(total > 0.0, shares / np.where(total > 0.0, total, 1.0), 0.5 * feet.stands)
+    support = _support(bones, feet, shares)
     # Between two straight legs a tiny shift of the pelvis bends one knee or the other, by its square root. If the error
     # changes sign without shrinking, the step is halved.
     error, step = np.zeros_like(shift), np.ones_like(shift)
     for _ in range(MAX_ROUNDS):
-        root, shortfall = _stand(bones, out, pelvis, hips - middle[:, None], shift, feet)
+        root, shortfall = _stand(bones, legs, out, pelvis, hips - middle[:, None], shift, feet)
         root = root - middle
-        shortfall += _touch(bones, out, rotations, root, hips, feet)
-        previous, error = error, body.centre_of_mass(out, root)[:, [0, 2]] - _support(bones, feet, shares)
+        shortfall += _touch(bones, legs, out, root, hips)
+        previous, error = error, body.centre_of_mass(out, root)[:, [0, 2]] - support
         error = np.where((stands & (total[:, 0] > 0.0))[:, None], error - feet.lean, 0.0)
         step = np.where((error * previous < 0.0) & (np.abs(error) > 0.5 * np.abs(previous)), 0.5 * step, step)
         far = np.abs(error).max(axis=1) > BALANCED
@@ -146,12 +183,13 @@ def _support(bones: _Bones, feet: Feet, shares: Floats) -> Floats:
 
 
 def _stand(
-    bones: _Bones, out: Floats, pelvis: Floats, hips: Floats, shift: Floats, feet: Feet
+    bones: _Bones, legs: list[_Leg], out: Floats, pelvis: Floats, hips: Floats, shift: Floats, feet: Feet
 ) -> tuple[Floats, Floats]:
     """Place the standing legs in `out` [T, J, 4].
 
     Args:
         bones: the left leg's segments.
+        legs: the left and the right ones.
         out: local rotations [T, J, 4], changed in place.
         pelvis: rotations of the pelvis [T, 4].
         hips: places of the hips relative to their middle [T, 2, 3], metres.
@@ -161,54 +199,42 @@ def _stand(
     Returns:
         The place of the hips' middle [T, 3], and the lengths by which legs are too short [T, 2]; metres.
     """
-    height, short, ankles, soles = _hip_height(bones, hips, shift, feet)
-    for side, sign in enumerate((1.0, -1.0)):
+    height, short = _hip_height(legs, hips, shift, feet)
+    for side, (sign, leg) in enumerate(zip((1.0, -1.0), legs, strict=True)):
         hip = np.array([sign, 1.0, 1.0]) * hips[:, side]
         hip += np.stack([sign * shift[:, 0], height, shift[:, 1]], axis=-1)
-        thigh, knee = _reach(bones, ankles[side] - hip, feet.knee[:, side])
+        thigh, knee = _reach(bones, leg.ankle - hip, feet.knee[:, side])
         mirrored_pelvis = pelvis if side == 0 else rot.mirror(pelvis)
         joints = np.stack(
             [
                 rot.inv_mul(mirrored_pelvis, thigh),
                 knee,
-                rot.inv_mul(rot.mul(thigh, knee), soles[side]),
-                rot.from_axis_angle([1.0, 0.0, 0.0], -feet.heel[:, side]),
+                rot.inv_mul(rot.mul(thigh, knee), leg.sole),
+                leg.lifted,
             ],
             axis=1,
         )
         joints = joints if side == 0 else rot.mirror(joints)
-        leg = bones.indices[side, : joints.shape[1]]
-        out[:, leg] = np.where(feet.stands[:, side, None, None], joints, out[:, leg])
+        placed = bones.indices[side, : joints.shape[1]]
+        out[:, placed] = np.where(feet.stands[:, side, None, None], joints, out[:, placed])
     return np.stack([shift[:, 0], height, shift[:, 1]], axis=-1), short
 
 
-def _hip_height(
-    bones: _Bones, hips: Floats, shift: Floats, feet: Feet
-) -> tuple[Floats, Floats, list[Floats], list[Floats]]:
-    """Find the height of the hips' middle [T] that standing legs allow; 0 if none stands.
-
-    Also return the lengths by which legs are too short [T, 2], and each leg's ankle [T, 3] and sole [T, 4], mirrored
-    for the right leg.
-    """
+def _hip_height(legs: list[_Leg], hips: Floats, shift: Floats, feet: Feet) -> tuple[Floats, Floats]:
+    """Return the height of the hips' middle [T] that standing legs allow, 0 if none stands, and the lengths by which
+    legs are too short [T, 2], metres."""
     height = np.full(len(hips), np.inf)
     short = np.zeros((len(hips), 2))
-    ankles, soles = [], []
-    for side, sign in enumerate((1.0, -1.0)):
-        sole = rot.mul(rot.about_vertical(feet.turn[:, side]), rot.from_axis_angle([1.0, 0.0, 0.0], feet.heel[:, side]))
-        ankle = _ball(bones, feet, side) - rot.mul_vec(sole, bones.toes)
-        knee = rot.from_axis_angle([1.0, 0.0, 0.0], feet.bend[:, side])
-        reach = np.linalg.norm(bones.knee + rot.mul_vec(knee, bones.ankle), axis=-1)
+    for side, (sign, leg) in enumerate(zip((1.0, -1.0), legs, strict=True)):
         hip = np.array([sign, 1.0, 1.0]) * hips[:, side]
         hip[:, 0] += sign * shift[:, 0]
         hip[:, 2] += shift[:, 1]
-        far = np.hypot(ankle[:, 0] - hip[:, 0], ankle[:, 2] - hip[:, 2])
+        far = np.hypot(leg.ankle[:, 0] - hip[:, 0], leg.ankle[:, 2] - hip[:, 2])
         stands = feet.stands[:, side]
-        short[:, side] = np.where(stands, np.maximum(far - reach + 1e-9, 0.0), 0.0)
-        top = ankle[:, 1] + np.sqrt(np.maximum(reach**2 - far**2, 1e-6)) - hip[:, 1]
+        short[:, side] = np.where(stands, np.maximum(far - leg.reach + 1e-9, 0.0), 0.0)
+        top = leg.ankle[:, 1] + np.sqrt(np.maximum(leg.reach**2 - far**2, 1e-6)) - hip[:, 1]
         height = np.where(stands, np.minimum(height, top), height)
-        ankles.append(ankle)
-        soles.append(sole)
-    return np.where(np.isfinite(height), height, 0.0), short, ankles, soles
+    return np.where(np.isfinite(height), height, 0.0), short
 
 
 def _reach(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floats]:
@@ -226,46 +252,50 @@ def _reach(bones: _Bones, target: Floats, towards: Floats) -> tuple[Floats, Floa
     end = bones.knee + rot.mul_vec(knee, bones.ankle)
     down = target / np.maximum(far, 1e-9)[:, None]
     forward = np.stack([np.sin(towards), np.zeros(len(towards)), np.cos(towards)], axis=-1)
-    across = np.cross(forward, down)
+    across = rot.cross(forward, down)
     across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-    line = rot.from_matrix(np.stack([across, -down, np.cross(down, across)], axis=-1))
+    line = rot.from_matrix(np.stack([across, -down, rot.cross(down, across)], axis=-1))
     return rot.mul(line, rot.from_axis_angle([1.0, 0.0, 0.0], np.arctan2(end[:, 2], -end[:, 1]))), knee
 
 
-def _touch(bones: _Bones, out: Floats, given: Floats, root: Floats, hips: Floats, feet: Feet) -> Floats:
-    """Raise touching legs until their feet's lowest point is on the floor, by bisection of the angle.
+def _touch(bones: _Bones, legs: list[_Leg], out: Floats, root: Floats, hips: Floats) -> Floats:
+    """Raise touching legs in `out` [T, J, 4] until their feet's lowest point is on the floor.
 
     Return the heights above the floor of feet whose legs do not reach it hanging straight down [T, 2], metres.
     """
-    above = np.zeros(feet.touches.shape)
-    for side in (0, 1):
-        rows = np.flatnonzero(feet.touches[:, side])
-        if len(rows) == 0:
+    above = np.zeros((len(out), 2))
+    for side, leg in enumerate(legs):
+        if len(leg.rows) == 0:
             continue
-        joints, pelvis = given[np.ix_(rows, bones.indices[side])], given[rows, 0]
-        if side == 1:
-            joints, pelvis = rot.mirror(joints), rot.mirror(pelvis)
-        twist = rot.about_vertical(rot.heading(joints[:, 0]))
-        floor = -(root[rows, 1] + hips[rows, side, 1])
-        axis = np.stack([-np.cos(feet.towards[rows, side]), np.zeros(len(rows)), np.sin(feet.towards[rows, side])], -1)
-        low, high = np.zeros(len(rows)), np.full(len(rows), np.radians(120.0))
-        above[rows, side] = np.maximum(_lowest(bones, twist, joints) - floor, 0.0)
-        for _ in range(48):
-            middle = 0.5 * (low + high)
-            over = _lowest(bones, rot.mul(rot.from_axis_angle(axis, middle), twist), joints) > floor
-            low, high = np.where(over, low, middle), np.where(over, middle, high)
-        joints[:, 0] = rot.inv_mul(pelvis, rot.mul(rot.from_axis_angle(axis, high), twist))
-        out[np.ix_(rows, bones.indices[side])] = joints if side == 0 else rot.mirror(joints)
+        floor = -(root[leg.rows, 1] + hips[leg.rows, side, 1])
+        above[leg.rows, side] = np.maximum(leg.up.min(axis=-1) - floor, 0.0)
+        joints = leg.joints.copy()
+        raised = rot.from_axis_angle(leg.axis, _angle_off_floor(leg, floor))
+        joints[:, 0] = rot.inv_mul(leg.pelvis, rot.mul(raised, joints[:, 0]))
+        out[np.ix_(leg.rows, bones.indices[side])] = joints if side == 0 else rot.mirror(joints)
     return above
 
 
-def _lowest(bones: _Bones, thigh: Floats, joints: Floats) -> Floats:
-    """Return the height above the hip [T], metres, of the lowest point of a foot whose thigh is turned by `thigh`."""
+def _angle_off_floor(leg: _Leg, floor: Floats) -> Floats:
+    """Return the angles [R], radians, at which the last of a raised foot's points leaves a floor [R] below the hip.
+
+    A point is as high above the hip as `up cos(angle) + ahead sin(angle)`: it goes down to where it is below the hip,
+    and leaves the floor as far beyond that as it met it before.
+    """
+    far = np.hypot(leg.up, leg.ahead)
+    share = np.clip(-floor[:, None] / np.maximum(far, 1e-9), -1.0, 1.0)
+    leaves = np.arctan2(-leg.ahead, -leg.up) + np.arccos(share)
+    return np.asarray(np.where(share < 1.0, leaves, 0.0).max(axis=-1).clip(0.0, HIGHEST))
+
+
+def _foot_points(bones: _Bones, joints: Floats) -> Floats:
+    """Return the places of a foot's points from the hip [R, P, 3], metres, of legs with these rotations [R, ..., 4]."""
+    thigh = joints[:, 0]
     turned = rot.mul(thigh, joints[:, 1])
     place = rot.mul_vec(thigh, bones.knee) + rot.mul_vec(turned, bones.ankle)
-    lowest = place[:, 1] + rot.mul_vec(rot.mul(turned, joints[:, 2]), bones.heel)[:, 1]
+    points = [place + rot.mul_vec(rot.mul(turned, joints[:, 2]), bones.heel)]
     for joint, step in enumerate(bones.foot, start=2):
         turned = rot.mul(turned, joints[:, joint])
         place = place + rot.mul_vec(turned, step)
-        lowest = np.minimum(lowest, place[:, 1])
-    return lowest
+        points.append(place)
+    return np.stack(points, axis=1)

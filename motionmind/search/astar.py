@@ -138,8 +138,7 @@ def _expand(
                 if parent != node:
                     _release(nodes, parent)
         if nodes.tally[_FREE] == 0 and not _forget(nodes, node):
-            nodes.key[node] = floor
-            return cost, False
+            return cost, False  # all nodes are this one and its ancestors: nothing was backed up into it
         _add(nodes, node, i, choice, chain, f, key)
     return cost, True
 

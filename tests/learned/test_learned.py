@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import platformdirs
 import pytest
 from saved_corpora import as_in_0_1
 
@@ -114,7 +115,8 @@ def test_learning_imports_nothing_that_the_fingerprint_leaves_out(tmp_path: Path
         "print(*sorted(name for name in sys.modules if name.startswith('motionmind')))\n"
     )
     places = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "MOTIONMIND_HOME": str(tmp_path / "home")}
-    compiled = {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", str(tmp_path / "compiled"))}
+    usual = platformdirs.user_cache_dir("motionmind", appauthor=False)
+    compiled = {"NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", usual)}  # which is not what is tested
     run = subprocess.run(
         [sys.executable, "-c", program], env=os.environ | places | compiled, capture_output=True, text=True, check=True
     )

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ BEGINS = {".png": b"\x89PNG", ".gif": b"GIF89a", ".mp4": b"", ".svg": b"<svg", "
 FILMS = [".gif", ".mp4", ".svg"]
 
 
+@cache
 def bodies() -> dict[str, Motion]:
     """A few frames on bodies of all kinds, and the numbers of frames that are odd."""
     ballet = ballet_clip("jump").slice(0, 6)

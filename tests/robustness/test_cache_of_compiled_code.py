@@ -20,16 +20,15 @@ from motionmind import files
 from motionmind import jit as door
 
 PACKAGE = Path(motionmind.__file__).parent
-# It prints what functions of two rooms return, and how many of them were compiled, and not found.
+# It prints what functions of two rooms return, and how many of them were compiled, and not found: of functions that take
+# the least time to compile.
 PROGRAM = """
 import numpy as np
 from motionmind.body.capsules import radius_at
 from motionmind.geometry.distances import squared_distance
-from motionmind.geometry.segments import nearest_points
-print(nearest_points(np.zeros((2, 3)), np.ones((2, 3))))
 print(squared_distance(np.ones((2, 4)), np.zeros((2, 4))))
 print(radius_at(np.ones(2), 0.5))
-print(sum(sum(one._cache_misses.values()) for one in (nearest_points, squared_distance, radius_at)))
+print(sum(sum(one._cache_misses.values()) for one in (squared_distance, radius_at)))
 """
 
 
@@ -53,7 +52,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("compiled")
     first, again = run(home), run(home)
     assert kept(home)
-    assert first.stdout.split()[-1] == "3"
+    assert first.stdout.split() == ["8.0", "1.0", "2"]
     assert again.stdout.split()[-1] == "0"  # found
     assert first.stderr == again.stderr == ""
     return home
@@ -99,7 +98,7 @@ def test_damaged_code_is_thrown_away_compiled_again_and_said_once(
     for file in before:
         damage(file, rng)
     told = run(home)
-    assert told.stdout == run(compiled).stdout.replace("\n0\n", "\n3\n")
+    assert told.stdout.split() == ["8.0", "1.0", "2"]
     assert told.stderr.count("was damaged") == 1
     assert told.stderr.count("\n") == 1
     assert kept(home) == list(before)
@@ -114,7 +113,7 @@ def test_code_that_cannot_be_read_is_compiled_each_time(compiled: Path, tmp_path
         a_folder(file, random.Random(0))
     for _ in range(2):
         told = run(home)
-        assert told.stdout.split()[-1] == "3"
+        assert told.stdout.split()[-1] == "2"
         assert told.stderr.count("cannot be kept") == 1
 
 
@@ -170,7 +169,7 @@ def test_a_full_disk_is_no_reason_to_fail(tmp_path: Path) -> None:
     limit = "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
     limit += f"resource.setrlimit(resource.RLIMIT_FSIZE, (1000, {resource.RLIM_INFINITY}))\n"
     told = run(tmp_path, limit + PROGRAM)
-    assert told.stdout.split()[-1] == "3"
+    assert told.stdout.split()[-1] == "2"
     assert told.stderr.count("cannot be kept") == 1
     assert told.stderr.count("\n") == 1
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]

@@ -44,52 +44,81 @@ def motion(name: str = "clip", frames: int = 12) -> Motion:
 
 # --- standard error ---------------------------------------------------------------------------------------------------
 
+# Runs command lines, each in a process of its own that begins with what this one has imported, which is most of what it
+# takes: with the words that the system gave, and the streams that Python opened.
+_CALLER = """
+import os, sys
+import motionmind.tween.engine
+from motionmind.cli import main
+lines = sys.argv[1:]
+while lines:
+    end = lines.index("--then")
+    words, lines = lines[:end], lines[end + 1 :]
+    child = os.fork()
+    if child == 0:
+        main(words)
+    print(f"--ended {os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])}", flush=True)
+"""
+Words = list[str | bytes]
 
-def shell(folder: Path, line: str) -> subprocess.CompletedProcess[bytes]:
-    """Run a line of a shell in a folder; `motionmind` is the command line."""
-    function = f'motionmind() {{ "{sys.executable}" -m motionmind "$@"; }}; '
+
+def call(folder: Path, *lines: Words, errors: str = "2>&1") -> list[tuple[int, bytes]]:
+    """Run command lines in other processes, for no test's report may hold such names; return codes and what they print.
+
+    Args:
+        folder: where they run.
+        lines: words of each.
+        errors: where a shell is to send standard error.
+    """
     environment = os.environ | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(folder / "home")}
-    return subprocess.run(["sh", "-c", function + line], cwd=folder, env=environment, capture_output=True, check=False)
+    words = [word for line in lines for word in (*line, "--then")]
+    command = ["sh", "-c", f'exec "$@" {errors}', "sh", sys.executable, "-c", _CALLER, *words]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
+    assert b"Traceback" not in done.stdout, ascii(done.stdout)
+    assert done.returncode == 0
+    told = re.findall(rb"(.*?)--ended (-?\d+)\n", done.stdout, re.S)
+    assert len(told) == len(lines)
+    return [(int(code), printed) for printed, code in told]
 
 
-WORK = [
-    ("motionmind convert clip.json clip.bvh", ["clip.bvh"]),
-    ("motionmind corpus build mine clip.json", ["home/corpora/mine/manifest.json"]),
+WORK: list[tuple[Words, list[str]]] = [
+    (["convert", "clip.json", "clip.bvh"], ["clip.bvh"]),
+    (["corpus", "build", "mine", "clip.json"], ["home/corpora/mine/manifest.json"]),
     (
-        f"motionmind tween {A} {B} --corpus ballet --moves 4 -o out.json --report report.json",
+        ["tween", str(A), str(B), "--corpus", "ballet", "--moves", "4", "-o", "out.json", "--report", "report.json"],
         ["out.json", "report.json"],
     ),
-    ("motionmind convert clip.json nothing.xyz", []),
-    ("motionmind convert nowhere.json clip.bvh", []),
-    ("motionmind nothing", []),
+    (["convert", "clip.json", "nothing.xyz"], []),
+    (["convert", "nowhere.json", "other.bvh"], []),
+    (["nothing"], []),
 ]
 
 
-@pytest.mark.parametrize(("line", "written"), WORK)
-def test_standard_error_that_is_closed_or_full_changes_nothing(tmp_path: Path, line: str, written: list[str]) -> None:
-    for number, errors in enumerate(["2>errors", "2>&-", "2>/dev/full"]):
-        if "full" in errors and not Path("/dev/full").exists():
-            continue
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        write_motion(folder / "clip.json", motion())
-        done = shell(folder, f"{line} {errors}")
-        assert done.returncode == (0 if written else 2), (errors, done.stderr)
-        for name in written:
-            assert (folder / name).read_bytes() == (tmp_path / "0" / name).read_bytes() or name == "report.json"
-        assert not (folder / "clip.bvh").exists() or "clip.bvh" in written
+@pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
+def test_standard_error_that_is_closed_or_full_changes_nothing(tmp_path: Path, usual: Path, errors: str) -> None:
+    if "full" in errors and not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full")
+    assert [code for code, _ in work(tmp_path, errors)] == [0 if written else 2 for _, written in WORK]
+    for name in (name for _, written in WORK for name in written):
+        assert (tmp_path / name).read_bytes() == (usual / name).read_bytes() or name == "report.json"
+    assert not (tmp_path / "other.bvh").exists()
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the work was done with standard error in a file."""
+    folder = tmp_path_factory.mktemp("usual")
+    assert [code for code, _ in work(folder, "2>errors")] == [0 if written else 2 for _, written in WORK]
+    assert (folder / "errors").read_bytes().count(b"error: ") == 3
+    return folder
+
+
+def work(folder: Path, errors: str) -> list[tuple[int, bytes]]:
+    write_motion(folder / "clip.json", motion())
+    return call(folder, *(words for words, _ in WORK), errors=errors)
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
-
-
-def call(folder: Path, *words: str | bytes | Path) -> tuple[int, bytes]:
-    """Run the command line in another process, for no test's report may hold such names; return code and errors."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(folder / "home")}
-    command = [sys.executable, "-m", "motionmind", *words]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False)
-    assert b"Traceback" not in done.stderr, ascii(done.stderr)
-    return done.returncode, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -106,30 +135,30 @@ def test_files_whose_names_are_no_utf_8_are_read_and_written(
     source = name + suffix
     write_motion(tmp_path / f"clip{suffix.decode()}", motion())
     (tmp_path / f"clip{suffix.decode()}").rename(tmp_path / os.fsdecode(source))
+    lines: list[Words] = []
     for target in targets:
         command = ["render", source, "-o"] if target in (b".html", b".svg", b".png") else ["convert", source]
-        assert call(tmp_path, *command, b"to-" + name + target)[0] == 0
-    assert call(tmp_path, "corpus", "build", "mine", source)[0] == 0
-    assert call(tmp_path, "corpus", "info", "mine")[0] == 0
-    ends = [source + b"@0", source + b"@9"]
+        lines.append([*command, b"to-" + name + target])
+    lines += [["corpus", "build", "mine", source], ["corpus", "info", "mine"]]
     files = ["--report", b"report-" + name, "-o", name + b"-out.bvh"]
-    assert call(tmp_path, "tween", *ends, "--corpus", "mine", "--moves", "1", *files)[0] == 0
+    lines.append(["tween", source + b"@0", source + b"@9", "--corpus", "mine", "--moves", "1", *files])
+    missing: list[Words] = [["convert", b"no-" + what, "out.json"] for what in (source, name)]
+    told = call(tmp_path, *lines, *missing)
+    assert [code for code, _ in told] == [0] * len(lines) + [2] * len(missing)
+    assert [errors.count(b"\n") for _, errors in told[len(lines) :]] == [1, 1]
     made = os.fsdecode(name + b"-out.bvh")
     assert read_motion(tmp_path / made).name == made.removesuffix(".bvh").encode("utf-8", "backslashreplace").decode()
-    for missing in (b"no-" + source, b"no-" + name):
-        code, errors = call(tmp_path, "convert", missing, "out.json")
-        assert (code, errors.count(b"\n")) == (2, 1)
 
 
 def test_words_that_are_no_utf_8_are_an_error_in_a_line(tmp_path: Path) -> None:
     write_motion(tmp_path / "clip.json", motion())
     strange = b"caf\xe9"
-    for words in (["--title", strange], ["--author", strange], ["--mix", strange]):
-        code, errors = call(tmp_path, "corpus", "build", "mine", "clip.json", *words)
-        assert (code, errors.count(b"error: ")) == (2, 1)
-    for command in (["corpus", "info", strange], ["corpus", "build", strange, "clip.json"], [strange]):
-        code, errors = call(tmp_path, *command)
-        assert (code, errors.count(b"\n")) == (2, 1)
+    about = [["corpus", "build", "mine", "clip.json", option, strange] for option in ("--title", "--author", "--mix")]
+    named = [["corpus", "info", strange], ["corpus", "build", strange, "clip.json"], [strange]]
+    told = call(tmp_path, *about, *named)
+    assert {code for code, _ in told} == {2}
+    assert [errors.count(b"error: ") for _, errors in told[: len(about)]] == [1] * 3
+    assert [errors.count(b"\n") for _, errors in told[len(about) :]] == [1] * 3
     assert not list(tmp_path.glob("home/corpora/*/manifest.json"))
 
 
