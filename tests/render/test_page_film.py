@@ -158,6 +158,21 @@ def test_films_have_names_that_every_system_takes(
 # --- what the page says -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("screen", SCREENS)
+def test_words_about_films_cover_no_others(show: Callable[..., Opened], screen: str) -> None:
+    tab = show(briefly("n" * 60, 0.1), **SCREENS[screen], script="delete window.MediaRecorder")
+    tab.get("document.getElementById('legend').open = true")
+    tab.click("film")
+    boxes = [tab.page.locator(one).bounding_box() for one in ("#legend", "#filming", "#canvas")]
+    (left, top, right, bottom) = np.transpose(
+        [[b["x"], b["y"], b["x"] + b["width"], b["y"] + b["height"]] for b in boxes]
+    )
+    assert right[0] <= left[1] or right[1] <= left[0] or bottom[0] <= top[1] or bottom[1] <= top[0]
+    assert left.min() == left[2]
+    assert right.max() == right[2]
+    readable_words(tab.page)
+
+
 @pytest.mark.parametrize(
     "script",
     [
