@@ -13,11 +13,12 @@ from motionmind._typing import Bools, Int16s
 
 SIZE = {"width": 640, "height": 480}  # of a page, where its size is all the same
 
-# The sizes of a notebook computer and of a telephone, upright and lying; the latter are used by fingers.
+# The sizes of a notebook computer, of a telephone, upright and lying, and of the smallest; these are used by fingers.
 SCREENS: dict[str, dict[str, Any]] = {
     "computer": {"viewport": {"width": 1280, "height": 800}},
     "upright": {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True},
     "lying": {"viewport": {"width": 844, "height": 390}, "has_touch": True, "is_mobile": True},
+    "smallest": {"viewport": {"width": 320, "height": 568}, "has_touch": True, "is_mobile": True},
 }
 
 # Of every element with words in it: its name, the contrast to what is behind it (WCAG 2.2, "contrast ratio"), and

@@ -437,7 +437,7 @@ def test_the_page_fits_every_screen_and_can_be_read(
     room = tab.locator("#space").bounding_box()
     tab.evaluate(f"motionmind.player.seek(motionmind.attractor.times[{jump}])")
     assert tab.locator("#space").bounding_box() == room
-    assert min(room["width"], room["height"]) > 150
+    assert min(room["width"], room["height"]) > 100
     assert "jumped from" in tab.inner_text("#reading")
     assert tab.evaluate("(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth)(reading)")
     assert {"flow", "reading", "piece", "other", "cell", "site", "h1"} <= readable_words(tab)

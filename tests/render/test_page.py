@@ -396,6 +396,24 @@ def test_keys_step_and_jump(show: Callable[..., Opened]) -> None:
     assert tab.get("motionmind.stage.view") == "side"
 
 
+def test_space_plays_after_something_was_clicked(show: Callable[..., Opened]) -> None:
+    tab = show(ballet_clip("adagio"), viewport={"width": 1000, "height": 700})
+    for choose in (
+        lambda: tab.click("loop"),
+        lambda: tab.page.click("#legend summary"),
+        lambda: tab.page.select_option("#speed", "0.5"),
+    ):
+        choose()
+        tab.press("Space")
+        assert tab.get("motionmind.player.playing")
+        tab.get("motionmind.player.pause()")
+    tab.page.focus("#speed")  # by keys, it keeps them
+    tab.press("ArrowDown")
+    tab.wait("motionmind.player.speed === 0.75")
+    tab.press("ArrowDown")
+    tab.wait("motionmind.player.speed === 1")
+
+
 def test_without_loop_it_ends(show: Callable[..., Opened]) -> None:
     tab = show(still(4))
     tab.press("l")

@@ -108,16 +108,22 @@ def pixels(tab: Opened, width: int, height: int) -> Int16s:
 def test_a_film_has_the_shape_of_the_picture_whatever_becomes_of_the_page(
     show: Callable[..., Opened], browser: Any, tmp_path: Path
 ) -> None:
-    tab = show(briefly(), **SCREENS["upright"])
+    motion = replace(briefly(), insertions=())
+    count = len(motion)
+    still = replace(motion, rotations=motion.rotations[[0] * count], root=motion.root[[0] * count])
+    tab = show(still, **SCREENS["upright"])
     box = tab.page.locator("#canvas").bounding_box()
-    tab.page.evaluate("motionmind.player.addEventListener('change', () => (seen = true), { once: true }), seen = false")
     with tab.page.expect_download(timeout=120_000) as download:
         tab.page.tap("#film")
-        tab.wait("seen && document.getElementById('film').textContent === 'Stop'")
+        tab.wait("motionmind.player.time > 0")
         tab.page.set_viewport_size(SCREENS["lying"]["viewport"])
+        tab.picture()
+        assert tab.page.inner_text("#film") == "Stop"
     download.value.save_as(tmp_path / "film.webm")
     found = seen_by_a_browser(browser, tmp_path / "film.webm")
     assert found["width"] / found["height"] == pytest.approx(box["width"] / box["height"], abs=0.01)
+    _, frames = decoded(tmp_path / "film.webm", (found["height"], found["width"]))
+    assert np.abs(frames[-1].astype(int) - frames[0]).mean() < 3.0
     tab.wait("document.getElementById('film').textContent === 'Film'")
     assert tab.page.locator("#canvas").bounding_box()["width"] == 844  # and the page is drawn as it is now
     assert tab.get("motionmind.stage.camera.aspect") > 2
@@ -147,15 +153,38 @@ def shape_of(tab: Opened) -> tuple[int, int]:
 
 @pytest.mark.parametrize(
     ("name", "file"),
-    [('a/b\\c: "d"?', "a-b-c- -d-.webm"), ("...", "movement.webm"), ("舞 é", "舞 é.webm"), ("x.json", "x.json.webm")],
+    [
+        ('a/b\\c: "d"?', "a-b-c- -d-.webm"),
+        ("...", "movement.webm"),
+        ("舞 é", "舞 é.webm"),
+        ("n" * 60, "n" * 60 + ".webm"),
+    ],
 )
 def test_films_have_names_that_every_system_takes(
     show: Callable[..., Opened], tmp_path: Path, name: str, file: str
 ) -> None:
-    assert film(show(briefly(name, 0.1)), tmp_path / "film.webm") == file
+    tab = show(briefly(name, 0.1), viewport={"width": 360, "height": 480})
+    assert film(tab, tmp_path / "film.webm") == file
+    assert tab.page.inner_text("#filming a") == f"Save {file}"
+    assert tab.get("[document.getElementById('filming')].every(one => one.scrollWidth <= one.clientWidth)")
 
 
 # --- what the page says -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_words_about_films_cover_no_others(show: Callable[..., Opened], screen: str) -> None:
+    tab = show(briefly("n" * 60, 0.1), **SCREENS[screen], script="delete window.MediaRecorder")
+    tab.get("document.getElementById('legend').open = true")
+    tab.click("film")
+    boxes = [tab.page.locator(one).bounding_box() for one in ("#legend", "#filming", "#canvas")]
+    (left, top, right, bottom) = np.transpose(
+        [[b["x"], b["y"], b["x"] + b["width"], b["y"] + b["height"]] for b in boxes]
+    )
+    assert right[0] <= left[1] or right[1] <= left[0] or bottom[0] <= top[1] or bottom[1] <= top[0]
+    assert left.min() == left[2]
+    assert right.max() == right[2]
+    readable_words(tab.page)
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,9 @@ function bind(player, stage, theme, refresh) {
     // Clicked, not chosen by keys: the space bar goes on to play and pause.
     if (event.detail > 0) event.target.closest("button, summary")?.blur();
   });
+  for (const select of document.querySelectorAll("select")) {
+    select.addEventListener("change", () => select.matches(":focus-visible") || select.blur());
+  }
   stage.controls.addEventListener("start", () => {
     for (const name of VIEWS) $(name).setAttribute("aria-pressed", "false");
   });
