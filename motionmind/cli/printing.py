@@ -248,12 +248,16 @@ def print_review(report: dict[str, Any]) -> None:
     click.echo(
         f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
     )
-    leaves = counts["seams"] / max(counts["postures"] - 1, 1)
+    seams = f"{count(counts['seams'], 'seam')} ({counts['departed']:.0%} of steps)"
     click.echo(
-        f"{count(counts['postures'], 'posture')}, {count(counts['seams'], 'seam')} ({leaves:.0%} of steps): "
-        f"{counts['inserted']} with an "
-        f"insertion, {counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
+        f"{count(counts['postures'], 'posture')}, {seams}: {counts['inserted']} with an insertion, "
+        f"{counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
     )
+    if counts["inserted"]:
+        click.echo(f"{counts['inserted_share']:.0%} of the time is inserted")
+    if report["limits"]:
+        own = f"the trajectory's own order leaves the piece in {course['departed']:.0%} of steps"
+        click.echo(f"{_format_limits(report['limits'])}; {own}")
     if counts["stays"]:
         click.echo(format_stillness(counts))
     click.echo("seam  postures   of the piece  decision   transition")
@@ -264,6 +268,12 @@ def print_review(report: dict[str, Any]) -> None:
         row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}"
         decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
         click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
+
+
+def _format_limits(limits: dict[str, Any]) -> str:
+    """Format what a variation was kept within: "kept within 30% inserted, in stretches of 4 postures at least"."""
+    share = "" if limits["inserted"] is None else f"within {limits['inserted']:.0%} inserted, "
+    return f"kept {share}in stretches of {count(limits['stretch'], 'posture')} at least"
 
 
 def format_stillness(counts: dict[str, Any]) -> str:

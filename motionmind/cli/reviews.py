@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
 
 
-@command("motionmind review variation.json --approve 6,7 --discard 8 --list")
+@command("motionmind review variation.json --approve 1,2 --discard 3 --list")
 @click.argument("file", type=FILE)
 @output("Write the edited variation: .json  [default: FILE itself]", required=False)
 @option("--list", "listing", section=Section.OUTPUT, is_flag=True, help="Print the seams, after the edits.")

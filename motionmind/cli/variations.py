@@ -36,10 +36,11 @@ if TYPE_CHECKING:
     from motionmind.variation.piece import Piece
     from motionmind.variation.variation import Variation
 
+_MUCH = 0.3  # share of the time beyond which insertions are much
 _STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
 
 
-@command("motionmind vary macarena --attractor rossler -o variation.json")
+@command("motionmind vary macarena --attractor rossler --inserted 0.3 -o variation.json")
 @click.argument("source", metavar="PIECE", shell_complete=completion.movement)
 @outputs(f"Write {OUTPUTS}; review takes .json.")
 @option("--report", section=Section.OUTPUT, type=FILE, help="Write the report as JSON; - prints it.")
@@ -113,7 +114,22 @@ _STILL = 0.25  # share of steps that stay, beyond which a variation seems to sta
     type=Number(0, 1),
     metavar="SHARE",
     help="Let this share of steps leave the piece's order: take the smallest nudge that comes within 0.05 of it  "
-    "[default: 0.25, unless --nudge or --start is given]",
+    "[default: 0.25, with --stretch 4 0.125, unless --nudge or --start is given]",
+)
+@option(
+    "--inserted",
+    section=Section.TRAJECTORY,
+    type=Number(0, 1),
+    metavar="SHARE",
+    help="Let insertions take this share of the time at most: seams with long ones go, or move to where the piece is "
+    "more like itself.",
+)
+@option(
+    "--stretch",
+    section=Section.TRAJECTORY,
+    type=COUNT,
+    metavar="N",
+    help="Make each stretch of the piece N postures long at least  [default: 4 with --inserted, else 1]",
 )
 @option(
     "--skip",
@@ -196,9 +212,8 @@ def vary(
     check_outputs(files, [*named.source.paths, *via_files(options, home)])
     flow = flow_of(attractor, **parse_parameters(parameter))
     request = request_options({row.field: options.pop(row.field) for row in SEARCH_OPTIONS}, home)
-    trajectory = {
-        key: options.pop(key) for key in ("depart", "start", "skip", "step", "transient", "length", "alternatives")
-    }
+    names = ("depart", "start", "skip", "step", "transient", "length", "inserted", "stretch", "alternatives")
+    trajectory = {name: options.pop(name) for name in names}
     nudge = options.pop("nudge")
     if trajectory["depart"] is not None and nudge is not None:
         raise click.UsageError("--depart seeks a nudge, and --nudge gives one; leave out one of them", context)
@@ -215,7 +230,10 @@ def vary(
             **request,
         )
     print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
-    _print_advice(variation, engine, share_sought(nudge, trajectory["depart"], trajectory["start"]))
+    depart = trajectory["depart"]
+    if not variation.kept:  # whose limits come first
+        depart = share_sought(nudge, depart, trajectory["start"])
+    _print_advice(variation, engine, depart)
     if not as_json:
         print_written([path for path, _ in files])
     if interruption.is_requested:
@@ -279,7 +297,9 @@ def _read_piece(
     motion = read_movement(source, clip, home, **reading_options)
     own = source.place if source.kind == "corpus" else None
     judge = corpus or own
-    unused = given_option(context, ["alternatives", *(row.field for row in SEARCH_OPTIONS if row.field != "fps")])
+    unused = given_option(
+        context, ["alternatives", "inserted", *(row.field for row in SEARCH_OPTIONS if row.field != "fps")]
+    )
     if unused and not judge:
         raise click.UsageError(f"{unused} is for --corpus, which is not given", context)
     engine = load_engine(judge, home) if judge else None
@@ -331,16 +351,24 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
 
 
 def _print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
-    """Note what to change if a variation does not leave the piece by enough, is not smoothed, or stands still."""
+    """Note what to change if a variation is not what was asked for, or not what one would want."""
     from motionmind.variation.departure import WITHIN, departure
 
-    reached = departure(variation.order)
+    reached = departure(variation.first_order)
     if depart is not None and abs(reached - depart) > WITHIN:
         note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
-    if not variation.seams:
+    counts = variation.report()["counts"]
+    limits = variation.kept.limits if variation.kept else None
+    if not variation.seams and limits:
+        note("within its limits the variation does not leave the piece's order: allow more by --inserted or --stretch")
+    elif not variation.seams:
         note("the variation does not leave the piece's order: try --depart 0.25, or a larger --length")
     elif engine is None:
         note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
-    counts = variation.report()["counts"]
+    share = counts["inserted_share"]
+    if limits is None and share > _MUCH:
+        note(f"insertions take {share:.0%} of the time: --inserted {_MUCH:g} keeps more of the piece")
+    if limits and limits.inserted is not None and share > limits.inserted:
+        note(f"no order was found with {limits.inserted:.0%} of the time inserted at most; this one has {share:.0%}")
     if counts["stays"] > _STILL * (counts["postures"] - 1):
         note(f"{format_stillness(counts)}: try another --start, or a larger --skip or --step")

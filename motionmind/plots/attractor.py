@@ -98,6 +98,9 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
             f"{_count(portrait.parting, 'posture')} of {len(portrait.points)}, "
             f"and jumps {_count(len(portrait.jumps), 'time')}."
         )
+    if portrait.variation.kept:
+        stretch = portrait.variation.kept.limits.stretch
+        summary += f" Its stretches have {_count(stretch, 'posture')} at least, so a point may be in a cell nearby."
     yield Words((_MARGIN, _MARGIN + 30), summary, LETTERS, INK)
     yield from _legend(_MARGIN, _MARGIN + 60)
     yield Words(

@@ -62,8 +62,8 @@ class Portrait:
 
     @property
     def order(self) -> Ints:
-        """The posture of the piece at each point [L]."""
-        return self.variation.order
+        """The posture of the piece at each point [L]: the nearest, or under limits one that is near."""
+        return self.variation.first_order
 
     @property
     def parting(self) -> int | None:

@@ -22,17 +22,22 @@ def departure(order: Ints) -> float:
     return float(np.mean((steps != 1) & (steps != 0))) if len(steps) else 0.0
 
 
-def share_sought(nudge: object | None, depart: float | None, start: object | None) -> float | None:
-    """Return the share of steps for which `vary` seeks a nudge, given its arguments; None if it does not seek one."""
-    return DEPART if nudge is None and depart is None and start is None else depart
+def share_sought(nudge: object | None, depart: float | None, start: object | None, stretch: int = 1) -> float | None:
+    """Return the share of steps for which `vary` seeks a nudge, given its arguments; None if it does not seek one.
+
+    Unless one is given, the stretches are twice as long on average as they have to be, or the share is a quarter if
+    that is less.
+    """
+    return min(DEPART, 0.5 / stretch) if nudge is None and depart is None and start is None else depart
 
 
-def find_nudge(order: Callable[[float], Ints], share: float) -> float:
+def find_nudge(order: Callable[[float], Ints], share: float, every: int = 1) -> float:
     """Find the smallest nudge by which a variation departs from its piece in a share of its steps.
 
     Args:
         order: returns the order of postures that a nudge gives; MotionMindError if its trajectory leads nowhere.
         share: the share, from 0 to 1.
+        every: tries each of so many of the nudges, which are ten to a power of ten.
 
     Returns:
         The smallest nudge that comes within 0.05 of the share; if none does, the one that comes nearest.
@@ -43,7 +48,7 @@ def find_nudge(order: Callable[[float], Ints], share: float) -> float:
     if not 0.0 <= share <= 1.0:
         raise MotionMindError(f"the share of steps that depart must be from 0 to 1, not {share}")
     nearest, off = float(_NUDGES[0]), np.inf
-    for nudge in map(float, _NUDGES):
+    for nudge in map(float, _NUDGES[::every]):
         try:
             found = abs(departure(order(nudge)) - share)
         except MotionMindError:

@@ -12,6 +12,8 @@ from motionmind.corpus.corpus import Facing
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, Wait
 from motionmind.variation.course import Course
+from motionmind.variation.departure import departure
+from motionmind.variation.limits import Kept, Limits, inserted_share
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Decision, Seam
 from motionmind.variation.seams import AbruptJoint, Candidate
@@ -26,7 +28,8 @@ class PieceReport(msgspec.Struct, frozen=True):
 
 
 class CourseReport(msgspec.Struct, frozen=True):
-    """The trajectories (see `Course`); `parting` in nats, on average, from one posture to the next."""
+    """The trajectories (see `Course`); `parting` in nats, on average, from one posture to the next; `departed` is the
+    share of steps by which their own order leaves the piece's."""
 
     flow: str
     parameters: Mapping[str, float]
@@ -37,6 +40,7 @@ class CourseReport(msgspec.Struct, frozen=True):
     transient: int
     exponent: float
     parting: float
+    departed: float
 
 
 class CountsReport(msgspec.Struct, frozen=True):
@@ -51,6 +55,8 @@ class CountsReport(msgspec.Struct, frozen=True):
         unjudged: seams that no corpus has judged.
         stays: steps that stay in their posture.
         seconds_still: the duration of these, seconds.
+        departed: share of the steps that leave the piece's order.
+        inserted_share: share of the time that insertions take.
     """
 
     postures: int
@@ -61,6 +67,8 @@ class CountsReport(msgspec.Struct, frozen=True):
     unjudged: int
     stays: int
     seconds_still: float
+    departed: float
+    inserted_share: float
 
 
 class CandidateReport(msgspec.Struct, frozen=True):
@@ -93,8 +101,9 @@ class SeamReport(msgspec.Struct, frozen=True):
 
 
 class VariationReport(msgspec.Struct, frozen=True):
-    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits, and
-    `motion_sha256` the hash of the file that was written with the report, null where none was."""
+    """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits,
+    `limits` those that its first order was kept within, null for none, and `motion_sha256` the hash of the file that
+    was written with the report, null where none was."""
 
     piece: PieceReport
     course: CourseReport
@@ -102,30 +111,42 @@ class VariationReport(msgspec.Struct, frozen=True):
     counts: CountsReport
     seams: list[SeamReport]
     edits: int
+    limits: Limits | None = None
     motion_sha256: str | None = None
 
 
-def report_of(piece: Piece, course: Course, order: Ints, seams: Sequence[Seam], edits: int) -> VariationReport:
+def report_of(
+    piece: Piece,
+    course: Course,
+    trajectory: Ints,
+    order: Ints,
+    seams: Sequence[Seam],
+    edits: int,
+    kept: Kept | None,
+) -> VariationReport:
     """Report a variation: all but the movement.
 
     Args:
         piece: what it is a variation of.
         course: the trajectories by which it was made.
+        trajectory: numbers of the piece's postures as the trajectories gave them [L].
         order: numbers of the piece's postures as they stand now [L].
         seams: its seams.
         edits: number of its edits.
+        kept: the order within limits that it began with, if it did.
     """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),
-        _course_report(course),
+        _course_report(course, trajectory),
         order.tolist(),
         _counts_report(piece, order, seams),
         list(map(_seam_report, seams)),
         edits,
+        kept.limits if kept else None,
     )
 
 
-def _course_report(course: Course) -> CourseReport:
+def _course_report(course: Course, trajectory: Ints) -> CourseReport:
     return CourseReport(
         course.flow,
         dict(course.parameters),
@@ -136,11 +157,16 @@ def _course_report(course: Course) -> CourseReport:
         course.transient,
         course.exponent,
         course.parting,
+        departure(trajectory),
     )
 
 
 def _counts_report(piece: Piece, order: Ints, seams: Sequence[Seam]) -> CountsReport:
     stays = np.flatnonzero(np.diff(order) == 0)
+    inserted = np.zeros(len(order) - 1)
+    for seam in seams:
+        if seam.insertion:
+            inserted[seam.at] = seam.insertion.motion.times[-1]
     return CountsReport(
         postures=len(order),
         seams=len(seams),
@@ -150,6 +176,8 @@ def _counts_report(piece: Piece, order: Ints, seams: Sequence[Seam]) -> CountsRe
         unjudged=sum(seam.transition is None for seam in seams),
         stays=len(stays),
         seconds_still=float(piece.durations[order[stays]].sum()),
+        departed=departure(order),
+        inserted_share=inserted_share(inserted, piece.durations[order[:-1]]),
     )
 
 

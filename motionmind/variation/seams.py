@@ -177,13 +177,11 @@ class TransitionTest:
         """
         engine, corpus = self.engine, self.engine.corpus
         for posture in (a, b):
-            if (difference := corpus.skeleton.difference(posture.skeleton)) is not None:
-                raise SkeletonError(f"the piece is on another skeleton than corpus {corpus.name!r}: {difference}")
+            self.check_skeleton(posture)
         chains = corpus.to_chains(np.stack([a.rotations, b.rotations]))
         before, after = engine.space.assign(chains)
         angles = np.degrees(rot.angle(*chains))
-        # Within a state's tolerance orientations are one to the corpus: that is no turn.
-        fast = angles > np.maximum(engine.space.tolerances, self._fastest * seconds) * _ROUNDING
+        fast = angles > self._largest(seconds)
         joints, found = len(corpus.skeleton), []
         attested = self._attested(before, after)
         if self.posturewise:
@@ -196,6 +194,56 @@ class TransitionTest:
             if fast[chain] or not attested[chain]
         ]
         return tuple(found)
+
+    def known(self, rotations: Floats, durations: Floats) -> Bools:
+        """Tell which transitions between N postures are not abrupt, from each to each [N, N].
+
+        Args:
+            rotations: local rotations of the postures [N, J, 4].
+            durations: seconds from each posture to the next one [N].
+        """
+        chains = self.engine.corpus.to_chains(rotations)
+        states = self.engine.space.assign(chains)
+        known = self._known_bodies(states) if self.posturewise else self._attested_pairs(states)
+        for i, seconds in enumerate(durations):
+            known[i] &= (np.degrees(rot.angle(chains[i], chains)) <= self._largest(float(seconds))).all(axis=-1)
+        return known
+
+    def check_skeleton(self, posture: Posture) -> None:
+        """Raise SkeletonError if a posture is on other joints than the corpus."""
+        corpus = self.engine.corpus
+        if (difference := corpus.skeleton.difference(posture.skeleton)) is not None:
+            raise SkeletonError(f"the piece is on another skeleton than corpus {corpus.name!r}: {difference}")
+
+    def _largest(self, seconds: float) -> Floats:
+        """Degrees that each chain may turn by within some seconds, and not be too fast [L]."""
+        # Within a state's tolerance orientations are one to the corpus: that is no turn.
+        return np.asarray(np.maximum(self.engine.space.tolerances, self._fastest * seconds) * _ROUNDING)
+
+    def _attested_pairs(self, states: Int32s) -> Bools:
+        """Whether the corpus attests every chain's move from each row of states [N, L] to each [N, N]."""
+        graph = self.engine.grammar.transitions
+        attested = np.ones((len(states), len(states)), dtype=np.bool_)
+        for chain in range(states.shape[1]):
+            used, which = np.unique(states[:, chain], return_inverse=True)
+            moves = np.eye(len(used), dtype=np.bool_)
+            for row, state in enumerate(used):
+                edges = slice(*graph.indptr[graph.starts[chain] + state :][:2])
+                moves[row] |= np.isin(used, graph.targets[edges])
+            attested &= moves[np.ix_(which, which)]
+        return attested
+
+    def _known_bodies(self, states: Int32s) -> Bools:
+        """Whether a body of the corpus went from each row of states [N, L] to each [N, N]; it may always stay."""
+        moves, joints, count = self.engine.corpus.moves, len(self.engine.corpus.skeleton), len(states)
+        rows = np.concatenate([states, self.engine.states])[:, :joints]
+        _, which = np.unique(rows, axis=0, return_inverse=True)
+        own, mine = np.unique(which[:count], return_inverse=True)
+        made = np.eye(len(own), dtype=np.bool_)
+        begins, ends = which[count:][moves.begins], which[count:][moves.ends]
+        both = np.isin(begins, own) & np.isin(ends, own)
+        made[np.searchsorted(own, begins[both]), np.searchsorted(own, ends[both])] = True
+        return np.asarray(made[np.ix_(mine, mine)])
 
     @cached_property
     def _fastest(self) -> Floats:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import msgspec
@@ -16,7 +16,7 @@ from motionmind._typing import Ints
 from motionmind.arguments import as_integers, check_flag, check_function, check_items, check_type
 from motionmind.body.motion import Motion
 from motionmind.chaos.flows import FLOWS, Flow
-from motionmind.chaos.reorder import itinerary
+from motionmind.chaos.reorder import Itinerary, itinerary
 from motionmind.chaos.trajectories import largest_exponent
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
@@ -25,6 +25,8 @@ from motionmind.tween.engine import Engine
 from motionmind.variation.arguments import check_number, check_numbers, check_whole, take_renamed
 from motionmind.variation.course import Course
 from motionmind.variation.departure import find_nudge, share_sought
+from motionmind.variation.insertion_times import estimate_insertions
+from motionmind.variation.limits import Kept, Limits, Smoothing, check_departure, check_limits, keep_within, seams_of
 from motionmind.variation.piece import Arrangement, Piece
 from motionmind.variation.report import report_of
 from motionmind.variation.review import (
@@ -39,8 +41,17 @@ from motionmind.variation.review import (
     apply_edit,
     initial_state,
 )
-from motionmind.variation.seams import JudgedTransition, OnProgress, Transition, check_asked, judge_and_smooth
+from motionmind.variation.seams import (
+    JudgedTransition,
+    OnProgress,
+    Transition,
+    TransitionTest,
+    check_asked,
+    judge_and_smooth,
+)
+from motionmind.variation.stretches import cheapest_order
 
+_COARSELY = 5  # each of so many nudges is tried where each takes some time
 NUDGE = 0.1  # of a trajectory that begins where it is told to, in a flow's own coordinates
 SKIP = 10
 ALTERNATIVES = 3
@@ -61,6 +72,7 @@ class Variation:
         order: the postures of the piece as the trajectories gave them [L].
         transitions: the judged transitions that it began with; none if no corpus was given.
         edits: the edits since, in order.
+        kept: the order that it began with in place of the trajectories', if limits were given; else None.
 
     >>> from motionmind import Engine, vary
     >>> engine = Engine.load("ballet")
@@ -75,15 +87,19 @@ class Variation:
     order: Ints
     transitions: tuple[Transition, ...] = ()
     edits: tuple[Edit, ...] = ()
+    kept: Kept | None = None
 
     def __post_init__(self) -> None:
         check_type("piece", self.piece, Piece)
         check_type("course", self.course, Course)
         check_items("transitions", self.transitions, "transitions", JudgedTransition)
         check_items("edits", self.edits, "edits", Approve, Discard, Replace, Cut, Smooth)
+        check_type("kept", self.kept, Kept, or_none=True)
         order = as_integers("order", self.order)
-        if order.ndim != 1 or len(order) == 0 or order.min() < 0 or order.max() >= len(self.piece):
-            raise MotionMindError(f"a variation's order must name postures of the piece, 0 to {len(self.piece) - 1}")
+        for one in (order, np.array(self.kept.order if self.kept else order)):
+            if one.ndim != 1 or one.shape != order.shape or not len(one) or min(one) < 0 or max(one) >= len(self.piece):
+                last = len(self.piece) - 1
+                raise MotionMindError(f"a variation's order must name postures of the piece, 0 to {last}")
         order.setflags(write=False)
         object.__setattr__(self, "order", order)
         _ = self._state  # raises if an edit does not fit
@@ -98,10 +114,15 @@ class Variation:
 
     @cached_property
     def _state(self) -> ReviewState:
-        state = initial_state(self.order, self.transitions)
+        state = initial_state(self.first_order, self.transitions)
         for edit in self.edits:
             state = apply_edit(state, edit)
         return state
+
+    @property
+    def first_order(self) -> Ints:
+        """The postures of the piece before any edit [L]: `kept`, or else `order`."""
+        return np.array(self.kept.order) if self.kept else self.order
 
     @property
     def postures(self) -> Ints:
@@ -125,7 +146,7 @@ class Variation:
     def report(self) -> dict[str, Any]:
         """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
         report: dict[str, Any] = msgspec.to_builtins(
-            report_of(self.piece, self.course, self.postures, self.seams, len(self.edits))
+            report_of(self.piece, self.course, self.order, self.postures, self.seams, len(self.edits), self.kept)
         )
         return report
 
@@ -250,6 +271,8 @@ def vary(
     step: float | None = None,
     transient: int | None = None,
     length: int | None = None,
+    inserted: float | None = None,
+    stretch: int | None = None,
     alternatives: int = ALTERNATIVES,
     posturewise: bool = False,
     on_progress: OnProgress | None = None,
@@ -268,18 +291,23 @@ def vary(
         nudge: the offset of the variation's trajectory from the piece's at its beginning: a number for the flow's first
             coordinate, or one for each [d]. None to seek it by `depart`.
         depart: the share of steps that are to leave the piece's order, in place of a nudge: the smallest nudge of the
-            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for 0.25, or, with a
-            `start`, for a nudge of 0.1.
+            first coordinate is taken that comes within 0.05 of it, or else nearest to it. None for 0.25, or half of
+            what the `stretch` allows if that is less; or, with a `start`, for a nudge of 0.1.
         start: the start of the piece's trajectory, before its transient [d]; None for the flow's own.
         skip: points of the trajectories to leave out between two postures.
         step: the step of the integration, in the flow's units of time; None for the flow's own.
         transient: steps to drop from the beginning; None for the flow's own.
         length: postures of the variation; None for as many as the piece has.
+        inserted: the greatest share of the time that insertions are to take. Seams with long insertions then go, or
+            move to where the piece is more like itself, and no more of them than needed (see
+            `motionmind.variation.limits`); if no order holds the limit, the one that inserts least is taken. None for
+            no limit.
+        stretch: postures that each stretch of the piece has at least; None for 4 where insertions are limited, else 1.
         alternatives: see `Variation.smooth`, as for `posturewise`, `on_progress`, `watch` and `options`.
 
     Raises:
-        MotionMindError: an argument is out of its range, a trajectory diverges or settles, or both a nudge and a share
-            are given.
+        MotionMindError: an argument is out of its range, a trajectory diverges or settles, both a nudge and a share
+            are given, insertions are limited that no corpus makes, or there are no such stretches.
         SkeletonError: the piece is on another skeleton than the corpus.
         WrongTypeError: an argument is of another type, or there is no such argument.
 
@@ -296,25 +324,36 @@ def vary(
     _check_watchers(posturewise, on_progress, watch)
     check_asked(alternatives, options)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    course, order = _order_postures(len(piece), flow, nudge, depart, start, skip, step, transient, length)
-    variation = Variation(piece, course, order)
-    if engine is None:
-        return variation
-    transitions = judge_and_smooth(
-        piece,
-        dict.fromkeys((seam.start, seam.end) for seam in variation.seams),
-        engine,
-        alternatives,
-        posturewise=posturewise,
-        on_progress=on_progress,
-        watch=watch,
-        **options,
-    )
-    return replace(variation, transitions=transitions)
+    if inserted is not None and engine is None:
+        raise MotionMindError("inserted limits what a corpus inserts, and none is given")
+    length = check_whole("length", len(piece) if length is None else length, 1, LONGEST)
+    limits = check_limits(inserted, stretch, len(piece), length)
+    course, found = _order_postures(len(piece), length, flow, nudge, depart, start, skip, step, transient, limits)
+    variation = Variation(piece, course, found.indices)
+    smooth: Smoothing | None = None
+    if engine is not None:
+        smooth = partial(
+            judge_and_smooth,
+            piece,
+            engine=engine,
+            alternatives=alternatives,
+            posturewise=posturewise,
+            on_progress=on_progress,
+            watch=watch,
+            **options,
+        )
+    if limits is not None:
+        seconds = np.zeros((len(piece), len(piece)), dtype=np.float32)
+        if engine is not None and limits.inserted is not None:
+            seconds = estimate_insertions(piece, TransitionTest(engine, posturewise))
+        kept, transitions = keep_within(limits, found, piece.durations, seconds, smooth)
+        return replace(variation, kept=kept, transitions=transitions)
+    return replace(variation, transitions=smooth(seams_of(found.indices))) if smooth else variation
 
 
 def _order_postures(
     count: int,
+    length: int,
     flow: Flow,
     nudge: float | Sequence[float] | None,
     depart: float | None,
@@ -322,27 +361,25 @@ def _order_postures(
     skip: int,
     step: float | None,
     transient: int | None,
-    length: int | None,
-) -> tuple[Course, Ints]:
-    """The course that `vary` asks for, its arguments checked, and the order of `count` postures that it gives [L]."""
+    limits: Limits | None,
+) -> tuple[Course, Itinerary]:
+    """The course that `vary` asks for, its arguments checked, and the reordering of `count` postures that it gives."""
     check_type("flow", flow, Flow, wanted="a Flow, such as flow_of('lorenz') gives")
     skip = check_whole("skip", skip, 0, LONGEST)
-    length = check_whole("length", count if length is None else length, 1, LONGEST)
     step = check_number("step", flow.step if step is None else step)
     transient = check_whole("transient", flow.transient if transient is None else transient, 0, MOST_STEPS)
     if nudge is not None and depart is not None:
         raise MotionMindError("depart seeks a nudge, and nudge gives one: leave out one of them")
-    depart = share_sought(nudge, depart, start)
+    check_departure(depart, limits)
+    depart = share_sought(nudge, depart, start, limits.stretch if limits else 1)
     start = check_numbers("start", flow.start if start is None else start)
 
-    def reorder(nudge: ArrayLike) -> Ints:
-        """Return the order of postures that a nudge gives [L]."""
-        return itinerary(
-            flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient
-        ).indices
+    def reorder(nudge: ArrayLike) -> Itinerary:
+        """Return the reordering that a nudge gives."""
+        return itinerary(flow, count, length, nudge=nudge, start=start, every=skip + 1, step=step, transient=transient)
 
     if nudge is None:
-        nudge = NUDGE if depart is None else find_nudge(reorder, check_number("depart", depart))
+        nudge = NUDGE if depart is None else _seek_nudge(reorder, check_number("depart", depart), limits)
     offset = check_numbers("nudge", nudge)
     if np.ndim(nudge) == 0:
         offset += (0.0,) * (len(flow.start) - 1)
@@ -350,3 +387,13 @@ def _order_postures(
     exponent = largest_exponent(flow, start, steps=EXPONENT_STEPS, step=max(step, flow.step))
     course = Course(flow.name, dict(flow.parameters), start, offset, skip, step, transient, round(exponent, 4))
     return course, reorder(offset)
+
+
+def _seek_nudge(reorder: Callable[[float], Itinerary], depart: float, limits: Limits | None) -> float:
+    """Return the nudge by which a share of the steps depart, in stretches as long as the limits say."""
+    if limits is None:
+        return find_nudge(lambda nudge: reorder(nudge).indices, depart)
+    first = reorder(0.0)
+    free = np.zeros((len(first.sites), len(first.sites)), dtype=np.float32)
+    stretch = limits.stretch
+    return find_nudge(lambda nudge: cheapest_order(reorder(nudge), free, 0.0, stretch), depart, every=_COARSELY)

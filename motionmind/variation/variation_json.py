@@ -9,11 +9,13 @@ A file is motion JSON (`motionmind.formats.motion_json`) with one more field:
       "order": [0, 1, 2, 63, 64, ...],
       "joins": [{"start": 2, "end": 63, "corpus": "ballet", "breaks": [{"joint": "left_hip", ...}],
                  "candidates": [{"motion": {...}, "status": "optimal", "cost": 131.2, ...}], "failure": ""}, ...],
-      "edits": [{"edit": "approve", "seams": [1, 3]}, {"edit": "cut", "first": 10, "last": 14, "before": 30}, ...]
+      "edits": [{"edit": "approve", "seams": [1, 3]}, {"edit": "cut", "first": 10, "last": 14, "before": 30}, ...],
+      "kept": {"order": [0, 1, 2, 3, 64, ...], "limits": {"inserted": 0.3, "stretch": 4}}
     }
 
 `piece` is the original with the frame of each of its postures, `order` the postures as the trajectory gave them,
 `joins` the judged transitions from one posture to another, and `edits` the decisions, from which all else follows.
+`kept` is there only where limits were given: the order that was taken in the trajectory's place.
 Numbers are written in full, and are read to the last bit as they were written.
 """
 
@@ -34,6 +36,7 @@ from motionmind.formats import _json
 from motionmind.formats._json import InsertionSchema
 from motionmind.formats.motion_json import FramesSchema, MotionSchema, motion_of, write_motion_json
 from motionmind.variation.course import Course
+from motionmind.variation.limits import Kept
 from motionmind.variation.piece import Piece
 from motionmind.variation.review import Approve, Cut, Discard, Edit, Replace, Smooth, is_seam
 from motionmind.variation.seams import Candidate, Index, InsertionCandidate, JudgedTransition, Transition
@@ -56,7 +59,7 @@ class PieceSchema(msgspec.Struct, forbid_unknown_fields=True):
     facing: Facing
 
 
-class VariationSchema(msgspec.Struct, forbid_unknown_fields=True):
+class VariationSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """The field `variation`, version 1."""
 
     version: int
@@ -65,6 +68,7 @@ class VariationSchema(msgspec.Struct, forbid_unknown_fields=True):
     order: list[Index]
     joins: list[FileTransition]
     edits: list[Approve | Discard | Replace | Cut | Smooth[FileTransition]]
+    kept: Kept | None = None
 
 
 class _Version(msgspec.Struct):
@@ -99,7 +103,7 @@ def read_variation(path: FilePath) -> Variation:
             for number, edit in enumerate(schema.edits)
         ]
         transitions = _read_transitions(schema.joins, "joins", piece, path)
-        return Variation(piece, schema.course, np.array(schema.order), transitions, tuple(edits))
+        return Variation(piece, schema.course, np.array(schema.order), transitions, tuple(edits), schema.kept)
     except FormatError:
         raise
     except MotionMindError as error:
@@ -127,6 +131,7 @@ def write_variation(path: FilePath, variation: Variation) -> None:
             Smooth(tuple(map(_file_transition, edit.transitions))) if isinstance(edit, Smooth) else edit
             for edit in variation.edits
         ],
+        variation.kept,
     )
     write_motion_json(path, variation.motion(), {"variation": msgspec.json.encode(schema)})
 

@@ -1,0 +1,209 @@
+"""Limits of a variation: how short stretches of the piece may be, and how much of the time insertions may take.
+
+The trajectory's own order has short stretches, and many insertions. Under limits another order is taken, which stays
+near the trajectory (`motionmind.variation.stretches`): of those with long enough stretches the cheapest, where a second
+of insertion has the smallest price by which the limit holds. So a seam goes, or moves to where the piece is more like
+itself, the sooner the longer its insertion is and the less the trajectory insists on it.
+
+How long an insertion is, is not known before the engine has found it. So it begins with estimates; the seams of the
+order that they give are smoothed, and what was found takes the place of the estimates, until the order has no seam that
+was not smoothed yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Floats, Ints, Singles
+from motionmind.chaos.reorder import Itinerary
+from motionmind.errors import MotionMindError
+from motionmind.variation.arguments import check_number, check_whole
+from motionmind.variation.departure import WITHIN
+from motionmind.variation.review import is_seam
+from motionmind.variation.seams import Index, Transition
+from motionmind.variation.stretches import cheapest_order
+
+STRETCH = 4  # postures of each stretch, where insertions are limited and nothing else is said
+_MOST = 4_000  # postures of a piece, and of its variation: arrays hold the square of them
+_ROUNDS = 12  # of smoothing; then only seams that are smoothed already are taken
+_HALVINGS = 20  # of the span of prices
+_PRICES = 1e-6, 1e4  # of a second, in the trajectory's extents
+_NEVER = 1e6  # seconds that stand for a seam that is not to be taken
+
+Smoothing = Callable[[Sequence[tuple[int, int]]], tuple[Transition, ...]]  # smooths seams; fewer if it was ended
+
+
+class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits of a variation.
+
+    Attributes:
+        inserted: the greatest share of the time that insertions are to take; None for no limit.
+        stretch: postures that each stretch of the piece has at least.
+    """
+
+    inserted: float | None
+    stretch: int
+
+
+class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The order that is kept under limits, in place of the trajectory's.
+
+    Attributes:
+        order: postures of the piece [L].
+        limits: the limits; the share that was reached may be greater.
+    """
+
+    order: tuple[Index, ...]
+    limits: Limits
+
+
+def check_limits(inserted: float | None, stretch: int | None, count: int, length: int) -> Limits | None:
+    """Return the limits that are asked for; None for none.
+
+    Args:
+        inserted: see `Limits`.
+        stretch: see `Limits`; None for 4, or as many as there are, if insertions are limited.
+        count: postures of the piece.
+        length: postures of the variation.
+
+    Raises:
+        MotionMindError: a limit is out of its range.
+    """
+    if inserted is None and stretch is None:
+        return None
+    if inserted is not None and not 0.0 <= check_number("inserted", inserted) <= 1.0:
+        raise MotionMindError(f"the share of inserted time must be from 0 to 1, not {inserted}")
+    if max(count, length) > _MOST:
+        raise MotionMindError(
+            f"inserted and stretch are for pieces and variations of up to {_MOST:,} postures, not of "
+            f"{max(count, length):,}: vary a part"
+        )
+    most = min(count, length)
+    if stretch is not None and check_whole("stretch", stretch, 1) > most:
+        raise MotionMindError(f"there are no stretches of {stretch} postures: the piece or its variation has {most}")
+    share = None if inserted is None else float(inserted)
+    return Limits(share, min(STRETCH, most) if stretch is None else int(stretch))
+
+
+def check_departure(depart: float | None, limits: Limits | None) -> None:
+    """Raise MotionMindError if so large a share of steps cannot leave a piece's order, in stretches so long."""
+    if depart is not None and limits is not None and depart > 1.0 / limits.stretch + WITHIN:
+        raise MotionMindError(
+            f"depart {depart:g} cannot be reached in stretches of {limits.stretch} postures: at most 1 step in "
+            f"{limits.stretch} leaves the piece's order; take shorter stretches"
+        )
+
+
+def inserted_share(inserted: Floats, durations: Floats) -> float:
+    """Return the share of a variation's time that insertions take.
+
+    Args:
+        inserted: seconds of the insertion at each of its steps, 0 where there is none [L - 1].
+        durations: seconds of the same steps in the piece [L - 1], which an insertion replaces.
+    """
+    total = float(np.where(inserted > 0.0, inserted, durations).sum())
+    return float(inserted.sum()) / total if total > 0.0 else 0.0
+
+
+@dataclass(eq=False)
+class _Seeker:
+    """Seeks an order within limits; `seconds` [N, N] are the estimates, which what is found replaces."""
+
+    course: Itinerary
+    durations: Floats
+    limits: Limits
+    seconds: Singles
+
+    def order(self) -> Ints:
+        """Return the order of the smallest price by which the limit holds, as far as is known [L]."""
+        at_no_price = self._cheapest(0.0)
+        if self._holds(at_no_price):
+            return at_no_price
+        low, high = np.log(_PRICES)
+        best = self._cheapest(float(np.exp(high)))
+        if not self._holds(best):
+            return best  # no other inserts less
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            order = self._cheapest(float(np.exp(middle)))
+            if self._holds(order):
+                best, high = order, middle
+            else:
+                low = middle
+        return best
+
+    def _cheapest(self, price: float) -> Ints:
+        return cheapest_order(self.course, self.seconds, price, self.limits.stretch)
+
+    def _holds(self, order: Ints) -> bool:
+        if self.limits.inserted is None:
+            return True
+        return inserted_share(self._inserted(order), self.durations[order[:-1]]) <= self.limits.inserted
+
+    def _inserted(self, order: Ints) -> Floats:
+        """Return the seconds inserted at each step of an order [L - 1]."""
+        steps = np.diff(order)
+        return np.where((steps != 0) & (steps != 1), self.seconds[order[:-1], order[1:]], 0.0)
+
+
+def keep_within(
+    limits: Limits, course: Itinerary, durations: Floats, seconds: Singles, smooth: Smoothing | None
+) -> tuple[Kept, tuple[Transition, ...]]:
+    """Find the order of a variation within limits, and smooth its seams.
+
+    Args:
+        limits: the limits.
+        course: the trajectories.
+        durations: seconds from each of the piece's postures to the next [N].
+        seconds: estimates of what a seam from each posture to each inserts [N, N].
+        smooth: smooths seams; None if no corpus does.
+
+    Returns:
+        The order, and its seams, judged and smoothed.
+
+    Raises:
+        MotionMindError: there is no order with such stretches.
+    """
+    seeker = _Seeker(course, durations, limits, seconds.copy())
+    smoothed: dict[tuple[int, int], Transition] = {}
+    order = seeker.order()
+    for number in range(_ROUNDS + 1):
+        pairs = seams_of(order)
+        new = [pair for pair in pairs if pair not in smoothed]
+        if not new or smooth is None:
+            break
+        found = smooth(new)
+        smoothed |= {(one.start, one.end): one for one in found}
+        if any(one.is_pending for one in found):  # ended early
+            break
+        _learn(seeker, seconds, smoothed)
+        if number == _ROUNDS - 1:
+            taken = np.array(list(smoothed))
+            rest = np.ones(seconds.shape, dtype=np.bool_)
+            rest[taken[:, 0], taken[:, 1]] = False
+            seeker.seconds[rest] = _NEVER
+        order = seeker.order()
+    kept = Kept(tuple(order.tolist()), limits)
+    return kept, tuple(smoothed[pair] for pair in seams_of(order) if pair in smoothed)
+
+
+def seams_of(order: Ints) -> list[tuple[int, int]]:
+    """Return the seams of an order of postures [L], each once: the postures that they lead from and to."""
+    pairs = zip(order[:-1].tolist(), order[1:].tolist(), strict=True)
+    return list(dict.fromkeys((i, k) for i, k in pairs if is_seam(i, k)))
+
+
+def _learn(seeker: _Seeker, estimates: Singles, smoothed: Mapping[tuple[int, int], Transition]) -> None:
+    """Put what was found in the place of the estimates, and bring the others to the same scale."""
+    known = {pair: float(one.candidates[0].motion.times[-1]) for pair, one in smoothed.items() if one.candidates}
+    scale = 1.0
+    if known:
+        i, k = np.array(list(known)).T
+        scale = sum(known.values()) / max(float(estimates[i, k].sum()), 1e-3)
+    seeker.seconds[:] = scale * estimates
+    for pair, seconds in known.items():
+        seeker.seconds[pair] = seconds
