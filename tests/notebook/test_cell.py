@@ -121,7 +121,7 @@ def test_movement_that_is_too_long_is_said_to_be() -> None:
     html = html_of(motion)
     assert len(html) < 500
     assert "<long>" in unescape(html)
-    assert "too long to play in a cell" in html
+    assert "too long to play in a notebook" in html
     assert "<iframe" not in html
     assert "<iframe" in html_of(motion.slice(0, frames - 1))
 
