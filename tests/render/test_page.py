@@ -237,6 +237,8 @@ def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[...
     assert np.ptp(changed("narrow")) < np.ptp(changed("onion"))
     tab.press("o")
     assert np.array_equal(tab.picture(), pictures["none"])
+    tab.page.select_option("#apart", "3")  # who says how far apart wants to see them
+    assert np.array_equal(tab.picture(), pictures["onion"])
 
 
 def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., Opened]) -> None:
@@ -274,6 +276,9 @@ def test_all_words_can_be_read(show: Callable[..., Opened], scheme: str) -> None
     tab.page.mouse.move(box["x"] + 50, box["y"] + 10)
     seen = {"h1", "frame", "inserted", "bridged", "front", "quarter", "summary", "li", "label", "speed", "hint"}
     assert seen <= readable_words(tab.page)
+    for button in ("#front", "#quarter", "#film", "#help", "summary", "#speed"):
+        tab.page.hover(button)
+        readable_words(tab.page)
     tab.press("?")
     assert {"keys", "kbd", "dd"} <= readable_words(tab.page)
 
