@@ -530,7 +530,9 @@ def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Op
 
 @pytest.mark.parametrize("rights", ["allow-scripts", "allow-scripts allow-downloads"])
 def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Path, rights: str) -> None:
-    frame = html.escape(page(bridged()), quote=True)
+    motion = bridged()
+    insertion = Insertion(0.3 * motion.insertions[0].times)
+    frame = html.escape(page(replace(motion, times=0.3 * motion.times, insertions=(insertion,))), quote=True)
     host = f'<!doctype html><iframe sandbox="{rights}" srcdoc="{frame}" style="width: 640px; height: 400px"></iframe>'
     (tmp_path / "host.html").write_text(host, "utf-8")
     context = browser.new_context(reduced_motion="reduce")
@@ -552,7 +554,7 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
     assert inner.evaluate("motionmind.player.time") > 0.0
     tab.keyboard.press("Space")  # the clicked frame has the keys
     assert not inner.evaluate("motionmind.player.playing")
-    inner.evaluate("motionmind.player.seek(0.5)")
+    inner.evaluate("motionmind.player.seek(0.15)")
     tab.keyboard.press("?")
     assert inner.is_visible("#sheet")
     tab.keyboard.press("Escape")
