@@ -358,23 +358,29 @@ def danced() -> Variation:
 
 
 @pytest.fixture
-def show(browser: Any, tmp_path: Path, danced: Variation) -> Iterator[Callable[..., Any]]:
+def said() -> list[str]:
+    """What pages complained of."""
+    return []
+
+
+@pytest.fixture
+def show(browser: Any, tmp_path: Path, danced: Variation, said: list[str]) -> Iterator[Callable[..., Any]]:
     """A function that opens the page of `danced`; afterwards, that it neither complained nor asked for anything."""
-    said: list[str] = []
     asked: list[str] = []
     contexts: list[Any] = []
     write_attractor(tmp_path / "page.html", danced)
 
-    def show(**options: Any) -> Any:
+    def show(ready: str = "window.motionmind?.attractor", script: str = "", **options: Any) -> Any:
         usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce"}
         contexts.append(browser.new_context(**(usual | options)))
         tab = contexts[-1].new_page()
         tab.on("console", lambda message: said.append(message.text))
         tab.on("pageerror", lambda error: said.append(str(error)))
         tab.on("request", lambda request: asked.append(request.url))
+        tab.add_init_script(script)
         tab.goto((tmp_path / "page.html").as_uri())
         for _ in range(500):
-            if tab.evaluate("!!window.motionmind?.attractor"):
+            if tab.evaluate(f"!!({ready})"):
                 break
             tab.wait_for_timeout(20)
         return tab
@@ -455,6 +461,18 @@ def luminance(colour: ArrayLike) -> float:
     share = np.asarray(colour) / 255.0
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_without_webgl_the_page_only_says_so(show: Callable[..., Any], said: list[str], screen: str) -> None:
+    script = "HTMLCanvasElement.prototype.getContext = () => null"
+    tab = show("document.getElementById('attractor').hidden", script, **SCREENS[screen])
+    size = SCREENS[screen]["viewport"]
+    box, main = tab.locator("#message").bounding_box(), tab.locator("main").bounding_box()
+    assert (main["width"], main["height"]) == (size["width"], size["height"])
+    assert box["x"] + box["width"] / 2 == pytest.approx(size["width"] / 2, abs=1)
+    assert "WebGL" in tab.inner_text("#message")
+    said.clear()  # three.js says it too
 
 
 def test_keys_turn_the_picture_that_has_the_focus(show: Callable[..., Any]) -> None:

@@ -237,6 +237,8 @@ def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[...
     assert np.ptp(changed("narrow")) < np.ptp(changed("onion"))
     tab.press("o")
     assert np.array_equal(tab.picture(), pictures["none"])
+    tab.page.select_option("#apart", "3")  # who says how far apart wants to see them
+    assert np.array_equal(tab.picture(), pictures["onion"])
 
 
 def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., Opened]) -> None:
@@ -274,6 +276,9 @@ def test_all_words_can_be_read(show: Callable[..., Opened], scheme: str) -> None
     tab.page.mouse.move(box["x"] + 50, box["y"] + 10)
     seen = {"h1", "frame", "inserted", "bridged", "front", "quarter", "summary", "li", "label", "speed", "hint"}
     assert seen <= readable_words(tab.page)
+    for button in ("#front", "#quarter", "#film", "#help", "summary", "#speed"):
+        tab.page.hover(button)
+        readable_words(tab.page)
     tab.press("?")
     assert {"keys", "kbd", "dd"} <= readable_words(tab.page)
 
@@ -525,7 +530,9 @@ def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Op
 
 @pytest.mark.parametrize("rights", ["allow-scripts", "allow-scripts allow-downloads"])
 def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Path, rights: str) -> None:
-    frame = html.escape(page(bridged()), quote=True)
+    motion = bridged()
+    insertion = Insertion(0.3 * motion.insertions[0].times)
+    frame = html.escape(page(replace(motion, times=0.3 * motion.times, insertions=(insertion,))), quote=True)
     host = f'<!doctype html><iframe sandbox="{rights}" srcdoc="{frame}" style="width: 640px; height: 400px"></iframe>'
     (tmp_path / "host.html").write_text(host, "utf-8")
     context = browser.new_context(reduced_motion="reduce")
@@ -547,7 +554,7 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
     assert inner.evaluate("motionmind.player.time") > 0.0
     tab.keyboard.press("Space")  # the clicked frame has the keys
     assert not inner.evaluate("motionmind.player.playing")
-    inner.evaluate("motionmind.player.seek(0.5)")
+    inner.evaluate("motionmind.player.seek(0.15)")
     tab.keyboard.press("?")
     assert inner.is_visible("#sheet")
     tab.keyboard.press("Escape")

@@ -120,7 +120,10 @@ function bind(player, stage, theme, refresh) {
     for (const name of VIEWS) $(name).setAttribute("aria-pressed", "false");
   });
   $("speed").addEventListener("change", () => (player.speed = Number($("speed").value)));
-  $("apart").addEventListener("change", refresh);
+  $("apart").addEventListener("change", () => {
+    $("onion").setAttribute("aria-pressed", "true"); // or nothing would happen
+    refresh();
+  });
 
   const { motion } = player;
   const starts = motion.insertions.map(({ times }) => times[0]);

@@ -221,4 +221,6 @@ function numbers(base64) {
 if (window.motionmind) {
   const data = JSON.parse($("data").textContent).beside;
   window.motionmind.attractor = new Attractor(data, window.motionmind.player, window.motionmind.theme);
+} else {
+  $("attractor").hidden = true; // the page says why nothing can be drawn
 }
