@@ -20,6 +20,7 @@ from motionmind.cli.pictures import render, sheet
 from motionmind.cli.printing import Notes, Warned
 from motionmind.cli.reviews import review
 from motionmind.cli.scores import compose, library
+from motionmind.cli.serving import serve
 from motionmind.cli.shells import completion
 from motionmind.cli.streams import forgiving
 from motionmind.cli.tweens import INTERRUPTED, tween
@@ -46,7 +47,7 @@ def app(context: click.Context) -> None:
 
 for _command in (
     *(tween, postures, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
-    *(vary, review, attractor, warm, completion),
+    *(vary, review, attractor, serve, warm, completion),
 ):
     app.add_command(_command)
 

@@ -113,6 +113,36 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
     return replace(movement, skeleton=fit.skeleton, rotations=rotations, root=rot.mul_vec(upright, root), **renamed)
 
 
+def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None = None) -> Motion:
+    """Bring a motion of human23 onto the joints of a posture: the inverse of `to_human23`, with y up.
+
+    Args:
+        motion: the motion, on human23.
+        like: a posture on the rig to move. Joints of its that have no counterpart stay as they are in it.
+        joints: {rig's joint: human23's joint} as for `joint_mapping`; None recognises the rig by its names.
+
+    Returns:
+        The motion on the rig's skeleton, its joints turned, and its pelvis placed, as human23's.
+
+    Raises:
+        SkeletonError: the rig does not map to human23, or its zero pose does not show how the body stands.
+    """
+    rig = like.skeleton
+    fit = _fit_human23(rig, joints)
+    source = dict(zip(reversed(fit.turns.tolist()), reversed(range(len(fit.turns))), strict=True))  # parents win
+    turned = rot.mul_inv(motion.skeleton.global_rotations(motion.rotations), fit.alignment)
+    placed = np.empty((len(motion), len(rig), 4))
+    for joint, parent in enumerate(rig.parents):
+        if joint in source:
+            placed[:, joint] = turned[:, source[joint]]
+        else:
+            own = like.rotations[joint]
+            placed[:, joint] = own if parent < 0 else rot.mul(placed[:, parent], own)
+    rotations = rot.normalise(rig.local_rotations(placed))
+    root = motion.root - rig.positions(rotations, np.zeros(3))[:, fit.pelvis]
+    return replace(motion, skeleton=rig, rotations=rotations, root=root, insertions=())
+
+
 def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) -> Movement:
     """Retarget movement to human23 if its joints map there; return it unchanged otherwise.
 

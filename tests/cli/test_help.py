@@ -82,6 +82,7 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "vary",
             "review",
             "attractor",
+            "serve",
             "warm",
             "completion",
         ),
@@ -136,8 +137,10 @@ def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 23
+    assert len(EXAMPLES) == 24
     for line in EXAMPLES:
+        if line.startswith("motionmind serve"):  # which does not end
+            continue
         program, *words = shlex.split(line)
         assert program == "motionmind"
         ran = run(*(found for word in words for found in (sorted(Path().glob(word)) if "*" in word else [word])))

@@ -257,7 +257,8 @@ def test_the_commands_and_the_python_of_a_guide_run(
     first = document == README  # whose first command runs in a test of its own
     for block in blocks(document.read_text("utf-8")):
         for line in commands_of(block)[first:]:
-            call(run, line)
+            if not line.startswith("motionmind serve"):  # which does not end
+                call(run, line)
         first = first and not commands_of(block)
         if block.language == "python":
             exec(compile(block.text, name_of(document), "exec"), namespace)

@@ -12,7 +12,7 @@ import pytest
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
-from motionmind.body.motion import Insertion, Motion
+from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError, SkeletonError
 from motionmind.formats.asf_amc import read_amc
@@ -21,6 +21,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import known_rig
 from motionmind.retarget.retarget import (
     filled_joints,
+    from_human23,
     joint_mapping,
     own_skeleton,
     read_joint_mapping,
@@ -147,6 +148,25 @@ def test_a_zero_pose_that_stands_is_seen_through(rig: str, legs: float, arms: fl
     np.testing.assert_array_equal(planned.times, PLAN[0].times)
     assert planned.bridged == PLAN[0].bridged
     assert found.name == source.name
+
+
+@pytest.mark.parametrize("rig", ["Mixamo", "Biovision"])
+def test_movement_goes_back_to_the_rig_that_it_came_from(rig: str) -> None:
+    there = disguise(dance(), rig_names(rig), spread())
+    back = from_human23(to_human23(there, up="y"), there.posture(0))
+    assert back.skeleton is there.skeleton
+    assert np.max(rot.angle(back.rotations, there.rotations)) < 1e-7
+    np.testing.assert_allclose(back.root, there.root, atol=1e-12)
+
+
+def test_joints_that_human23_lacks_stay_as_in_the_posture_given() -> None:
+    there = with_leaf(disguise(dance(), rig_names("Mixamo"), spread()), "a tail")
+    bent = there.rotations[3].copy()
+    bent[-1] = about("z", 30.0)
+    like = Posture(there.skeleton, bent, there.root[3])
+    back = from_human23(to_human23(there, up="y"), like)
+    tail = there.skeleton.index("a tail")
+    np.testing.assert_allclose(back.rotations[:, tail], np.tile(like.rotations[tail], (len(there), 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("rig", ["CMU, BVH", "CMU, ASF"])

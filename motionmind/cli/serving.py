@@ -1,0 +1,77 @@
+"""The command that serves movement to other programs."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import click
+
+from motionmind.cli.options import CORPUS, HOME, Section, command, option
+from motionmind.cli.printing import note
+from motionmind.cli.warming import warm_once
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError
+
+_AT_ONCE = 16  # connections
+_IDLE = 5  # seconds that a connection without a request stays open
+
+
+@command("motionmind serve --mmcp --corpus ballet")
+@option(
+    "--mmcp",
+    section=Section.OUTPUT,
+    is_flag=True,
+    required=True,
+    help="Speak MMCP, the protocol of animation programs such as Blender with Proscenium.",
+)
+@CORPUS
+@option(
+    "--host",
+    section=Section.OUTPUT,
+    default="127.0.0.1",
+    metavar="ADDRESS",
+    help="Listen at this address; any other than that of this computer lets others ask.",
+)
+@option("--port", section=Section.OUTPUT, type=click.IntRange(0, 65535), default=8000, help="Listen at this port.")
+@HOME
+def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> None:
+    """Serve movement in the style of a corpus to animation programs, until Ctrl-C.
+
+    A program sends a skeleton, poses at frames, waypoints and pins, and gets the movement between them, each stretch
+    with its certificate. It needs the extra: pip install "motionmind[mmcp]".
+    """
+    if not mmcp:
+        raise click.UsageError("Missing option '--mmcp': there is no other protocol.", click.get_current_context())
+    try:
+        import uvicorn
+
+        from motionmind.serve.guard import Guard
+        from motionmind.serve.mmcp import app
+    except ImportError as error:
+        raise MotionMindError(f'MMCP needs an extra: pip install "motionmind[mmcp]" ({error})') from None
+    from motionmind.tween.engine import Engine
+
+    engine = Engine.load(corpus, home)
+    warm_once()
+    try:
+        listening = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except OSError as error:
+        raise MotionMindError(f"cannot listen at {host}:{port}: {(error.strerror or str(error)).lower()}") from None
+    with listening:
+        address, at = listening.getsockname()[:2]
+        if not address.startswith("127.") and address != "::1":
+            note(f"whoever reaches {address} may ask for movement: there is no password")
+        shown = f"[{address}]" if ":" in address else address
+        click.echo(f"serving {displayed(engine.corpus.name)} at http://{shown}:{at} (Ctrl-C ends)")
+        config = uvicorn.Config(
+            Guard(app(engine), host),
+            log_level="error",
+            access_log=False,
+            ws="none",
+            server_header=False,
+            limit_concurrency=_AT_ONCE,
+            timeout_keep_alive=_IDLE,
+            timeout_graceful_shutdown=_IDLE,
+        )
+        uvicorn.Server(config).run(sockets=[listening])

@@ -1,0 +1,291 @@
+"""From poses, waypoints and pins on a time line to movement: tweens from pose to pose, each with its certificate.
+
+A tween goes from each pose to the next in the time between them, and takes up the movement of the one before. Where a
+waypoint lies between two poses, the body is first moved without it; the posture that it then has there is put on the
+waypoint, and the tweens go through that posture too. What is left to the given poses and waypoints (retargeting is not
+exact, and waypoints that are close together are not each a posture) is made up for by a correction that is linear in
+time between them. Pins turn limbs, in the pins' frames as far as it takes and less and less around them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.motion import Motion, Posture
+from motionmind.errors import NoPathError
+from motionmind.geometry import rotations as rot
+from motionmind.search.solve import Watch
+from motionmind.serve.order import Order, Pin, Waypoint
+from motionmind.serve.pins import chain_to, reach
+from motionmind.serve.rig import Rig
+from motionmind.tween.engine import Engine
+from motionmind.tween.result import Tween
+
+_APART = 0.4  # seconds at least between two postures that tweens join for a waypoint's sake
+_EASES = 0.3  # seconds before its first frame in which a pin begins to act, and after its last
+_STILL = 1e-4  # radians and metres within which two poses are one
+_MISSED = 1e-3  # metres by which a pin may be missed without a note
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A tween between two poses.
+
+    Attributes:
+        first: frame of the first pose.
+        last: frame of the second.
+        tween: the tween, on the corpus's joints.
+    """
+
+    first: int
+    last: int
+    tween: Tween
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """One movement.
+
+    Attributes:
+        rotations: of the order's joints [T, J, 4].
+        root: places of the root joint [T, 3], metres.
+        stretches: its tweens, in order.
+        notes: what the order may not have meant, in sentences.
+    """
+
+    rotations: Floats
+    root: Floats
+    stretches: tuple[Stretch, ...]
+    notes: tuple[str, ...]
+
+
+def perform(engine: Engine, order: Order, watch: Watch | None = None) -> list[Performance]:
+    """Return the movements of an order.
+
+    Args:
+        engine: the corpus that moves the body.
+        order: what is asked.
+        watch: see `Engine.tween`; its errors end the work.
+
+    Raises:
+        SkeletonError: the body does not map to the corpus's.
+        NoPathError: nothing joins two poses.
+        MotionMindError: what is asked cannot be.
+    """
+    return _Stage(engine, order, watch).perform()
+
+
+class _Stage:
+    """The work on one order."""
+
+    def __init__(self, engine: Engine, order: Order, watch: Watch | None) -> None:
+        self.engine, self.order, self.watch = engine, order, watch
+        self.rig = Rig(order.skeleton, engine.corpus)
+        self.hold = tuple(order.hold)
+        self.notes: list[str] = []
+
+    def perform(self) -> list[Performance]:
+        """Return the movements."""
+        order, given = self.order, self._whole_poses()
+        first, last = order.poses[0].frame, order.poses[-1].frame
+        if first > 0:
+            self.notes.append(f"still before frame {first}, the first with a pose")
+        if last < order.frames - 1:
+            self.notes.append(f"still after frame {last}, the last with a pose")
+        poses, out = self._with_waypoints(given), []
+        tried: list[list[Tween]] = [[] for _ in poses]
+        for sample in range(order.samples):
+            motion, stretches = self._move(poses, tried, sample)
+            motion = self._correct(motion, given)
+            motion, missed = self._pin(motion, [frame for frame, _ in given])
+            out.append(Performance(motion.rotations, motion.root, tuple(stretches), (*self.notes, *missed)))
+        return out
+
+    def _whole_poses(self) -> list[tuple[int, Posture]]:
+        """Return the frames and postures of the poses, with what is not given of them filled in."""
+        order, skeleton = self.order, self.order.skeleton
+        places = {one.frame: one.place for one in order.waypoints}
+        places |= {one.frame: one.root[[0, 2]] for one in order.poses if one.root is not None}
+        frames = sorted(places)
+        known = np.array([places[frame] for frame in frames]) if frames else order.stands[None, [0, 2]]
+        headings = {one.frame: one.heading for one in order.waypoints if one.heading is not None}
+        out = []
+        for pose in order.poses:
+            rotations = pose.rotations
+            if not pose.given.all():
+                like = Posture(skeleton, np.where(pose.given[:, None], rotations, rot.IDENTITY), np.zeros(3))
+                filled = self.rig.nearest(like, pose.given.astype(np.float64))
+                rotations = np.where(pose.given[:, None], rotations, filled)
+                lacks = [name for name, is_given in zip(skeleton.names, pose.given, strict=True) if not is_given]
+                self.notes.append(
+                    f"frame {pose.frame}: {len(lacks)} joints of the pose are not given, such as {lacks[0]}; they are "
+                    "those of the corpus's nearest posture"
+                )
+                if not pose.given[0] and pose.frame in headings:
+                    rotations = rotations.copy()
+                    rotations[0] = _facing(rotations[0], headings[pose.frame])
+            root = pose.root
+            if root is None:
+                x, z = (np.interp(pose.frame, frames or [0], known[:, axis]) for axis in (0, 1))
+                low = skeleton.positions(rotations, np.zeros(3))[:, 1].min()
+                root = np.array([x, order.lowest - low, z])
+            out.append((pose.frame, Posture(skeleton, rotations, root)))
+        return out
+
+    def _with_waypoints(self, given: list[tuple[int, Posture]]) -> list[tuple[int, Posture]]:
+        """Return the poses, and between them postures on waypoints."""
+        apart, chosen = _APART * self.order.fps, [frame for frame, _ in given]
+        passed: list[Waypoint] = []
+        for one in self.order.waypoints:
+            if chosen[0] < one.frame < chosen[-1] and min(abs(one.frame - frame) for frame in chosen) >= apart:
+                chosen.append(one.frame)
+                chosen.sort()
+                passed.append(one)
+        if not passed:
+            return given
+        motion, _ = self._move(given, [[] for _ in given], 0)
+        out = [*given]
+        for one in passed:
+            posture = motion.posture(one.frame)
+            rotations = posture.rotations.copy()
+            if one.heading is not None:
+                rotations[0] = _facing(rotations[0], one.heading)
+            x, z = one.place
+            out.append((one.frame, replace(posture, rotations=rotations, root=np.array([x, posture.root[1], z]))))
+        return sorted(out, key=lambda pair: pair[0])
+
+    def _move(
+        self, poses: list[tuple[int, Posture]], tried: list[list[Tween]], sample: int
+    ) -> tuple[Motion, list[Stretch]]:
+        """Return the motion through postures, still before the first and after the last, and its tweens.
+
+        Args:
+            poses: frames and postures, in order.
+            tried: tweens of earlier samples between each and the next; that of this sample is added.
+            sample: number of the sample.
+        """
+        order = self.order
+        rotations = np.empty((order.frames, len(order.skeleton), 4))
+        root = np.empty((order.frames, 3))
+        for (frame, posture), (following, _) in pairwise([*poses, (order.frames, poses[-1][1])]):
+            rotations[frame:following], root[frame:following] = posture.rotations, posture.root
+        rotations[: poses[0][0]], root[: poses[0][0]] = poses[0][1].rotations, poses[0][1].root
+        stretches: list[Stretch] = []
+        before: Motion | None = None
+        for ((first, a), (last, b)), found in zip(pairwise(poses), tried, strict=False):
+            if last - first < 2 or _is_same(a, b):
+                before = None
+                continue
+            tween = self._tween(a, b, last - first, before, found, sample)
+            found.append(tween)
+            stretches.append(Stretch(first, last, tween))
+            made = tween.motion.at(tween.motion.times[0] + np.arange(last - first + 1) / order.fps)
+            mine = self.rig.from_corpus(made, a)
+            rotations[first + 1 : last], root[first + 1 : last] = mine.rotations[1:-1], mine.root[1:-1]
+            before = replace(made, insertions=())
+        return Motion(order.skeleton, rotations, root, np.arange(order.frames) / order.fps), stretches
+
+    def _tween(
+        self, a: Posture, b: Posture, frames: int, before: Motion | None, found: list[Tween], sample: int
+    ) -> Tween:
+        """Return the tween from one posture to another in a number of frames."""
+        order = self.order
+        start, end = self.rig.to_corpus(a), self.rig.to_corpus(b)
+        options: dict[str, Any] = {
+            "duration": frames / order.fps,
+            "fps": order.fps,
+            "novelty": order.novelty,
+            "hold": self.hold,
+            "sample": order.seed > 0,
+            "seed": order.seed + sample,
+        }
+        if found and not order.seed:
+            try:
+                return self.engine.tween(start, end, before=before, watch=self.watch, **options, unlike=found)
+            except NoPathError:
+                self.notes.append(f"sample {sample}: there is no other movement in some of the {frames} frames")
+        return self.engine.tween(start, end, before=before, watch=self.watch, **options)
+
+    def _correct(self, motion: Motion, given: list[tuple[int, Posture]]) -> Motion:
+        """Return the motion exactly at the poses and the waypoints, by corrections linear in time between them."""
+        times = np.arange(len(motion))
+        frames = np.array([frame for frame, _ in given])
+        asked = np.stack([posture.rotations for _, posture in given])
+        rotations = rot.mul(rot.exp(_lines(times, frames, _turns(motion.rotations[frames], asked))), motion.rotations)
+        headed = [one for one in self.order.waypoints if one.heading is not None and one.frame not in frames]
+        if headed:
+            between = np.array([one.frame for one in headed])
+            turned = [_turns(rotations[one.frame, 0], _facing(rotations[one.frame, 0], one.heading)) for one in headed]
+            turn = _lines(times, *_with_zeros(between, np.stack(turned), frames))
+            rotations[:, 0] = rot.mul(rot.exp(turn), rotations[:, 0])
+        off = np.stack([posture.root for _, posture in given]) - motion.root[frames]
+        root = motion.root + _lines(times, frames, off)
+        free = [one for one in self.order.waypoints if one.frame not in frames]
+        if free:
+            between = np.array([one.frame for one in free])
+            level = np.stack([one.place for one in free]) - root[between][:, [0, 2]]
+            inside = (between > frames[0]) & (between < frames[-1])
+            if not inside.all():
+                self.notes.append("waypoints before the first pose or after the last are not passed")
+            root[:, [0, 2]] += _lines(times, *_with_zeros(between[inside], level[inside], frames))
+        return replace(motion, rotations=rot.normalise(rotations), root=root)
+
+    def _pin(self, motion: Motion, fixed: Sequence[int]) -> tuple[Motion, list[str]]:
+        """Return the motion with joints brought to their pins, poses excepted, and what is missed."""
+        skeleton, rotations, notes = self.order.skeleton, motion.rotations.copy(), []
+        eases = round(_EASES * self.order.fps)
+        pins = [pin for pin in self.order.pins if pin.frame not in fixed]
+        for joint in dict.fromkeys(pin.joint for pin in pins):
+            mine: list[Pin] = sorted((pin for pin in pins if pin.joint == joint), key=lambda pin: pin.frame)
+            frames = np.array([pin.frame for pin in mine])
+            turned = [*chain_to(skeleton, joint), joint]
+            goals = rotations[frames]
+            for goal, pin in zip(goals, mine, strict=True):
+                goal[:] = reach(skeleton, goal, motion.root[pin.frame], joint, pin.place)
+                if pin.rotation is not None:
+                    goal[joint] = pin.rotation
+            beside = [*fixed, frames[0] - eases, frames[-1] + eases]
+            turns = _turns(rotations[frames], goals)
+            for one in turned:
+                way = _lines(np.arange(len(motion)), *_with_zeros(frames, turns[:, one], np.array(beside)))
+                rotations[:, one] = rot.normalise(rot.mul(rot.exp(way), rotations[:, one]))
+        for pin in self.order.pins:
+            at = skeleton.positions(rotations[pin.frame], motion.root[pin.frame])[pin.joint]
+            if (missed := float(np.linalg.norm(at - pin.place))) > _MISSED:
+                notes.append(f"frame {pin.frame}: {skeleton.names[pin.joint]} is {missed:.3f} m from its pin")
+        return replace(motion, rotations=rotations), notes
+
+
+def _facing(q: Floats, heading: float | None) -> Floats:
+    """Return a rotation of the root [4] turned about the vertical to face a heading."""
+    turn = 0.0 if heading is None else heading - float(rot.heading(q))
+    return rot.mul(rot.about_vertical(turn), q)
+
+
+def _turns(q: Floats, wanted: Floats) -> Floats:
+    """Return the rotation vectors [..., 3] that lead from rotations to others."""
+    return rot.log(rot.mul_inv(wanted, q))
+
+
+def _lines(times: Ints, frames: Ints, values: Floats) -> Floats:
+    """Return values [K, ...] at increasing frames [K] linear in time between them, and constant beyond [T, ...]."""
+    flat = values.reshape(len(values), -1)
+    return np.stack([np.interp(times, frames, one) for one in flat.T], axis=1).reshape(len(times), *values.shape[1:])
+
+
+def _with_zeros(frames: Ints, values: Floats, beside: Ints) -> tuple[Ints, Floats]:
+    """Return frames and their values, with values of 0 in other frames, in order."""
+    zeros = np.setdiff1d(beside, frames)
+    every = np.concatenate([frames, zeros])
+    order = np.argsort(every)
+    return every[order], np.concatenate([values, np.zeros((len(zeros), *values.shape[1:]))])[order]
+
+
+def _is_same(a: Posture, b: Posture) -> bool:
+    return bool(rot.angle(a.rotations, b.rotations).max() < _STILL and np.abs(a.root - b.root).max() < _STILL)
