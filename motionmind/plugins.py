@@ -1,4 +1,4 @@
-"""What other packages add: formats, discretizations and flows, found by the entry points of installed packages.
+"""Formats, discretizations and flows that other packages add, found by the entry points of installed packages.
 
 A package is asked only for what MotionMind itself does not have, and imported only when it is used, so that neither the
 time to start nor what is built in depends on what is installed. See docs/how-to/plugins.md.
