@@ -11,6 +11,7 @@ from .chaos.flows import flow_of as flow_of
 from .corpus.store import list_corpora as list_corpora
 from .discretize.library import write_library as write_library
 from .discretize.naming import name_states as name_states
+from .discretize.protocol import Discretization as Discretization
 from .discretize.spec import make_discretization as make_discretization
 from .errors import CorpusError as CorpusError
 from .errors import FormatError as FormatError
@@ -24,6 +25,8 @@ from .formats import read_motion as read_motion
 from .formats import read_posture as read_posture
 from .formats import write_motion as write_motion
 from .formats import write_posture as write_posture
+from .formats.added import MotionReader as MotionReader
+from .formats.added import MotionWriter as MotionWriter
 from .learned.plausibility import Sighting as Sighting
 from .metrics.measure import Figure as Figure
 from .metrics.measure import measure as measure
@@ -59,6 +62,7 @@ __version__: str
 __all__ = [
     "Bridge",
     "CorpusError",
+    "Discretization",
     "Engine",
     "Explanation",
     "Figure",
@@ -68,6 +72,8 @@ __all__ = [
     "Motion",
     "MotionMindError",
     "MotionMindWarning",
+    "MotionReader",
+    "MotionWriter",
     "NoPathError",
     "Piece",
     "Posture",

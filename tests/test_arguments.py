@@ -18,6 +18,7 @@ from motionmind.corpus.gather import Gathering
 
 # Made by MotionMind and given to its users, who make none; errors and warnings take any message.
 ANSWERS = {"Bridge", "Explanation", "Figure", "Seam", "Sighting", "Source", "Tween", "TweenReport", "Wait"}
+PROTOCOLS = {"Discretization", "MotionReader", "MotionWriter"}  # which others implement
 SCORE = """title  Two bends of the knees
 body   human23
 legs
@@ -160,7 +161,11 @@ def public() -> dict[str, Callable[..., Any]]:
     found: dict[str, Callable[..., Any]] = {}
     for name in mm.__all__:
         thing = getattr(mm, name)
-        if name in ANSWERS or not callable(thing) or (isinstance(thing, type) and issubclass(thing, Exception)):
+        if (
+            name in ANSWERS | PROTOCOLS
+            or not callable(thing)
+            or (isinstance(thing, type) and issubclass(thing, Exception))
+        ):
             continue
         if name != "Engine":  # `fit` and `load` make one
             found[name] = thing

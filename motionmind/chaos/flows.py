@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from motionmind import plugins
 from motionmind._typing import Floats
 from motionmind.arguments import (
     as_floats,
@@ -22,10 +23,13 @@ from motionmind.arguments import (
     check_mapping,
     check_real,
     check_text,
+    described,
 )
 from motionmind.errors import MotionMindError, suggestion
 
 Field = Callable[..., Any]
+
+_GROUP: plugins.Group = "motionmind.flows"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +97,7 @@ def flow_of(name: str, **parameters: float) -> Flow:
     """Return the registered flow of this name.
 
     Args:
-        name: one of `FLOWS`.
+        name: one of `FLOWS`, or one that an installed package adds (an entry point in `motionmind.flows`).
         parameters: values for some of its parameters; the others keep their defaults.
 
     Raises:
@@ -104,13 +108,21 @@ def flow_of(name: str, **parameters: float) -> Flow:
     28.0
     """
     check_text("name", name)
-    if name not in FLOWS:
-        raise MotionMindError(f"no flow {name!r}{suggestion(name, sorted(FLOWS))}")
-    flow = FLOWS[name]
+    flow = FLOWS.get(name) or _added(name)
+    if flow is None:
+        raise MotionMindError(f"no flow {name!r}{suggestion(name, sorted({*FLOWS, *plugins.added(_GROUP)}))}")
     for given in parameters:
         if given not in flow.parameters:
             raise MotionMindError(f"{name} has no parameter {given!r}{suggestion(given, flow.parameters, 'it has')}")
     return replace(flow, parameters={**flow.parameters, **parameters})
+
+
+def _added(name: str) -> Flow | None:
+    """Return the flow that an installed package adds under a name; None if there is none."""
+    flow = plugins.load(_GROUP, name)
+    if flow is not None and (not isinstance(flow, Flow) or flow.name != name):
+        raise plugins.unfit(_GROUP, name, f"a Flow of that name, not {described(flow)}")
+    return flow
 
 
 # --- the registry -----------------------------------------------------------------------------------------------------

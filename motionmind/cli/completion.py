@@ -59,7 +59,9 @@ def joints(context: click.Context, _: click.Parameter, incomplete: str) -> list[
 
 def flows(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete the name of a flow."""
-    return [CompletionItem(name) for name in FLOWS if name.startswith(incomplete)]
+    from motionmind.plugins import added
+
+    return [CompletionItem(name) for name in (*FLOWS, *added("motionmind.flows")) if name.startswith(incomplete)]
 
 
 def _complete_named(context: click.Context, incomplete: str, suffix: str) -> list[CompletionItem]:

@@ -130,7 +130,7 @@ def check_outputs(outputs: Sequence[tuple[Path, tuple[str, ...]]], sources: Sequ
     places, read_places = [_resolve(path) for path in paths], [_resolve(path) for path in sources]
     for path, suffixes in outputs:
         folder = _resolve(path).parent
-        if suffixes and path.suffix.lower() not in suffixes:
+        if suffixes and not _is_one_of(path, suffixes):
             fault = f"the name must end in one of {', '.join(suffixes)}"
         elif places.count(_resolve(path)) > 1:
             fault = "it would be written twice"
@@ -144,6 +144,16 @@ def check_outputs(outputs: Sequence[tuple[Path, tuple[str, ...]]], sources: Sequ
             continue
         raise MotionMindError(f"{path}: cannot be written: {fault}")
     return paths
+
+
+def _is_one_of(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Return whether a file has one of some suffixes, or, where movement is written, one of an added format."""
+    suffix = path.suffix.lower()
+    if suffix in suffixes or ".bvh" not in suffixes:
+        return suffix in suffixes
+    from motionmind.plugins import added
+
+    return suffix.removeprefix(".") in added("motionmind.formats")
 
 
 def _resolve(path: Path) -> Path:

@@ -32,7 +32,7 @@ _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a chang
 _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
-    *("_cells.py", "_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py"),
+    *("_cells.py", "_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py", "plugins.py"),
     *("geometry", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
 )
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from typing import cast
 
+from motionmind import plugins
 from motionmind.arguments import check_mapping, check_path
 from motionmind.discretize.codebook import Codebook
 from motionmind.discretize.expert import ExpertLibrary
@@ -14,6 +15,8 @@ from motionmind.discretize.grids import EulerGrid, QuaternionGrid
 from motionmind.discretize.library import library_from_mapping, read_library
 from motionmind.discretize.protocol import Discretization
 from motionmind.errors import FormatError, MotionMindError, did_you_mean
+
+_GROUP: plugins.Group = "motionmind.discretizations"
 
 KINDS = ("codebook", "quaternion", "euler")
 
@@ -36,7 +39,8 @@ def make_discretization(
     coefficient by about half its angle. In a library, an orientation further off than the tolerance has no name.
 
     Args:
-        kind: codebook, quaternion, euler, or else the name or .toml file of a library.
+        kind: codebook, quaternion, euler, or else the name or .toml file of a library, or a kind that an installed
+            package adds (an entry point in `motionmind.discretizations`).
         tolerance: degrees.
         per_joint: degrees for single joints.
 
@@ -66,7 +70,12 @@ def make_discretization(
     except FormatError as error:
         if kind.endswith(".toml"):
             raise
-        hint = did_you_mean(kind, KINDS) or f"; the kinds without a library are {', '.join(KINDS)}"
+        if kind in plugins.added(_GROUP):
+            return _make_added(kind, {"tolerance": tolerance, "per_joint": per_joint})
+        hint = (
+            did_you_mean(kind, [*KINDS, *plugins.added(_GROUP)])
+            or f"; the kinds without a library are {', '.join(KINDS)}"
+        )
         raise FormatError(f"{error}{hint}") from None
 
 
@@ -93,6 +102,8 @@ def from_spec(spec: str | Mapping[str, object]) -> Discretization:
     if not isinstance(spec, Mapping):
         raise FormatError(f"discretization: must be an object with a kind, not {spec!r:.60}")
     kind = spec.get("kind")
+    if isinstance(kind, str) and kind not in _KEYS and kind in plugins.added(_GROUP):
+        return _make_added(kind, {str(key): value for key, value in spec.items() if key != "kind"})
     if not isinstance(kind, str) or kind not in _KEYS:
         raise FormatError(f"discretization: the kind must be one of {', '.join(_KEYS)}, not {kind!r:.60}")
     options = {str(key): value for key, value in spec.items() if key != "kind"}
@@ -107,6 +118,22 @@ def from_spec(spec: str | Mapping[str, object]) -> Discretization:
         raise
     except MotionMindError as error:
         raise FormatError(f"discretization: {error}") from None
+
+
+def _make_added(kind: str, options: Mapping[str, object]) -> Discretization:
+    """Make a discretization of a kind that an installed package adds."""
+    make = plugins.load(_GROUP, kind)
+    if not callable(make):
+        raise plugins.unfit(_GROUP, kind, "a class or function that makes a Discretization")
+    try:
+        made = make(**options)
+    except MotionMindError:
+        raise
+    except Exception as error:
+        raise FormatError(f"discretization: {plugins.failure(_GROUP, kind, error)}") from error
+    if not isinstance(made, Discretization) or made.kind != kind:
+        raise plugins.unfit(_GROUP, kind, "what makes a Discretization of that kind")
+    return made
 
 
 def _make(kind: str, options: dict[str, object]) -> Discretization:

@@ -13,7 +13,8 @@
 | `.gltf`, `.vrm` | as `.glb` | |
 | `.vrma` | as `.glb` | motion of people |
 
-`lossy_fields` names what a format cannot hold.
+Installed packages may add others, each named after its suffix (`motionmind.formats.added`). `lossy_fields` names what a
+format cannot hold.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, write_atomically
-from motionmind.formats.lossy import lossy_fields
+from motionmind.formats.added import added_suffixes, read_added, write_added
+from motionmind.formats.lossy import WRITABLE, lossy_fields
 
 __all__ = ["lossy_fields", "read_motion", "read_posture", "write_atomically", "write_motion", "write_posture"]
 
@@ -39,7 +41,6 @@ _REFUSED = {
     ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
     ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
 }
-_WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")
 
 
 def read_motion(
@@ -86,23 +87,26 @@ def read_motion(
         case ".bvh":
             from motionmind.formats.bvh import read_bvh
 
-            return read_bvh(path, unit=unit, fps=fps)
+            motion = read_bvh(path, unit=unit, fps=fps)
         case ".amc":
             from motionmind.formats.asf_amc import read_amc
 
-            return read_amc(path, asf) if fps is None else read_amc(path, asf, fps=fps)
+            motion = read_amc(path, asf) if fps is None else read_amc(path, asf, fps=fps)
         case ".txt":
             from motionmind.formats.papers import read_papers
 
-            return read_papers(path, skeleton=skeleton, rate=1.0 if fps is None else fps)
+            motion = read_papers(path, skeleton=skeleton, rate=1.0 if fps is None else fps)
         case ".npz" | ".pkl" | ".npy" as suffix:
-            return _read_smpl(path, suffix, fps)
+            motion = _read_smpl(path, suffix, fps)
         case ".json":
-            return _read_json(path)
-        case _:
+            motion = _read_json(path)
+        case ".glb" | ".gltf" | ".vrm" | ".vrma":
             from motionmind.formats.gltf import read_gltf
 
-            return read_gltf(path, unit=unit)
+            motion = read_gltf(path, unit=unit)
+        case _:
+            motion = read_added(path, fps)
+    return motion
 
 
 def _read_smpl(path: FilePath, suffix: str, fps: float | None) -> Motion:
@@ -193,7 +197,7 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
     check_path("path", path)
     check_type("motion", motion, Motion)
     check_type("unit", unit, str, Real, wanted="the name of a unit, or its metres")
-    suffix = _suffix(path, _WRITABLE, "written")
+    suffix = _suffix(path, WRITABLE, "written")
     if suffix == ".bvh":
         from motionmind.formats.bvh import write_bvh
         from motionmind.formats.programs import note_settings
@@ -216,10 +220,12 @@ def write_motion(path: FilePath, motion: Motion, *, unit: str | float = "cm") ->
         from motionmind.formats.npz import write_npz
 
         write_npz(path, motion)
-    else:
+    elif suffix == ".json":
         from motionmind.formats.motion_json import write_motion_json
 
         write_motion_json(path, motion)
+    else:
+        write_added(path, motion)
 
 
 def write_posture(path: FilePath, posture: Posture) -> None:
@@ -236,7 +242,7 @@ def write_posture(path: FilePath, posture: Posture) -> None:
     """
     check_path("path", path)
     check_type("posture", posture, Posture)
-    if _suffix(path, _WRITABLE, "written") == ".json":
+    if _suffix(path, WRITABLE, "written") == ".json":
         from motionmind.formats.posture_json import write_posture_json
 
         write_posture_json(path, posture)
@@ -245,10 +251,10 @@ def write_posture(path: FilePath, posture: Posture) -> None:
 
 
 def _suffix(path: FilePath, known: tuple[str, ...], verb: str) -> str:
-    """Return the lower-case suffix; an error if it is not `known` among those that can be "read" or "written"."""
+    """Return the lower-case suffix; an error if it is neither `known` nor added, of files to be "read" or "written"."""
     suffix = Path(path).suffix.lower()
-    if suffix not in known:
-        message = f"suffix {suffix!r} is unknown; files that can be {verb} end in {', '.join(known)}"
+    if suffix not in known and suffix not in (others := added_suffixes()):
+        message = f"suffix {suffix!r} is unknown; files that can be {verb} end in {', '.join((*known, *others))}"
         message = _REFUSED.get(suffix, message) if verb == "read" else message
         raise FormatError(message, path=path) if verb == "read" else MotionMindError(f"{path}: {message}")
     return suffix

@@ -13,7 +13,10 @@ from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import enumerated
 from motionmind.files import FilePath
+from motionmind.formats.added import added_suffixes, lossy_added
 from motionmind.geometry import rotations as rot
+
+WRITABLE = (".json", ".bvh", ".txt", ".glb", ".npz", ".vrma")  # suffixes of the formats that are written
 
 _TINY = 1e-6  # seconds and metres
 
@@ -44,6 +47,8 @@ def lossy_fields(motion: Motion, path: FilePath, source: FilePath | None = None)
     check_path("path", path)
     check_path("source", source, or_none=True)
     suffix = Path(path).suffix.lower()
+    if suffix not in WRITABLE and suffix in added_suffixes():
+        return lossy_added(path, motion)
     lossy = []
     if source is not None and Path(source).suffix.lower() == ".json":
         from motionmind.formats.motion_json import holds_variation

@@ -324,10 +324,10 @@ def vary(
     _check_watchers(posturewise, on_progress, watch)
     check_asked(alternatives, options)
     piece = piece if isinstance(piece, Piece) else Piece.of(piece)
-    if inserted is not None and engine is None:
-        raise MotionMindError("inserted limits what a corpus inserts, and none is given")
     length = check_whole("length", len(piece) if length is None else length, 1, LONGEST)
     limits = check_limits(inserted, stretch, len(piece), length)
+    if inserted is not None and engine is None:
+        raise MotionMindError("inserted limits what a corpus inserts, and none is given")
     course, found = _order_postures(len(piece), length, flow, nudge, depart, start, skip, step, transient, limits)
     variation = Variation(piece, course, found.indices)
     smooth: Smoothing | None = None
