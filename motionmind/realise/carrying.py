@@ -159,7 +159,7 @@ def carry(
         posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
-    start, off, heights = _with_detail(shape, detailed, bearing.loads, falls, flying, start, off, floor, fps)
+    start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
     return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom)
 
 
@@ -187,7 +187,7 @@ def _departures(
 def _with_detail(
     plain: Shape,
     detailed: Shape,
-    loads: Floats,
+    bearing: Bearing,
     falls: Floats,
     flying: Bools,
     root: Floats,
@@ -198,13 +198,13 @@ def _with_detail(
     """Return the root [N, 3], displacements of feet [N, feet, 3] and their heights [N, feet] with fine detail, metres.
 
     If legs reached for their places from a smooth root, their knees would move for the detail of all other joints: so
-    the root moves with it, and in flight so that the centre of mass does not. Feet that bear keep their height;
-    one that would swing into the floor is lifted, and not the body with it.
+    the root moves with it, and in flight so that the centre of mass does not. Feet that stand keep their places, and
+    those that bear their height; one that would swing into the floor is lifted, and not the body with it.
 
     Args:
         plain: the body without detail.
         detailed: the body with it.
-        loads: how much each foot bears [N, feet], from 0 to 1.
+        bearing: what bears it.
         falls: how far detail takes the root from the centre of mass [N, 3], metres.
         flying: where nothing bears the body [N].
         root: positions of the root without detail [N, 3], metres.
@@ -212,6 +212,7 @@ def _with_detail(
         floor: height of the floor [N], metres.
         fps: frames a second.
     """
+    loads = bearing.loads
     fades = fade_at_ends(len(loads), (True, True), fps)
     share = loads / np.maximum(loads.sum(axis=1, keepdims=True), 1.0)
     moves = np.zeros(root.shape)
@@ -227,6 +228,8 @@ def _with_detail(
         kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
     off = off.copy()
     off[..., 1] += kept - reached
+    slips = plain.tracks - detailed.tracks - (moved - root)[:, None, [0, 2]]
+    off[..., [0, 2]] += (bearing.holds(fps) * fades[:, None])[..., None] * slips
     return moved, off, kept
 
 

@@ -10,7 +10,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.knees import bend_of, cover, distance_of, keep_detail, slow_down, smoothed
+from motionmind.realise.knees import bend_of, distance_of, keep_detail, slow_down, smoothed
 from motionmind.realise.least_squares import bending_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
@@ -329,9 +329,8 @@ def ease_knees(
         return _lengthened(aims, lengths) - legs, shift
     lowest = (legs + off - shift[:, None])[..., 1] - room
     firm, out = (_lengthened(aims, longer) for longer in (lengths, finer))
-    sunk = np.maximum(np.minimum(firm[..., 1], lowest) - out[..., 1], 0.0)
-    for number in range(len(feet)):
-        out[:, number, 1] += cover(sunk[:, number], fps) * fade_at_ends(len(out), moving, fps)
+    # Detail that would take a foot into the floor is left out there: to lift the foot for a while would be seen.
+    out[..., 1] = np.maximum(out[..., 1], np.minimum(firm[..., 1], lowest))
     return out - legs, shift
 
 

@@ -384,6 +384,34 @@ def test_a_foot_that_wavers_into_the_floor_does_not_lift_the_body() -> None:
     assert lowest_height(human23(), found, went).min() > -0.006
 
 
+def on_bent_knees(frames: int) -> tuple[Floats, Floats]:
+    """A body that stands still on bent knees: rotations and root."""
+    bends = {"hip": (-20.0, 0.0, 0.0), "knee": (37.0, 0.0, 0.0), "ankle": (-17.0, 0.0, 0.0)}
+    q = posed({f"{side}_{joint}": bend for side in ("left", "right") for joint, bend in bends.items()}, frames)
+    return q, stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+
+
+def test_feet_that_stand_keep_their_places_under_legs_with_fine_detail() -> None:
+    q, root = on_bent_knees(61)
+    wavers = rot.mul(q, detail(61, 0.04, [human23().index(f"{side}_hip") for side in ("left", "right")]))
+    ankles = [human23().index(f"{side}_ankle") for side in ("left", "right")]
+
+    def slips(rotations: Floats, root: Floats) -> float:
+        return float(np.ptp(human23().positions(rotations, root)[:, ankles][..., [0, 2]], axis=0).max())
+
+    assert slips(wavers, root) > 0.05
+    assert slips(*grounded(wavers, root, plain=q)) < 0.015
+
+
+def test_fine_detail_of_knees_lifts_no_standing_foot_for_long() -> None:
+    q, root = on_bent_knees(61)
+    wavers = rot.mul(q, detail(61, 0.15, [human23().index(f"{side}_knee") for side in ("left", "right")]))
+    heights = limb_heights(human23(), *grounded(wavers, root, plain=q))[:, :2]
+    assert heights.max() < 0.02
+    assert heights.min() > -0.006
+    assert np.all(np.mean(heights < 0.004, axis=0) > 0.4)
+
+
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     still, leaps = np.full(31, 1.0), np.full(31, 0.3)
     on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY, 30.0)
