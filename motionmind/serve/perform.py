@@ -1,10 +1,11 @@
 """From poses, waypoints and pins on a time line to movement: tweens from pose to pose, each with its certificate.
 
 A tween goes from each pose to the next in the time between them, and takes up the movement of the one before. Where a
-waypoint lies between two poses, the body is first moved without it; the posture that it then has there is put on the
-waypoint, and the tweens go through that posture too. What is left to the given poses and waypoints (retargeting is not
-exact, and waypoints that are close together are not each a posture) is made up for by a correction that is linear in
-time between them. Pins turn limbs, in the pins' frames as far as it takes and less and less around them.
+waypoint lies between two poses, or a pose of some joints alone, the body is first moved without it; the posture that it
+then has there is put on the waypoint, or into the pose, and the tweens go through that posture too. What is left to the
+poses and the waypoints (retargeting is not exact, and waypoints that are close together are not each a posture) is made
+up for by a correction that is linear in time between them. Pins turn limbs, in the pins' frames as far as it takes and
+less and less around them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Watch
-from motionmind.serve.order import Order, Pin, Waypoint
+from motionmind.serve.order import Order, Pin, Pose, Waypoint
 from motionmind.serve.pins import chain_to, reach
 from motionmind.serve.rig import Rig
 from motionmind.tween.engine import Engine
@@ -30,7 +31,7 @@ from motionmind.tween.result import Tween
 _APART = 0.4  # seconds at least between two postures that tweens join for a waypoint's sake
 _EASES = 0.3  # seconds before its first frame in which a pin begins to act, and after its last
 _STILL = 1e-4  # radians and metres within which two poses are one
-_MISSED = 1e-3  # metres by which a pin may be missed without a note
+_MISSED = 1e-3  # metres by which a pin or a waypoint may be missed without a note
 
 
 @dataclass(frozen=True)
@@ -98,39 +99,28 @@ class _Stage:
             self.notes.append(f"still before frame {first}, the first with a pose")
         if last < order.frames - 1:
             self.notes.append(f"still after frame {last}, the last with a pose")
-        poses, out = self._with_waypoints(given), []
+        poses, fixed = self._with_postures_between(given), np.array([pose.frame for pose in order.poses])
+        out = []
         tried: list[list[Tween]] = [[] for _ in poses]
         for sample in range(order.samples):
             motion, stretches = self._move(poses, tried, sample)
-            motion = self._correct(motion, given)
-            motion, missed = self._pin(motion, [frame for frame, _ in given])
+            motion = self._on_waypoints(motion, fixed)
+            motion, missed = self._pin(motion, fixed.tolist())
             out.append(Performance(motion.rotations, motion.root, tuple(stretches), (*self.notes, *missed)))
         return out
 
     def _whole_poses(self) -> list[tuple[int, Posture]]:
-        """Return the frames and postures of the poses, with what is not given of them filled in."""
+        """Return the frames and postures of the poses that are whole, and of the first and the last, filled in."""
         order, skeleton = self.order, self.order.skeleton
         places = {one.frame: one.place for one in order.waypoints}
         places |= {one.frame: one.root[[0, 2]] for one in order.poses if one.root is not None}
         frames = sorted(places)
         known = np.array([places[frame] for frame in frames]) if frames else order.stands[None, [0, 2]]
-        headings = {one.frame: one.heading for one in order.waypoints if one.heading is not None}
         out = []
         for pose in order.poses:
-            rotations = pose.rotations
-            if not pose.given.all():
-                like = Posture(skeleton, np.where(pose.given[:, None], rotations, rot.IDENTITY), np.zeros(3))
-                filled = self.rig.nearest(like, pose.given.astype(np.float64))
-                rotations = np.where(pose.given[:, None], rotations, filled)
-                lacks = [name for name, is_given in zip(skeleton.names, pose.given, strict=True) if not is_given]
-                self.notes.append(
-                    f"frame {pose.frame}: {len(lacks)} joints of the pose are not given, such as {lacks[0]}; they are "
-                    "those of the corpus's nearest posture"
-                )
-                if not pose.given[0] and pose.frame in headings:
-                    rotations = rotations.copy()
-                    rotations[0] = _facing(rotations[0], headings[pose.frame])
-            root = pose.root
+            if not pose.given.all() and pose is not order.poses[0] and pose is not order.poses[-1]:
+                continue
+            rotations, root = self._filled(pose), pose.root
             if root is None:
                 x, z = (np.interp(pose.frame, frames or [0], known[:, axis]) for axis in (0, 1))
                 low = skeleton.positions(rotations, np.zeros(3))[:, 1].min()
@@ -138,27 +128,44 @@ class _Stage:
             out.append((pose.frame, Posture(skeleton, rotations, root)))
         return out
 
-    def _with_waypoints(self, given: list[tuple[int, Posture]]) -> list[tuple[int, Posture]]:
-        """Return the poses, and between them postures on waypoints."""
-        apart, chosen = _APART * self.order.fps, [frame for frame, _ in given]
-        passed: list[Waypoint] = []
+    def _filled(self, pose: Pose) -> Floats:
+        """Return the rotations of a pose [J, 4]; joints that are not given as in the corpus's nearest posture."""
+        if pose.given.all():
+            return pose.rotations
+        skeleton = self.order.skeleton
+        like = Posture(skeleton, np.where(pose.given[:, None], pose.rotations, rot.IDENTITY), np.zeros(3))
+        filled = self.rig.nearest(like, pose.given.astype(np.float64))
+        rotations = np.where(pose.given[:, None], pose.rotations, filled)
         for one in self.order.waypoints:
-            if chosen[0] < one.frame < chosen[-1] and min(abs(one.frame - frame) for frame in chosen) >= apart:
-                chosen.append(one.frame)
-                chosen.sort()
-                passed.append(one)
-        if not passed:
+            if one.frame == pose.frame and one.heading is not None and not pose.given[0]:
+                rotations[0] = _facing(rotations[0], one.heading)
+        lacks = [name for name, is_given in zip(skeleton.names, pose.given, strict=True) if not is_given]
+        self.notes.append(
+            f"frame {pose.frame}: {len(lacks)} joints of the pose are not given, such as {lacks[0]}; they are those of "
+            "the corpus's nearest posture"
+        )
+        return rotations
+
+    def _with_postures_between(self, given: list[tuple[int, Posture]]) -> list[tuple[int, Posture]]:
+        """Return the whole poses, and between them postures at the other poses and on waypoints.
+
+        They are those of the movement that passes the whole poses alone, with what is asked put in its place.
+        """
+        apart, chosen = _APART * self.order.fps, [pose.frame for pose in self.order.poses]
+        asked: dict[int, tuple[Pose | None, Waypoint | None]] = {
+            pose.frame: (pose, None) for pose in self.order.poses if all(pose.frame != frame for frame, _ in given)
+        }
+        for one in self.order.waypoints:
+            if one.frame in asked:
+                asked[one.frame] = asked[one.frame][0], one
+            elif chosen[0] < one.frame < chosen[-1] and min(abs(one.frame - frame) for frame in chosen) >= apart:
+                asked[one.frame] = None, one
+                chosen = sorted([*chosen, one.frame])
+        if not asked:
             return given
         motion, _ = self._move(given, [[] for _ in given], 0)
-        out = [*given]
-        for one in passed:
-            posture = motion.posture(one.frame)
-            rotations = posture.rotations.copy()
-            if one.heading is not None:
-                rotations[0] = _facing(rotations[0], one.heading)
-            x, z = one.place
-            out.append((one.frame, replace(posture, rotations=rotations, root=np.array([x, posture.root[1], z]))))
-        return sorted(out, key=lambda pair: pair[0])
+        between = [(frame, _put(motion.posture(frame), *what)) for frame, what in asked.items()]
+        return sorted([*given, *between], key=lambda pair: pair[0])
 
     def _move(
         self, poses: list[tuple[int, Posture]], tried: list[list[Tween]], sample: int
@@ -186,7 +193,7 @@ class _Stage:
             found.append(tween)
             stretches.append(Stretch(first, last, tween))
             made = tween.motion.at(tween.motion.times[0] + np.arange(last - first + 1) / order.fps)
-            mine = self.rig.from_corpus(made, a)
+            mine = _joining(self.rig.from_corpus(made, a), a, b)
             rotations[first + 1 : last], root[first + 1 : last] = mine.rotations[1:-1], mine.root[1:-1]
             before = replace(made, insertions=())
         return Motion(order.skeleton, rotations, root, np.arange(order.frames) / order.fps), stretches
@@ -212,29 +219,28 @@ class _Stage:
                 self.notes.append(f"sample {sample}: there is no other movement in some of the {frames} frames")
         return self.engine.tween(start, end, before=before, watch=self.watch, **options)
 
-    def _correct(self, motion: Motion, given: list[tuple[int, Posture]]) -> Motion:
-        """Return the motion exactly at the poses and the waypoints, by corrections linear in time between them."""
-        times = np.arange(len(motion))
-        frames = np.array([frame for frame, _ in given])
-        asked = np.stack([posture.rotations for _, posture in given])
-        rotations = rot.mul(rot.exp(_lines(times, frames, _turns(motion.rotations[frames], asked))), motion.rotations)
-        headed = [one for one in self.order.waypoints if one.heading is not None and one.frame not in frames]
+    def _on_waypoints(self, motion: Motion, frames: Ints) -> Motion:
+        """Return the motion on all waypoints, by corrections linear in time between them and the poses' frames."""
+        times, rotations, root = np.arange(len(motion)), motion.rotations.copy(), motion.root.copy()
+        free = [one for one in self.order.waypoints if frames[0] < one.frame < frames[-1] and one.frame not in frames]
+        headed = [(one.frame, one.heading) for one in free if one.heading is not None]
         if headed:
-            between = np.array([one.frame for one in headed])
-            turned = [_turns(rotations[one.frame, 0], _facing(rotations[one.frame, 0], one.heading)) for one in headed]
+            between = np.array([frame for frame, _ in headed])
+            turned = [_turns(rotations[frame, 0], _facing(rotations[frame, 0], heading)) for frame, heading in headed]
             turn = _lines(times, *_with_zeros(between, np.stack(turned), frames))
-            rotations[:, 0] = rot.mul(rot.exp(turn), rotations[:, 0])
-        off = np.stack([posture.root for _, posture in given]) - motion.root[frames]
-        root = motion.root + _lines(times, frames, off)
-        free = [one for one in self.order.waypoints if one.frame not in frames]
+            rotations[:, 0] = rot.normalise(rot.mul(rot.exp(turn), rotations[:, 0]))
         if free:
             between = np.array([one.frame for one in free])
             level = np.stack([one.place for one in free]) - root[between][:, [0, 2]]
-            inside = (between > frames[0]) & (between < frames[-1])
-            if not inside.all():
-                self.notes.append("waypoints before the first pose or after the last are not passed")
-            root[:, [0, 2]] += _lines(times, *_with_zeros(between[inside], level[inside], frames))
-        return replace(motion, rotations=rot.normalise(rotations), root=root)
+            root[:, [0, 2]] += _lines(times, *_with_zeros(between, level, frames))
+        for one in self.order.waypoints:
+            off = float(np.linalg.norm(root[one.frame, [0, 2]] - one.place))
+            if off > _MISSED:
+                self.notes.append(
+                    f"frame {one.frame}: {off:.3f} m from the waypoint: poses come first, and the body is still before "
+                    "the first and after the last"
+                )
+        return replace(motion, rotations=rotations, root=root)
 
     def _pin(self, motion: Motion, fixed: Sequence[int]) -> tuple[Motion, list[str]]:
         """Return the motion with joints brought to their pins, poses excepted, and what is missed."""
@@ -262,10 +268,30 @@ class _Stage:
         return replace(motion, rotations=rotations), notes
 
 
-def _facing(q: Floats, heading: float | None) -> Floats:
+def _put(posture: Posture, pose: Pose | None, waypoint: Waypoint | None) -> Posture:
+    """Return a posture with what a pose gives of it, and on a waypoint."""
+    rotations, root = posture.rotations.copy(), posture.root.copy()
+    if waypoint is not None:
+        root[[0, 2]] = waypoint.place
+        rotations[0] = rotations[0] if waypoint.heading is None else _facing(rotations[0], waypoint.heading)
+    if pose is not None:
+        rotations = np.where(pose.given[:, None], pose.rotations, rotations)
+        root = root if pose.root is None else pose.root
+    return replace(posture, rotations=rotations, root=root)
+
+
+def _joining(motion: Motion, a: Posture, b: Posture) -> Motion:
+    """Return a motion that begins and ends in two postures exactly, by a correction linear in time."""
+    ends, times = np.array([0, len(motion) - 1]), np.arange(len(motion))
+    turns = _turns(motion.rotations[ends], np.stack([a.rotations, b.rotations]))
+    rotations = rot.normalise(rot.mul(rot.exp(_lines(times, ends, turns)), motion.rotations))
+    root = motion.root + _lines(times, ends, np.stack([a.root, b.root]) - motion.root[ends])
+    return replace(motion, rotations=rotations, root=root)
+
+
+def _facing(q: Floats, heading: float) -> Floats:
     """Return a rotation of the root [4] turned about the vertical to face a heading."""
-    turn = 0.0 if heading is None else heading - float(rot.heading(q))
-    return rot.mul(rot.about_vertical(turn), q)
+    return rot.mul(rot.about_vertical(heading - float(rot.heading(q))), q)
 
 
 def _turns(q: Floats, wanted: Floats) -> Floats:

@@ -70,11 +70,12 @@ def test_poses_are_exact_and_each_stretch_has_its_certificate(url: str) -> None:
 
 
 def test_movement_goes_on_through_a_pose(url: str) -> None:
-    _, (sample,) = generate(url, ask([keyframe(0, A), keyframe(40, B), keyframe(90, C)], 91))
-    root = root_of(sample, "pelvis")
-    steps = np.linalg.norm(np.diff(root, axis=0), axis=1)
-    assert np.abs(np.diff(steps[38:42])).max() < 0.02
-    assert steps.max() < 0.1
+    _, (sample,) = generate(url, ask([keyframe(0, A), keyframe(50, B), keyframe(90, C)], 91))
+    velocity = 30.0 * np.diff(root_of(sample, "pelvis")[48:53], axis=0)
+    assert np.linalg.norm(velocity[2] - velocity[1]) < 0.25
+    turned = rot.from_matrix(rotations_of(sample, human23().names)[48:53].astype(np.float64))
+    turning = 30.0 * rot.log(rot.inv_mul(turned[:-1], turned[1:]))
+    assert np.linalg.norm(turning[2] - turning[1], axis=-1).max() < 1.5
 
 
 def test_the_same_request_has_the_same_answer(url: str) -> None:
@@ -106,6 +107,15 @@ def test_waypoints_are_passed_and_faced(url: str) -> None:
     assert len(certificates(document)[0]["stretches"]) == 4
 
 
+def test_waypoints_of_a_dense_path_are_all_passed(url: str) -> None:
+    frames = list(range(0, 81, 5))
+    places = [[0.01 * frame, 0.1 * np.sin(0.05 * frame)] for frame in frames]
+    path = {"type": "root_path", "frames": frames, "positions_xz": places}
+    poses = [keyframe(0, A, root=False), keyframe(80, B, root=False)]
+    _, (sample,) = generate(url, ask([*poses, path], 81))
+    np.testing.assert_allclose(root_of(sample, "pelvis")[frames][:, [0, 2]], places, atol=EXACT)
+
+
 def test_pins_are_reached_and_poses_stay(url: str) -> None:
     skeleton = human23()
     at = skeleton.positions(A.rotations, A.root)[skeleton.index("left_wrist")]
@@ -134,6 +144,29 @@ def test_part_of_a_pose_is_filled_from_the_corpus(url: str) -> None:
     asked = rot.to_matrix(A.rotations[[human23().index(name) for name in given]])
     np.testing.assert_allclose(rotations_of(sample, given)[0], asked, atol=EXACT)
     assert "20 joints" in document["extensions"]["MMCP_motion"]["notes"][0]["message"]
+
+
+def test_a_pose_of_one_arm_leaves_the_rest_to_the_movement(url: str) -> None:
+    arm = [name for name in human23().names if name.startswith("left_") and name[5:] in ("shoulder", "elbow", "wrist")]
+    part = keyframe(40, C, root=False)
+    part["joint_rotations"] = {name: part["joint_rotations"][name] for name in arm}
+    ends = [keyframe(0, A), keyframe(80, B)]
+    document, (sample,) = generate(url, ask([*ends, part], 81))
+    _, (without,) = generate(url, ask(ends, 81))
+    asked = rot.to_matrix(C.rotations[[human23().index(name) for name in arm]])
+    np.testing.assert_allclose(rotations_of(sample, arm)[40], asked, atol=EXACT)
+    others = [name for name in human23().names if name not in arm]
+    np.testing.assert_allclose(rotations_of(sample, others)[40], rotations_of(without, others)[40], atol=EXACT)
+    assert document["extensions"]["MMCP_motion"]["notes"] == []
+    assert len(certificates(document)[0]["stretches"]) == 2
+
+
+def test_a_waypoint_that_a_pose_rules_out_is_told(url: str) -> None:
+    path = {"type": "root_path", "frames": [0, 60, 65], "positions_xz": [[5.0, 0.0], [0.4, 0.3], [9.0, 9.0]]}
+    document, (sample,) = generate(url, ask([keyframe(0, A), keyframe(60, B), path], 66))
+    assert_at(sample, 0, A)
+    said = [note["message"] for note in document["extensions"]["MMCP_motion"]["notes"]]
+    assert [line.split(":")[0] for line in said if "waypoint" in line] == ["frame 0", "frame 65"]
 
 
 def test_the_rest_of_a_pose_is_at_rest_where_that_is_asked(url: str) -> None:
@@ -185,6 +218,17 @@ def test_a_foreign_rig_gets_movement_of_its_own(url: str) -> None:
     elbow, theirs = rotations_of(sample, ["mixamorig:LeftForeArm"]), rotations_of(mine, ["left_elbow"])
     bends = [np.arccos(np.clip((np.trace(m[:, 0], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)) for m in (elbow, theirs)]
     assert np.abs(bends[0] - bends[1]).max() < np.radians(3.0)
+
+
+def test_a_joint_that_the_corpus_lacks_goes_evenly_from_pose_to_pose(url: str) -> None:
+    a, b = on_rig(A), on_rig(B)
+    thumb = a.skeleton.names.index("mixamorig:LeftHandThumb1")
+    turned = b.rotations.copy()
+    turned[thumb] = rot.mul(turned[thumb], rot.from_axis_angle([1.0, 0.0, 0.0], 1.2))
+    b = Posture(b.skeleton, turned, b.root)
+    _, (sample,) = generate(url, ask([keyframe(0, a), keyframe(30, b)], 31, a.skeleton))
+    found = rot.from_matrix(rotations_of(sample, ["mixamorig:LeftHandThumb1"])[:, 0].astype(np.float64))
+    np.testing.assert_allclose(rot.angle(found[:-1], found[1:]), 1.2 / 30.0, atol=1e-3)
 
 
 def test_a_batch_has_an_answer_for_each(url: str) -> None:
