@@ -630,15 +630,18 @@ def test_without_webgl_it_says_so(show: Callable[..., Opened]) -> None:
 
 @pytest.mark.parametrize("screen", SCREENS)
 def test_it_fits_every_screen(show: Callable[..., Opened], screen: str) -> None:
-    tab = show(replace(bridged(), name="x" * 60), **SCREENS[screen])
+    tab = show(replace(still(1500, bridged().insertions), name="x" * 60), **SCREENS[screen])
     controls = reachable_controls(tab.page, 44 if SCREENS[screen].get("has_touch") else 32)
     assert {"canvas", "timeline", "play", "speed", "apart", "front", "dark", "help", "Colours"} <= controls
     room = "(({ clientWidth, clientHeight }) => [clientWidth, clientHeight])(document.getElementById('canvas'))"
     size = tab.get(room)
     assert size[1] > 180
-    for time in (0.0, 0.3, 0.5, 1.1):  # words come and go, and the picture stays as large
+    for time in (0.0, 0.3, 0.5, 149.9):  # words come and go, and the picture stays as large
         tab.get(f"motionmind.player.seek({time})")
         assert tab.get(room) == size
+    line = "(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth)(document.querySelector('header p'))"
+    assert tab.get(line)
+    assert tab.page.inner_text("header p").split() == "frame 1499 of 1499 149.90 s".split()
 
 
 def test_a_telephone_has_enough_of_two_pixels_to_one(show: Callable[..., Opened]) -> None:

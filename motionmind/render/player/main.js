@@ -12,7 +12,7 @@ import { Timeline } from "motionmind/timeline";
 
 const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
 const VIEWS = ["front", "side", "top", "quarter"];
-const ROOMY = "(min-width: 700px) and (min-height: 480px)"; // pages on which the legend is open at first
+const ROOMY = { width: 680, height: 380 }; // CSS pixels of a stage on which the legend is open at first
 
 const $ = (id) => document.getElementById(id);
 
@@ -29,7 +29,7 @@ function start() {
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
   $("ends").hidden = motion.insertions.every((insertion) => motion.ends(insertion).length === 0);
   writeLegend($("legend").querySelector("ul"), motion, body, data.colours);
-  $("legend").open = matchMedia(ROOMY).matches;
+  $("legend").open = $("stage").clientWidth >= ROOMY.width && $("stage").clientHeight >= ROOMY.height;
   writeKeys($("sheet").querySelector("dl"), motion);
 
   const refresh = () => {
