@@ -131,6 +131,15 @@ def test_a_tween_becomes_any_picture_at_once_or_later(suffix: str, run: Run, tmp
         assert re.sub(number, b"#", at_once) == re.sub(number, b"#", later)
         ours, theirs = (np.array(re.findall(number, text), dtype=np.float64) for text in (at_once, later))
         np.testing.assert_allclose(ours, theirs, atol=5.0)  # of the fine units that paths are drawn in
+    elif suffix == ".gif":
+        with Image.open(tmp_path / "tween.gif") as one, Image.open(tmp_path / "again.gif") as other:
+            assert one.n_frames == other.n_frames
+            for frame in range(one.n_frames):
+                one.seek(frame)
+                other.seek(frame)
+                assert one.info["duration"] == other.info["duration"]
+                pixels = (np.asarray(picture.convert("RGB"), dtype=float) for picture in (one, other))
+                assert np.abs(np.subtract(*pixels)).mean() < 0.01
     else:
         assert at_once == later
 
