@@ -21,6 +21,7 @@ from motionmind.geometry import rotations as rot
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
+CALMS = CALM, 0.5  # metres a second squared: level accelerations up to which weight is looked at; the second: rest
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
 
@@ -33,7 +34,8 @@ class Seen(NamedTuple):
             of the feet [T - 1], depth of the legs in each other [T]; metres and seconds.
         joints: speeds of the joints [T - 1, J], rad/s.
         bounce: vertical acceleration of the mass, up or down [T - 2], m/s^2; empty where masses are unknown.
-        lean: overhang where one limb bears and the mass is hardly accelerated [T], metres, else NaN; or empty.
+        lean: overhang where one limb bears and the mass is accelerated level by less than each of `CALMS` [T, 2],
+            metres, else NaN; or empty.
         fall: vertical acceleration in frames in the air whose neighbours are in the air, too, m/s^2.
         skates: whether a foot skates [T - 1].
         airborne: whether the body is in the air [T].
@@ -52,12 +54,13 @@ def see(motion: Motion, floor: float | Floats) -> Seen:
     """Look at movement at 30 frames a second above a floor, whose height may change from frame to frame [T]."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
     support = find_support(body, rotations, root, FPS, floor)
-    bounce, lean, fall = np.zeros(0), np.zeros(0), np.zeros(0)
+    bounce, lean, fall = np.zeros(0), np.zeros((0, len(CALMS))), np.zeros(0)
     if support.mass is not None and support.overhang is not None:
         accelerations = FPS**2 * np.diff(support.mass, 2, axis=0)
-        calm = np.zeros(len(motion), dtype=bool)
-        calm[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2]) < CALM
-        lean = np.where(calm & (support.bears.sum(axis=1) == 1), support.overhang, np.nan)
+        level = np.full((len(motion), 1), np.inf)
+        level[1:-1, 0] = np.hypot(accelerations[:, 0], accelerations[:, 2])
+        alone = support.bears.sum(axis=1, keepdims=True) == 1
+        lean = np.where((level < CALMS) & alone, support.overhang[:, None], np.nan)
         bounce = np.abs(accelerations[:, 1])
         up = support.airborne
         fall = accelerations[up[:-2] & up[1:-1] & up[2:], 1]
@@ -79,13 +82,13 @@ class Limits(NamedTuple):
         most: of each of `MEASURES`; that of the joints as a multiple of `joints`.
         joints: what each joint's greatest speed exceeds in one window of two hundred [J], rad/s.
         own: share of the dancers' windows that are beyond any of them.
-        leans: share of the dancers' windows in which the mass is beyond `Dancers.lean`.
+        leans: shares of the dancers' windows in which the mass is beyond each of `Dancers.lean` [2].
     """
 
     most: dict[str, float]
     joints: Floats
     own: float
-    leans: float
+    leans: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +141,8 @@ class Dancers:
         count = min(map(len, all_of.values()))
         beyond = np.any([all_of[name][:count] > most[name] for name in MEASURES], axis=0)
         leans = [np.nan_to_num(seen.lean) > self.lean for seen in chosen if len(seen.lean)]
-        return Limits(most, each, float(beyond.mean()), float(greatest(leans, 0).mean()) if leans else 0.0)
+        out = greatest(leans, 0).mean(axis=0) if leans else np.zeros(len(CALMS))
+        return Limits(most, each, float(beyond.mean()), out)
 
     def worst(self, seen: Seen) -> dict[str, float]:
         """How many times as great as its limit the greatest of each of `MEASURES` is."""
@@ -153,9 +157,10 @@ class Dancers:
         return _percentile([seen.bounce for seen in self.seen])
 
     @cached_property
-    def lean(self) -> float:
-        """The 99th percentile of how far it is outside of what they stand on, on one limb and at ease, metres."""
-        return _percentile([seen.lean[np.isfinite(seen.lean)] for seen in self.seen])
+    def lean(self) -> Floats:
+        """The 99th percentiles of how far it is outside of what they stand on, as in `Seen` [2], metres."""
+        leans = np.concatenate([seen.lean for seen in self.seen])
+        return np.array([_percentile([those[np.isfinite(those)]]) for those in leans.T])
 
     def far_pairs(self, count: int, seed: int) -> list[tuple[int, int]]:
         """Random pairs of postures."""

@@ -110,9 +110,11 @@ def _row(
         "turn": float(turns.mean()),
         "own": float("nan"),
         "own_leans": float("nan"),
+        "own_rests": float("nan"),
         "any": 0,
         **dict.fromkeys(MEASURES, float("nan")),
         "leans": 0,
+        "rests": 0,
         "crossed": 0,
         "rise": float("nan"),
         "skates": float("nan"),
@@ -122,13 +124,16 @@ def _row(
     if motion is None or seen is None or danced is None:
         return row
     worst, limits = danced.worst(seen), danced.limits(len(motion))
+    leans, rests = np.any(seen.lean > danced.lean, axis=0)
     return row | {
         "seconds": float(motion.times[-1]),
         "own": limits.own,
-        "own_leans": limits.leans,
+        "own_leans": float(limits.leans[0]),
+        "own_rests": float(limits.leans[1]),
         "any": int(max(worst.values()) > 1.0),
         **worst,
-        "leans": int(bool(np.any(seen.lean > danced.lean))),
+        "leans": int(leans),
+        "rests": int(rests),
         "crossed": int(seen.greatest["legs"].max() > CROSSED),
         "rise": standing_rise(motion.skeleton, motion.rotations, motion.root) if kind == "one leg" else float("nan"),
         "skates": float(seen.skates.mean()) if len(seen.skates) else 0.0,
@@ -164,6 +169,8 @@ def tell(rows: list[Row]) -> str:
         "bounce over the dancers'": lambda r: f"{r['rows'][0]['bounce']:.2f}",
         "leans": lambda r: _interval(r["rows"], "leans"),
         "their own windows": lambda r: f"{_mean(r['rows'], 'own_leans'):.0%}",
+        "leans at rest": lambda r: _interval(r["rows"], "rests"),
+        "their own, at rest": lambda r: f"{_mean(r['rows'], 'own_rests'):.0%}",
         "legs over 3 cm": lambda r: _interval(r["rows"], "crossed"),
         "skates over the dancers'": lambda r: f"{_mean(r['rows'], 'skates') / r['rows'][0]['own_skates']:.2f}",
         "standing feet that rise": lambda r: _rises(r["one leg"]),
