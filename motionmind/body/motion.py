@@ -246,7 +246,7 @@ class Motion:
             rate: postures a second, at most FASTEST.
 
         Raises:
-            MotionMindError: the rate is out of that range, or gives too many frames (`check_size`).
+            MotionMindError: the rate is out of that range, or gives too many frames (as `at`).
         """
         check_real("rate", rate)
         if not 0.0 < rate <= FASTEST:
@@ -255,17 +255,22 @@ class Motion:
             )
         span = self.times[-1] - self.times[0]
         steps = np.floor(span * rate + 1e-3)
-        check_size(steps + 1.0, len(self.skeleton), self.name)
+        self._check_size(steps + 1.0)
         return self.at(self.times[0] + np.arange(steps + 1) / rate)
+
+    def _check_size(self, frames: float) -> None:
+        """Check that so many frames may be made of these; of a recording, however long, about as many may."""
+        if frames > 2.0 * len(self):
+            check_size(frames, len(self.skeleton), self.name)
 
     def at(self, times: Floats) -> Motion:
         """Return the motion at increasing `times` [N], seconds: rotations by slerp, root linearly; still beyond it.
 
         Raises:
-            MotionMindError: there are too many of them (`check_size`).
+            MotionMindError: there are too many of them (`check_size`), and more than twice as many as there are frames.
         """
         times = as_floats("times", times)
-        check_size(len(times), len(self.skeleton), self.name)
+        self._check_size(len(times))
         if len(self) == 1:
             frames = np.zeros(len(times), dtype=int)
             return replace(self, rotations=self.rotations[frames], root=self.root[frames], times=times, keyframed=False)

@@ -278,20 +278,34 @@ class Corpus:
             keyframed=self.rate is None,
         )
 
-    def recording(self, clip: Clip) -> Motion:
-        """Return a clip as a motion of its N postures and, if the corpus keeps detail, K frames between each two."""
-        postures, between = self.motion(clip), self.detail.shape[1]
+    def recording(self, clip: Clip, start: int = 0, stop: int | None = None) -> Motion:
+        """Return a clip as a motion of its N postures and, if the corpus keeps detail, K frames between each two.
+
+        Args:
+            clip: one of the clips.
+            start, stop: the first of the frames to return, and the one after the last; all by default.
+        """
+        between = self.detail.shape[1]
         if between == 0 or len(clip) == 1:
-            return postures
-        times = subdivide_times(postures.times, between)
-        detail = np.zeros((len(times), len(self.skeleton), 3))
-        detail[np.arange(len(times)) % (between + 1) > 0] = self.detail[clip.start : clip.stop - 1].reshape(
-            -1, len(self.skeleton), 3
-        )
-        spline = rotation_spline(postures.times, postures.rotations, times)
+            postures = self.motion(clip)
+            return postures if start == 0 and stop is None else postures.slice(start, stop or len(postures))
+        here = slice(clip.start, clip.stop)
+        whole = self.recorded_times(clip)
+        frames = np.arange(len(whole))[start:stop]
+        move, number = np.divmod(frames, between + 1)
+        is_between = number > 0
+        detail = np.zeros((len(frames), len(self.skeleton), 3))
+        detail[is_between] = self.detail[clip.start + move[is_between], number[is_between] - 1]
+        times = whole[frames]
+        spline = rotation_spline(self.times[here], self.rotations[here], times)
         rotations = rot.normalise(rot.mul(spline, rot.exp(detail)))
-        root = natural_spline(postures.times, postures.root, times)
+        root = natural_spline(self.times[here], self.root[here], times)
         return Motion(self.skeleton, rotations, root, times, clip.name)
+
+    def recorded_times(self, clip: Clip) -> Floats:
+        """Return the times of the frames of `recording`, seconds."""
+        times, between = self.times[clip.start : clip.stop], self.detail.shape[1]
+        return times if between == 0 or len(clip) == 1 else subdivide_times(times, between)
 
 
 def subdivide_times(times: Floats, between: int) -> Floats:

@@ -32,6 +32,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
+from motionmind.learned.sampled import BLOCK, Sampled
 
 SHORTEST, LONGEST = 0.3, 5.0  # seconds between the still moments of a window
 SMOOTHED = 0.5  # seconds over which speeds are averaged to find still moments
@@ -119,14 +120,15 @@ class Pace:
 
 def learn_pace(corpus: Corpus) -> Pace:
     """Learn the pace of a corpus."""
-    recordings = [corpus.recording(clip) for clip in corpus.clips if len(clip) > 1]
-    clips = [clip for clip in (recording.resample(FPS) for recording in recordings) if len(clip) > 1]
-    steps = [way_of(clip) for clip in clips]
+    recordings = [Sampled(corpus, clip, FPS) for clip in corpus.clips if len(clip) > 1]
+    clips = [recording for recording in recordings if len(recording) > 1]
+    steps = [np.concatenate([way_of(block).parts for block in clip.blocks(BLOCK, overlap=1)]) for clip in clips]
     joints = len(corpus.skeleton)
     usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
     greatest, slowest = fastest, np.zeros(1)
     if steps:
-        speeds = FPS * np.concatenate([step.parts for step in steps])
+        speeds = np.concatenate(steps)
+        speeds *= FPS
         each = np.stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]], axis=1)
         usual = np.maximum(each.mean(axis=0), usual)
         rare = np.percentile(speeds, RARE, axis=0)
@@ -134,9 +136,9 @@ def learn_pace(corpus: Corpus) -> Pace:
         least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
         fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
         greatest = np.maximum(speeds.max(axis=0), fastest)
-        seconds = [over_seconds(FPS * step.joints.mean(axis=1), FPS) for step in steps]
+        seconds = [over_seconds(FPS * step[:, :joints].mean(axis=1), FPS) for step in steps]
         slowest = np.percentile(np.concatenate(seconds), [100.0 - RARE])
-    windows = [_windows(clip, step.joints.mean(axis=1)) for clip, step in zip(clips, steps, strict=True)]
+    windows = [_windows(clip, step[:, :joints].mean(axis=1)) for clip, step in zip(clips, steps, strict=True)]
     efforts = np.concatenate([np.zeros(0), *(_effort(way, usual) for way, _ in windows)])
     logs = np.concatenate([np.zeros(0), *(np.log(seconds) for _, seconds in windows)])
     return Pace(usual, fastest, greatest, slowest, _fit(efforts, logs))
@@ -153,7 +155,7 @@ def _effort(way: Way, usual: Floats) -> Floats:
     return np.asarray(np.log(BEGINS + joints + np.hypot(travel, 0.5 * turn)))
 
 
-def _windows(clip: Motion, steps: Floats) -> tuple[Way, Floats]:
+def _windows(clip: Sampled, steps: Floats) -> tuple[Way, Floats]:
     """Return the ways and durations between a clip's still moments, of each two that are as far apart as a window.
 
     Args:
@@ -161,10 +163,21 @@ def _windows(clip: Motion, steps: Floats) -> tuple[Way, Floats]:
         steps: angle that the mean joint turns by from each frame to the next [T - 1].
     """
     still = find_still(steps)
-    pairs = [(i, k) for n, i in enumerate(still) for k in still[n + 1 :] if SHORTEST <= (k - i) / FPS <= LONGEST]
+    rotations, root = clip.take(still)
+    stops = np.searchsorted(still, still + LONGEST * FPS, side="right")
+    pairs = [
+        (i, k)
+        for i, stop in enumerate(stops)
+        for k in range(i + 1, stop)
+        if SHORTEST <= (still[k] - still[i]) / FPS <= LONGEST
+    ]
     begins, ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    rotations, root = (clip.rotations[begins], clip.rotations[ends]), (clip.root[begins], clip.root[ends])
-    return ways(clip.skeleton, rotations, root), (ends - begins) / FPS
+    parts = [slice(start, start + BLOCK) for start in range(0, max(len(pairs), 1), BLOCK)]
+    found = [
+        ways(clip.skeleton, (rotations[begins[part]], rotations[ends[part]]), (root[begins[part]], root[ends[part]]))
+        for part in parts
+    ]
+    return Way(*map(np.concatenate, zip(*found, strict=True))), (still[ends] - still[begins]) / FPS
 
 
 def find_still(steps: Floats) -> Ints:

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.contact import RATE, find_floor
+from motionmind.body.contact import RATE, floor_height, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.learned.pace import way_of
+from motionmind.learned.sampled import BLOCK, Sampled
 
 MEASURES = (*SEEN, "pace")
 ABOUT = {  # the unit of each, and what it is
@@ -35,7 +36,7 @@ BEYOND = 99.5  # percentile of the corpus's own stretches
 # What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, and times as fast.
 TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0])
 _MOST = 40_000  # frames of a corpus that are measured, about
-_PIECE = 120  # frames of each piece of a corpus that has more
+_PIECE = BLOCK // 32  # frames of each piece of a corpus that has more
 
 
 @dataclass(frozen=True)
@@ -108,8 +109,14 @@ def summarise_shown(motion: Motion, fastest: Floats, floor: float) -> Floats:
 
 
 def _summarise(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, str]:
-    """Return the most that a movement shows of each of `MEASURES` [M], and the name of its fastest part."""
-    frames, speeds = _show(motion, fastest, floor)
+    """Return the most that a movement shows of each of `MEASURES` [M], and the name of its fastest part.
+
+    The floor's height is in metres; None stands for 0, or lower where the body is.
+    """
+    sampled = at_rate(motion)
+    if floor is None:
+        floor = floor_of(sampled.skeleton, sampled.rotations, sampled.root)
+    frames, speeds = _show(sampled, fastest, floor)
     parts = (*motion.skeleton.names, FACING, "travel")
     return greatest(frames), parts[int(speeds.max(axis=0).argmax())] if len(speeds) else ""
 
@@ -118,15 +125,10 @@ def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _show(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, Floats]:
-    """Return what a movement shows in each frame at 30 a second [T, M], and how many times as fast as its fastest each
-    part is between frames [T - 1, J + 2].
-
-    The floor's height is in metres; None stands for 0, or lower where the body is.
-    """
-    sampled = at_rate(motion)
-    where = sampled.skeleton, sampled.rotations, sampled.root
-    frames = implausibility(*where, RATE, floor_of(*where) if floor is None else floor)
+def _show(sampled: Motion, fastest: Floats, floor: float) -> tuple[Floats, Floats]:
+    """Return what movement shows in each frame at 30 a second [T, M], above a floor at a height in metres, and how many
+    times as fast as its fastest each part is between frames [T - 1, J + 2]."""
+    frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
     pace = np.full((len(sampled), 1), np.nan)
     speeds = RATE * way_of(sampled).parts / fastest
     pace[1:, 0] = speeds.max(axis=1)
@@ -139,13 +141,18 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
     every = int(np.ceil(RATE * seconds / _MOST))
     pieces = 0
     for clip in corpus.clips:
-        recording = at_rate(corpus.recording(clip))
-        floor = find_floor(recording.skeleton, recording.rotations, recording.root, heels=True)
-        size = len(recording) if every <= 1 else _PIECE
-        for start in range(0, len(recording), size):
-            if every <= 1 or pieces % every == 0:
-                yield _show(recording.slice(start, start + size), fastest, floor)[0]
-            pieces += 1
+        recording = Sampled(corpus, clip, RATE, smooth=True)
+        size = max(len(recording), BLOCK) if every <= 1 else _PIECE
+        lowest: list[Floats] = []
+        kept: list[Motion] = []
+        for block in recording.blocks(max(size, BLOCK)):
+            lowest.append(lowest_height(block.skeleton, block.rotations, block.root))
+            for start in range(0, len(block), size):
+                if every <= 1 or pieces % every == 0:
+                    kept.append(block.slice(start, start + size))
+                pieces += 1
+        floor = floor_height(np.concatenate(lowest))
+        yield from (_show(piece, fastest, floor)[0] for piece in kept)
 
 
 def _greatest_of_stretches(values: Floats) -> Floats:

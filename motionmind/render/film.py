@@ -22,10 +22,13 @@ from motionmind.errors import MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.jit import jit
 from motionmind.render.stage import Stage
-from motionmind.render.timing import HOLD, SLOWEST, frame_rate, frame_times
+from motionmind.render.timing import HOLD, SLOWEST, USUAL_FRAMES, film_rate, frame_rate, frame_times
 
 _GIF_RATE, _GIF_MOST = 25.0, 50.0  # frames a second: at most by default; at most of all, as browsers play it
 _MP4_RATE, _MP4_MOST = 60.0, 120.0
+# Frames times joints of the motion for each frame that an MP4 has besides the usual ones: films of people have as many
+# frames as were recorded, however long.
+_OF_PLACES = 16
 _COLOURS = 255  # of a GIF's palette; one more stands for unchanged pixels
 _SAMPLES = 10  # frames from which the palette is chosen
 _CELLS = 64  # levels of each of red, green and blue that are told apart when the palette is looked up
@@ -45,22 +48,24 @@ def write_film(
         path: the file.
         motion: the motion, on any skeleton.
         fps: frames a second, from 0.01 to 50 in a GIF, to 120 in an MP4; by default the motion's own (25 if fewer than
-            12), at most 25 in a GIF and 60 in an MP4.
+            12), at most 25 in a GIF and 60 in an MP4, or so few that a GIF has 1,000 in all, and an MP4 no more than
+            that and a sixteenth of the motion's frames times joints.
         view: the name of one of `view.VIEWS`.
         size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
-        MotionMindError: the suffix is another, a number is out of range, the extra for MP4 is not installed, or the
-            file cannot be written.
+        MotionMindError: the suffix is another, a number is out of range, there would be more than four times as many
+            frames, the extra for MP4 is not installed, or the file cannot be written.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in {".gif", ".mp4"}:
         raise MotionMindError(f"{path}: a film is a .gif or an .mp4, not {suffix or 'a name without suffix'}")
     usual, most = (_GIF_RATE, _GIF_MOST) if suffix == ".gif" else (_MP4_RATE, _MP4_MOST)
-    rate = min(frame_rate(motion), usual) if fps is None else fps
-    if not SLOWEST <= rate <= most:
-        raise MotionMindError(f"{path}: a {suffix} has from {SLOWEST:g} to {most:g} frames a second, not {rate:g}")
+    if fps is not None and not SLOWEST <= fps <= most:
+        raise MotionMindError(f"{path}: a {suffix} has from {SLOWEST:g} to {most:g} frames a second, not {fps:g}")
+    frames = USUAL_FRAMES if suffix == ".gif" else USUAL_FRAMES + len(motion) * len(motion.skeleton) // _OF_PLACES
+    rate = film_rate(motion, min(frame_rate(motion), usual), fps, frames)
     stage = Stage(motion, frame_times(motion, rate), view=view, size=size, first=first)
     write_atomically(path, gif(stage) if suffix == ".gif" else mp4(stage, rate))
 

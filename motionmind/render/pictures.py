@@ -34,15 +34,16 @@ def write_picture(
         path: the file.
         motion: the motion, on any skeleton.
         fps: frames a second of a film, from 0.01 to 50 (GIF), 120 (MP4) or 60 (SVG); by default 12 in an SVG, elsewhere
-            the motion's own (25 if fewer than 12), at most 25 in a GIF and 60 in an MP4.
+            the motion's own (25 if fewer than 12), at most 25 in a GIF and 60 in an MP4. Of long movement they are
+            fewer, and a GIF or an SVG has 1,000 in all; four times as many may be asked for.
         view: viewpoint of a film or of one posture: "quarter" (the default), "front", "side", "left" or "top".
         size: height of a film or of one posture, pixels, from 120 to 2160, by default 480; a flat movement makes the
             picture lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
-        MotionMindError: the suffix is unknown, an option does not apply to it or is out of range, the extra for MP4 is
-            not installed, or the file cannot be written.
+        MotionMindError: the suffix is unknown, an option does not apply to it or is out of range, a film would have too
+            many frames, the extra for MP4 is not installed, or the file cannot be written.
 
     >>> import numpy as np
     >>> from motionmind import Posture, human23, write_picture

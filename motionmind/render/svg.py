@@ -25,7 +25,7 @@ from motionmind.render.markup import hexadecimal, xml_text
 from motionmind.render.palette import BRIDGED, GRID, GROUND, INK, PAPER, SHADOW, TEXT, TRACK, VIOLET
 from motionmind.render.solids import EMPTY
 from motionmind.render.stage import GHOST, FigurePlate, Stage
-from motionmind.render.timing import HOLD, SLOWEST, frame_times
+from motionmind.render.timing import HOLD, SLOWEST, film_rate, frame_times
 from motionmind.render.trace import Lines, outlines, ridges, smooth
 
 _RATE, _MOST = 12.0, 60.0  # frames a second: by default, as in drawn animation; at most, as screens have
@@ -49,13 +49,14 @@ def write_svg(
     Args:
         path: the file.
         motion: the motion, on any skeleton.
-        fps: frames a second, from 0.01 to 60; 12 by default.
+        fps: frames a second, from 0.01 to 60; by default 12, or so few that there are 1,000 in all.
         view: the name of one of `view.VIEWS`.
         size: height of the picture, pixels, from 120 to 2160; a flat movement makes it lower.
         first: number of the motion's first frame in the longer motion that it is a part of.
 
     Raises:
-        MotionMindError: the rate, view or size is invalid, or the file cannot be written.
+        MotionMindError: the rate, view or size is invalid, there would be more than 4,000 frames, or the file cannot be
+            written.
     """
     write_atomically(path, svg(motion, fps=fps, view=view, size=size, first=first).encode())
 
@@ -67,7 +68,7 @@ def svg(motion: Motion, *, fps: float | None = None, view: str = "quarter", size
     """
     if fps is not None and not SLOWEST <= fps <= _MOST:
         raise MotionMindError(f"an SVG has from {SLOWEST:g} to {_MOST:g} frames a second, not {fps:g}")
-    stage = Stage(motion, frame_times(motion, fps or _RATE), view=view, size=size, first=first)
+    stage = Stage(motion, frame_times(motion, film_rate(motion, _RATE, fps)), view=view, size=size, first=first)
     artist = _Artist(stage)
     width, height = stage.camera.width, stage.camera.height
     text = [

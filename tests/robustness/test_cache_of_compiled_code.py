@@ -20,8 +20,8 @@ from motionmind import files
 from motionmind import jit as door
 
 PACKAGE = Path(motionmind.__file__).parent
-# It prints what functions of two rooms return, and how many of them were compiled, and not found: of functions that take
-# the least time to compile.
+# It prints what functions of two rooms return, of those that take the least time to compile, and how many of them were
+# compiled, and not found.
 PROGRAM = """
 import numpy as np
 from motionmind.body.capsules import radius_at
