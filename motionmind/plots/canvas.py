@@ -43,6 +43,9 @@ class Plate:
             raise MotionMindError(f"{path}: suffix {suffix!r} is unknown; this picture is written as .svg or .png")
         write_atomically(path, svg(self).encode() if suffix == ".svg" else png(self))
 
+    def __repr__(self) -> str:
+        return f"<Picture of {self.width} x {self.height} pixels: {self.title}>"
+
     def _repr_svg_(self) -> str:
         return svg(self)
 

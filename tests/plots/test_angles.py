@@ -79,6 +79,7 @@ def test_the_picture_is_whole_whatever_turns(tmp_path: Path) -> None:
     assert hexadecimal(PIECE) in (tmp_path / "chart.svg").read_text()
     assert Image.open(BytesIO(png(plate))).size == (plate.width, plate.height)
     assert plate._repr_svg_().startswith("<svg")
+    assert len(repr(plate)) < 200
 
 
 @pytest.mark.parametrize(
