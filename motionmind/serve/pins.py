@@ -5,27 +5,43 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
 _CLOSE = 1e-6  # metres
+_A_LIMB = 0.2  # share of the longest way out from the root that is at least as long as a limb
 _STEPS = 60
 _DAMPING = 1e-3  # metres: of steps where the limb is nearly stretched
 _MOST = 0.5  # radians that a joint turns by in a step
 
 
 def chain_to(skeleton: Skeleton, joint: int) -> list[int]:
-    """Return the joints that may turn to bring one to a place: those of its limb before it, or all from the root."""
-    for limb in limbs_of(skeleton):
-        if joint in limb[1:]:
-            return limb[: limb.index(joint)]
-    chain: list[int] = []
-    parent = skeleton.parents[joint]
-    while parent >= 0:
-        chain.insert(0, parent)
-        parent = skeleton.parents[parent]
-    return chain
+    """Return the joints that turn to bring one to a place: those of its limb before it, or else all before it.
+
+    A limb ends where another hangs from the same joint. Fingers and helpers are too short to be limbs.
+    """
+    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    reaches = np.zeros(len(skeleton))  # from a joint to the far end of what hangs from it, along the bones
+    for child in range(len(skeleton) - 1, 0, -1):
+        parent = skeleton.parents[child]
+        reaches[parent] = max(reaches[parent], lengths[child] + reaches[child])
+    limb: list[int] = []
+    below, at = joint, skeleton.parents[joint]
+    while at >= 0:
+        others = [lengths[child] + reaches[child] for child in skeleton.children(at) if child != below]
+        if max(others, default=0.0) >= _A_LIMB * reaches[0]:
+            break
+        limb.insert(0, at)
+        below, at = at, skeleton.parents[at]
+    return limb or _before(skeleton, joint)
+
+
+def _before(skeleton: Skeleton, joint: int) -> list[int]:
+    """Return the joints from the root to the one before a joint."""
+    out: list[int] = []
+    while (joint := skeleton.parents[joint]) >= 0:
+        out.insert(0, joint)
+    return out
 
 
 def reach(skeleton: Skeleton, rotations: Floats, root: Floats, joint: int, place: Floats) -> Floats:

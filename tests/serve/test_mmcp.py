@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from served import ask, keyframe, of_ballet, on_rig, root_of, rotations_of, wire
+from motionmcp import backbone, client, schemas
+from served import ask, keyframe, of_ballet, on_rig, root_of, rotations_of, serving, wire
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.formats import read_motion
 from motionmind.geometry import rotations as rot
-
-client = pytest.importorskip("motionmcp.client")
-schemas = pytest.importorskip("motionmcp.schemas")
-backbone = pytest.importorskip("motionmcp.backbone")
+from motionmind.serve.mmcp import app
+from motionmind.tween.engine import Engine
 
 A, B, C = of_ballet("arabesque"), of_ballet("fifth", (0.4, 0.95, 0.3)), of_ballet("adagio@23", (0.6, 0.93, 0.1))
 EXACT = 1e-4
@@ -248,6 +247,22 @@ def test_the_answer_is_gltf_that_this_program_reads_too(url: str, tmp_path: Any)
     motion = read_motion(tmp_path / "motion.gltf")
     assert motion.skeleton.names == human23().names
     np.testing.assert_allclose(np.abs(np.sum(motion.rotations[30] * B.rotations, axis=-1)), 1.0, atol=1e-6)
+
+
+def test_an_insect_is_served_on_its_own_joints_alone() -> None:
+    engine = Engine.load("walk-hexapod")
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    a, b = clip.posture(0), clip.posture(3)
+    with serving(app(engine)) as url:
+        model = client.pick_model(client.get_capabilities(url))
+        assert not model["supports_retargeting"]
+        request = ask([keyframe(0, a), keyframe(40, b)], 41, a.skeleton) | {"model": "walk-hexapod"}
+        _, (sample,) = generate(url, request)
+        with pytest.raises(client.MmcpError) as error:
+            client.generate(url, ask([keyframe(0, A), keyframe(40, B)], 41) | {"model": "walk-hexapod"})
+    for frame, posture in ((0, a), (40, b)):
+        assert_at(sample, frame, posture)
+    assert error.value.code == "retargeting_unsupported"
 
 
 NAN = float("nan")

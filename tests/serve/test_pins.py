@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
-from motionmind.body.human import human23
+from motionmind.body.human import human23, human44
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.serve.pins import chain_to, reach
@@ -16,6 +16,22 @@ def bent(skeleton: Skeleton, seed: int, size: float) -> Floats:
     """Some rotations of all joints."""
     rng = np.random.default_rng(seed)
     return rot.exp(size * rng.standard_normal((len(skeleton), 3)))
+
+
+@pytest.mark.parametrize(
+    ("joint", "limb"),
+    [
+        ("left_wrist", ["left_clavicle", "left_shoulder", "left_elbow"]),
+        ("right_toes", ["right_hip", "right_knee", "right_ankle"]),
+        ("atlantal", ["cervical"]),
+        ("left_hip", ["pelvis"]),
+        ("thorax", ["lumbar"]),
+    ],
+)
+def test_a_limb_ends_where_another_begins_with_fingers_or_without(joint: str, limb: list[str]) -> None:
+    for body in (human23(), human44()):
+        chain = [body.names[one] for one in chain_to(body, body.index(joint))]
+        assert [name for name in chain if name in human23().names] == limb  # human44 has more of a spine
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from motionmcp import client
 from served import ask, keyframe, of_ballet, on_rig, root_of, rotations_of
 
 from motionmind.geometry import rotations as rot
 
-client = pytest.importorskip("motionmcp.client")
 PYTHON = os.environ.get("BLENDER_PYTHON") or (importlib.util.find_spec("bpy") and sys.executable)
 BLENDER = """
 import json, sys
