@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Number, P
 from motionmind.cli.warming import help_first_search
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
+from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
 
@@ -229,7 +231,7 @@ def vary(
             **trajectory,
             **request,
         )
-    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
+    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home)
     depart = trajectory["depart"]
     if not variation.kept:  # whose limits come first
         depart = share_sought(nudge, depart, trajectory["start"])
@@ -269,13 +271,26 @@ def load_engine(corpus: str, home: Path | None) -> Engine:
     return Engine.load(corpus, home)
 
 
-def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None) -> None:
+def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None, home: Path | None) -> None:
     """Print a variation's report, as a table or as JSON with the hash of the file that was written, if one was."""
     report = variation.report()
     if as_json:
         click.echo(json.dumps(report | {"motion_sha256": motion_sha256}))
     else:
-        print_review(report)
+        print_review(report, names_in(variation, home))
+
+
+def names_in(variation: Variation, home: Path | None) -> Sequence[str]:
+    """Return a name for each of the piece's postures, by the corpus that judged the variation if it is there."""
+    from motionmind.names.finding import open_collection
+    from motionmind.names.spelling import Source
+    from motionmind.variation.posture_names import name_postures
+
+    corpus = next((seam.transition.corpus for seam in variation.seams if seam.transition), None)
+    if corpus:
+        with suppress(MotionMindError):  # it was built elsewhere, or is gone
+            return name_postures(variation.piece, open_collection(Source(corpus, "corpus", corpus), home))
+    return name_postures(variation.piece)
 
 
 def _read_piece(
