@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from motionmind.tween.what_if import WhatIf
 
 
+_NAME = 24  # characters of a posture's name in a table
 _FEW = 3  # warnings that are printed without --details
 
 
@@ -236,8 +237,13 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_
     print_written(files)
 
 
-def print_review(report: dict[str, Any]) -> None:
-    """Print the report of a variation: how it was made, then a line for each stretch of the piece and its seam."""
+def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
+    """Print the report of a variation: how it was made, then a line for each stretch of the piece and its seam.
+
+    Args:
+        report: the report, as plain values.
+        names: a name for each of the piece's postures [N].
+    """
     course, counts = report["course"], report["counts"]
     values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
     nudge = ", ".join(f"{x:g}" for x in course["nudge"])
@@ -260,12 +266,15 @@ def print_review(report: dict[str, Any]) -> None:
         click.echo(f"{_format_limits(report['limits'])}; {own}")
     if counts["stays"]:
         click.echo(format_stillness(counts))
-    click.echo("seam  postures   of the piece  decision   transition")
     begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
     ends = [*(seam["at"] for seam in report["seams"]), counts["postures"] - 1]
-    for seam, first, last in zip([None, *report["seams"]], begins, ends, strict=True):
-        here, there = _format_stretch(first, last), _format_stretch(report["order"][first], report["order"][last])
-        row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}"
+    spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
+    named = [_format_names(names[first], names[last]) for first, last in spans]
+    width = max(map(len, named))
+    click.echo(f"seam  postures   of the piece  {'named':{width}}  decision   transition")
+    for seam, first, last, span, name in zip([None, *report["seams"]], begins, ends, spans, named, strict=True):
+        here, there = _format_stretch(first, last), _format_stretch(*span)
+        row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}   {name:{width}}"
         decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
         click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
 
@@ -284,6 +293,13 @@ def format_stillness(counts: dict[str, Any]) -> str:
 
 def _format_stretch(first: int, last: int) -> str:
     return str(first) if first == last else f"{first}..{last}"
+
+
+def _format_names(first: str, last: str) -> str:
+    """Format the names of the first and the last posture of a stretch: "fifth..tendu", "adagio@3..17"."""
+    one, other = (displayed(name, _NAME) for name in (first, last))
+    clip, at, frame = other.rpartition("@")
+    return one if first == last else f"{one}..{frame if at and one.startswith(f'{clip}@') else other}"
 
 
 def _format_transition(seam: dict[str, Any]) -> str:

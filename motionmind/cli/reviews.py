@@ -11,12 +11,14 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import HOME, JSON, Section, command, given_option, option, output
-from motionmind.cli.printing import Interruption, note, print_written
+from motionmind.cli.printing import Interruption, count, note, print_written
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching
 from motionmind.cli.tweens import INTERRUPTED
 from motionmind.cli.types import COUNT, FILE, NATURAL, Numbers, Span
-from motionmind.cli.variations import load_engine, print_variation
+from motionmind.cli.variations import load_engine, names_in, print_variation
+from motionmind.display import displayed_path
 from motionmind.files import all_or_none, sha256_of
+from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
@@ -24,9 +26,26 @@ if TYPE_CHECKING:
 
 @command("motionmind review variation.json --approve 1,2 --discard 3 --list")
 @click.argument("file", type=FILE)
-@output("Write the edited variation: .json  [default: FILE itself]", required=False)
+@output(
+    "Write the edited variation: .json  [default: FILE itself]; with --play a picture (.png), a film (.gif, .mp4, "
+    ".svg) or a page (.html).",
+    required=False,
+)
 @option("--list", "listing", section=Section.OUTPUT, is_flag=True, help="Print the seams, after the edits.")
 @JSON
+@option(
+    "--sheet",
+    section=Section.OUTPUT,
+    type=FILE,
+    help="Draw each seam, after the edits: the posture before it, what is inserted, the posture after it (.png).",
+)
+@option(
+    "--play",
+    section=Section.OUTPUT,
+    type=COUNT,
+    metavar="SEAM",
+    help="Draw the movement around this seam into -o, with --alternative K in its place; nothing is edited.",
+)
 @option("--undo", section=Section.EDITS, count=True, help="Take back the last edit; repeat for earlier ones.")
 @option(
     "--cut",
@@ -51,7 +70,7 @@ if TYPE_CHECKING:
     section=Section.EDITS,
     type=COUNT,
     metavar="K",
-    help="Choose movement K of those found for the seam.",
+    help="Choose movement K of those found for the seam to --replace or to --play.",
 )
 @option(
     "--approve",
@@ -85,6 +104,8 @@ def review(
     output: Path | None,
     listing: bool,
     as_json: bool,
+    sheet: Path | None,
+    play: int | None,
     smooth: str | None,
     home: Path | None,
     **options: Any,
@@ -95,17 +116,25 @@ def review(
     variation, all that was found and all that was decided, and --undo takes back one edit after the other. Its
     movement, which render, sheet and convert take, has all insertions but those discarded.
 
-    Seams keep their numbers; postures are numbered from 0. The options on what to pass through, how to search, how to
-    weigh and how to move are for --smooth.
+    Seams are numbered in the order in which they come, anew after a --cut; postures are numbered from 0, and named as
+    the corpus names them, or by clip and frame. The options on what to pass through, how to search, how to weigh and
+    how to move are for --smooth.
     """
     request = {name: options.pop(name) for name in ("alternatives", *(row.field for row in SEARCH_OPTIONS))}
-    _check_pairs(context, options, smooth, request)
+    has_edits = any(options[name] for name in ("undo", "cut", "replace", "approve", "discard")) or bool(smooth)
+    _check_pairs(context, options | {"play": play}, smooth, request)
+    if play is not None:
+        if has_edits or listing or as_json or sheet:
+            raise click.UsageError("--play draws one seam, and does nothing else", context)
+        _play(context, file, play, options["alternative"], output)
+        return
     from motionmind.variation.variation_json import read_variation, write_variation
 
-    has_edits = any(options[name] for name in ("undo", "cut", "replace", "approve", "discard")) or bool(smooth)
     if output and not has_edits:
         raise click.UsageError("-o is for an edited variation, and no edit is given", context)
-    check_outputs([(output, (".json",))] if output else [], [])
+    outputs = [(output, (".json",))] if output else []
+    outputs += [(sheet, (".png",))] if sheet else []
+    check_outputs(outputs, [])
     before = read_variation(file)
     interruption = Interruption()
     after = _undo_and_cut(before, options)
@@ -116,13 +145,17 @@ def review(
     with all_or_none() as written:
         if is_written:
             write_variation(output or file, after)
+        if sheet:
+            _draw_seams(sheet, after, home)
         motion_sha256 = sha256_of(written, output or file)
-    if listing or as_json or not has_edits:
-        print_variation(after, as_json, motion_sha256)
+    if listing or as_json or not (has_edits or sheet):
+        print_variation(after, as_json, motion_sha256, home)
     if has_edits and after.edits == before.edits:
         note("nothing changed")
-    if is_written and not as_json:
-        print_written([output or file])
+    files = [output or file] if is_written else []
+    files += [sheet] if sheet else []
+    if files and not as_json:
+        print_written(files)
     if interruption.is_requested:
         context.exit(INTERRUPTED)
 
@@ -133,11 +166,34 @@ def _check_pairs(
     """Check that options which need another come with it."""
     if (edits["cut"] is None) != (edits["paste"] is None):
         raise click.UsageError("--cut and --paste go together: give both", context)
-    if (edits["replace"] is None) != (edits["alternative"] is None):
-        raise click.UsageError("--replace and --alternative go together: give both", context)
+    if edits["play"] is None and (edits["replace"] is None) != (edits["alternative"] is None):
+        raise click.UsageError("--replace and --alternative go together: give both, or --play", context)
     unused = given_option(context, request.keys())
     if unused and not smooth:
         raise click.UsageError(f"{unused} is for --smooth, which is not given", context)
+
+
+def _draw_seams(path: Path, variation: Variation, home: Path | None) -> None:
+    """Draw all seams of a variation."""
+    from motionmind.formats import write_atomically
+    from motionmind.render.seam_sheet import seam_sheet
+    from motionmind.render.sheet import png
+
+    write_atomically(path, png(seam_sheet(variation, names_in(variation, home))))
+
+
+def _play(context: click.Context, file: Path, seam: int, alternative: int | None, output: Path | None) -> None:
+    """Draw the movement around a seam of a variation in a file, with another of its insertions if one is given."""
+    from motionmind.render.pictures import write_picture
+    from motionmind.variation.variation_json import read_variation
+
+    if output is None:
+        raise click.UsageError(f"--play draws into a file: name one by -o, such as -o seam-{seam}.gif", context)
+    check_outputs([(output, PICTURES)], [file])
+    motion = read_variation(file).around(seam, alternative)
+    write_picture(output, motion)
+    seconds = motion.times[-1] - motion.times[0]
+    click.echo(f"{displayed_path(output)}: seam {seam}, {count(len(motion), 'frame')}, {seconds:.2f} s")
 
 
 def _undo_and_cut(variation: Variation, edits: Mapping[str, Any]) -> Variation:

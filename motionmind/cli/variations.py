@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Number, P
 from motionmind.cli.warming import help_first_search
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
+from motionmind.errors import MotionMindError, enumerated
 from motionmind.files import all_or_none, sha256_of
 from motionmind.render import PICTURES
 
@@ -229,7 +231,9 @@ def vary(
             **trajectory,
             **request,
         )
-    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]))
+    print_variation(variation, as_json, _write(outputs, report, variation, request["fps"]), home)
+    if engine and not as_json:
+        print_seams_beyond(variation, engine)
     depart = trajectory["depart"]
     if not variation.kept:  # whose limits come first
         depart = share_sought(nudge, depart, trajectory["start"])
@@ -269,13 +273,43 @@ def load_engine(corpus: str, home: Path | None) -> Engine:
     return Engine.load(corpus, home)
 
 
-def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None) -> None:
+def print_variation(variation: Variation, as_json: bool, motion_sha256: str | None, home: Path | None) -> None:
     """Print a variation's report, as a table or as JSON with the hash of the file that was written, if one was."""
     report = variation.report()
     if as_json:
         click.echo(json.dumps(report | {"motion_sha256": motion_sha256}))
     else:
-        print_review(report)
+        print_review(report, names_in(variation, home))
+
+
+def print_seams_beyond(variation: Variation, engine: Engine) -> None:
+    """Print where insertions go beyond all that the corpus shows: of each measure the worst seam, and the others."""
+    from motionmind.tween.headline import shown_beyond
+
+    found: dict[str, list[tuple[float, int, str]]] = {}
+    for seam in variation.seams:
+        if seam.insertion:
+            for name, one in engine.plausibility.shown(seam.insertion.motion).items():
+                if one.is_beyond and one.value is not None and one.most is not None:
+                    found.setdefault(name, []).append((one.value / one.most, seam.number, shown_beyond(name, one)))
+    for sightings in found.values():
+        _, number, sentence = max(sightings, key=lambda sighting: sighting[0])
+        others = sorted(other for _, other, _ in sightings if other != number)
+        also = f" (seam{'s' * (len(others) > 1)} {enumerated(list(map(str, others)), 8)}, too)" if others else ""
+        click.echo(f"beware    seam {number}: {sentence}{also}")
+
+
+def names_in(variation: Variation, home: Path | None) -> Sequence[str]:
+    """Return a name for each of the piece's postures, by the corpus that judged the variation if it is there."""
+    from motionmind.names.finding import open_collection
+    from motionmind.names.spelling import Source
+    from motionmind.variation.posture_names import name_postures
+
+    corpus = next((seam.transition.corpus for seam in variation.seams if seam.transition), None)
+    if corpus:
+        with suppress(MotionMindError):  # it was built elsewhere, or is gone
+            return name_postures(variation.piece, open_collection(Source(corpus, "corpus", corpus), home))
+    return name_postures(variation.piece)
 
 
 def _read_piece(

@@ -1,8 +1,11 @@
 """The most that a corpus's own movement shows a viewer, beside which other movement is plausible or not.
 
-To the measures of `motionmind.body.plausibility` comes `pace`: how many times as fast as its fastest the fastest of all
-joints, the body's turning and its travel is, where fastest is what that part exceeds in one of a hundred frames of the
-corpus (`motionmind.learned.pace`).
+To the measures of `motionmind.body.plausibility` come two:
+
+- `pace`: how many times as fast as its fastest the fastest of all joints, the body's turning and its travel is, where
+  fastest is what that part exceeds in one of a hundred frames of the corpus (`motionmind.learned.pace`);
+- `sliding`: the share of a second in which some foot near the floor moves further, from frame to frame, than a foot
+  that stands (`motionmind.body.contact.skating`), of bodies as tall as people, with feet.
 
 The limit of each is the 99.5th percentile, over all stretches of a second of the corpus's clips, of the greatest that
 each shows. Shorter clips are a stretch each.
@@ -16,25 +19,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Floats
+<<<<<<< HEAD
 from motionmind.body.contact import RATE, floor_height, lowest_height
+=======
+from motionmind.body.contact import FAR, RATE, find_feet, find_floor, foot_slides
+>>>>>>> 720956e
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.learned.pace import way_of
 from motionmind.learned.sampled import BLOCK, Sampled
 
-MEASURES = (*SEEN, "pace")
+MEASURES = (*SEEN, "pace", "sliding")
 ABOUT = {  # the unit of each, and what it is
     "balance": ("m", "how far the body leans over what it stands on, on one limb and at ease"),
     "bounce": ("m/s^2", "greatest acceleration of the body's mass, up or down"),
     "flight": ("", "share of gravity that the body lacks in the air: 1 where it floats"),
     "crossed_limbs": ("m", "how deep limbs are in each other"),
     "pace": ("", "how many times as fast as its fastest the fastest part of the body is"),
+    "sliding": ("", "greatest share of a second in which a foot near the floor slides"),
 }
 STRETCH = 1.0  # seconds
 BEYOND = 99.5  # percentile of the corpus's own stretches
-# What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, and times as fast.
-TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0])
+# What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, times as fast, and a share.
+TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
+_TALL = 1.0  # metres; how far a foot may move is known of bodies at least as tall
 _MOST = 40_000  # frames of a corpus that are measured, about
 _PIECE = BLOCK // 32  # frames of each piece of a corpus that has more
 
@@ -125,14 +134,40 @@ def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+<<<<<<< HEAD
 def _show(sampled: Motion, fastest: Floats, floor: float) -> tuple[Floats, Floats]:
     """Return what movement shows in each frame at 30 a second [T, M], above a floor at a height in metres, and how many
     times as fast as its fastest each part is between frames [T - 1, J + 2]."""
     frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
+=======
+def _show(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, Floats]:
+    """Return what a movement shows in each frame at 30 a second [T, M], and how many times as fast as its fastest each
+    part is between frames [T - 1, J + 2].
+
+    The floor's height is in metres; None stands for 0, or lower where the body is.
+    """
+    sampled = at_rate(motion)
+    where = sampled.skeleton, sampled.rotations, sampled.root
+    floor = floor_of(*where) if floor is None else floor
+    frames = implausibility(*where, RATE, floor)
+>>>>>>> 720956e
     pace = np.full((len(sampled), 1), np.nan)
     speeds = RATE * way_of(sampled).parts / fastest
     pace[1:, 0] = speeds.max(axis=1)
-    return np.concatenate([frames, pace], axis=1), speeds
+    return np.concatenate([frames, pace, _sliding(sampled, floor)[:, None]], axis=1), speeds
+
+
+def _sliding(motion: Motion, floor: float) -> Floats:
+    """Return the share of the second up to each frame in which a foot slides [T], at 30 frames a second.
+
+    What comes before the movement does not slide. It is NaN for bodies that have no feet or are small.
+    """
+    body = motion.skeleton
+    if body.height < _TALL or not find_feet(body):
+        return np.full(len(motion), np.nan)
+    slides = (foot_slides(body, motion.rotations, motion.root, floor) > FAR).any(axis=-1)
+    so_far = np.concatenate([np.zeros(round(RATE) + 1), np.cumsum(slides)])
+    return np.asarray((so_far[round(RATE) :] - so_far[: len(motion)]) / RATE)
 
 
 def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:

@@ -7,7 +7,7 @@ from functools import cache
 from io import BytesIO
 from math import ceil, sqrt
 from numbers import Integral
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -109,6 +109,26 @@ def contact_sheet(
     return sheet.picture(columns)
 
 
+class Row(NamedTuple):
+    """A row of a sheet: a heading, the numbers of frames, None where nothing is to be drawn, and a caption for each."""
+
+    heading: str
+    frames: Sequence[int | None]
+    captions: Sequence[str]
+
+
+def row_sheet(motion: Motion, rows: Sequence[Row]) -> Image.Image:
+    """Draw rows of postures of a motion, all as long as the first, each under its heading; see `contact_sheet`."""
+    drawn = [
+        (frame, caption)
+        for row in rows
+        for frame, caption in zip(row.frames, row.captions, strict=True)
+        if frame is not None
+    ]
+    sheet = _Sheet(motion, [frame for frame, _ in drawn], STAGE_RIGHT, 0, [caption for _, caption in drawn])
+    return sheet.rows(rows)
+
+
 def png(picture: Image.Image) -> bytes:
     """Encode a contact sheet as PNG, in 256 colours."""
     data = BytesIO()
@@ -188,22 +208,48 @@ class _Sheet:
     def picture(self, columns: int | None) -> Image.Image:
         """Draw the whole sheet, `columns` postures a row, or about a screen's shape."""
         count = len(self.frames)
-        wide = sum(window.width for window in self.windows)
-        tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION)
+        wide, tall = self._size()
         columns = min(columns or max(1, round(sqrt(1.5 * count * tall / wide))), count)
-        lines = self._legend(columns * wide)
-        header = _LINE * (len(lines) + 2)
-        sheet = Image.new("RGB", (columns * wide + 1, header + ceil(count / columns) * tall + 1), SHEET_PAPER)
-        pen = ImageDraw.Draw(sheet)
-        pen.text((6, 4), displayed(self.motion.name or self.motion.skeleton.name), TEXT, ImageFont.load_default(15))
-        for number, line in enumerate(lines):
-            for x, words, ink in line:
-                pen.text((x, _LINE * (number + 1) + 9), words, ink, _small())
+        sheet, pen, header = self._paper(columns * wide, ceil(count / columns) * tall)
         for at in range(count):
             corner = at % columns * wide, header + at // columns * tall
             self._tile(sheet, pen, at, corner)
             pen.rectangle((*corner, corner[0] + wide, corner[1] + tall), outline=SHEET_FRAME)
         return sheet
+
+    def rows(self, rows: Sequence[Row]) -> Image.Image:
+        """Draw the sheet in rows with headings, side by side so that it has about a screen's shape."""
+        wide, tall = self._size()
+        width, height = len(rows[0].frames) * wide, tall + _CAPTION
+        columns = min(max(1, round(sqrt(1.5 * len(rows) * height / width))), len(rows))
+        sheet, pen, header = self._paper(columns * width, ceil(len(rows) / columns) * height)
+        at = 0
+        for number, row in enumerate(rows):
+            x, y = number % columns * width, header + number // columns * height
+            pen.text((x + 6, y + 4), displayed(row.heading), TEXT, ImageFont.load_default(15))
+            for place, frame in enumerate(row.frames):
+                if frame is not None:
+                    self._tile(sheet, pen, at, (x + place * wide, y + _CAPTION))
+                    at += 1
+            pen.rectangle((x, y, x + width, y + height), outline=SHEET_FRAME)
+        return sheet
+
+    def _size(self) -> tuple[int, int]:
+        """Return the width and the height of a posture's views, pixels."""
+        tall = self.windows[0].height + max(self.plan.height if self.plan else 0, _CAPTION)
+        return sum(window.width for window in self.windows), tall
+
+    def _paper(self, width: int, height: int) -> tuple[Image.Image, ImageDraw.ImageDraw, int]:
+        """Return a sheet with so many pixels below its title and its legend, its pen, and the height of these."""
+        lines = self._legend(width)
+        header = _LINE * (len(lines) + 2)
+        sheet = Image.new("RGB", (width + 1, header + height + 1), SHEET_PAPER)
+        pen = ImageDraw.Draw(sheet)
+        pen.text((6, 4), displayed(self.motion.name or self.motion.skeleton.name), TEXT, ImageFont.load_default(15))
+        for number, line in enumerate(lines):
+            for x, words, ink in line:
+                pen.text((x, _LINE * (number + 1) + 9), words, ink, _small())
+        return sheet, pen, header
 
     def _tile(self, sheet: Image.Image, pen: ImageDraw.ImageDraw, at: int, corner: tuple[int, int]) -> None:
         """Draw one posture, its views and its caption, from an upper left corner on, pixels."""

@@ -10,6 +10,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.plausibility import at_rate, floor_of
 from motionmind.display import displayed
 from motionmind.errors import enumerated
+from motionmind.learned.plausibility import Sighting
 from motionmind.tween.result import Tween
 
 _FAR = 30.0  # degrees; nobody sees that a smaller move of a joint is a bridge
@@ -21,6 +22,7 @@ _SHOWN = {
     "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
     "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
     "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
+    "sliding": "feet slide: near the floor one moves in {0:.0%} of a second, in the corpus in {1:.0%} at most",
     "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
 }
 
@@ -43,11 +45,7 @@ def headline(tween: Tween) -> str:
 
 def beyond(tween: Tween) -> list[str]:
     """Say where a tween goes beyond all that the corpus shows, so that a viewer would wince; each in a line."""
-    said = [
-        _SHOWN[name].format(one.value, one.most, displayed(one.part))
-        for name, one in tween.shown.items()
-        if one.is_beyond
-    ]
+    said = [shown_beyond(name, one) for name, one in tween.shown.items() if one.is_beyond]
     if tween.bridges:
         far = max(tween.bridges, key=lambda bridge: bridge.degrees)
         if far.degrees >= _FAR:
@@ -55,6 +53,16 @@ def beyond(tween: Tween) -> list[str]:
                 f"{displayed(far.joint)} turns by {far.degrees:.0f} degrees as in no clip, in move {far.move + 1}"
             )
     return said
+
+
+def shown_beyond(name: str, one: Sighting) -> str:
+    """Say in words what goes beyond all that a corpus shows, and by how much.
+
+    Args:
+        name: of the measure, one of `motionmind.learned.plausibility.MEASURES`.
+        one: a movement's sighting of it, which is beyond.
+    """
+    return _SHOWN[name].format(one.value, one.most, displayed(one.part))
 
 
 def _seen(tween: Tween) -> str:

@@ -44,11 +44,17 @@ class Replace(msgspec.Struct, frozen=True, tag_field="edit", tag="replace", forb
 
 
 class Cut(msgspec.Struct, frozen=True, tag_field="edit", tag="cut", forbid_unknown_fields=True):
-    """Move postures `first` to `last` before posture `before`, all as numbered before the edit."""
+    """Move postures `first` to `last` before posture `before`, all as numbered before the edit.
+
+    Attributes:
+        numbers: "anew" if seams are numbered in the order in which they come then; "kept", as in files of 0.1, if each
+            seam keeps its number and new seams get the next ones.
+    """
 
     first: int
     last: int
     before: int
+    numbers: Literal["kept", "anew"] = "kept"
 
 
 class Smooth(
@@ -71,7 +77,7 @@ class Verdict:
     """The reviewer's decision on a seam.
 
     Attributes:
-        number: the seam's number, which it keeps.
+        number: the seam's number, from 1 on in the order of the movement.
         decision: open until somebody approves or discards the seam; insertions that are not discarded are in the
             movement.
         chosen: the number of the chosen candidate, counted from 1.
@@ -87,7 +93,7 @@ class Seam:
     """A place in a variation where it neither goes on as the piece does nor stays in its posture.
 
     Attributes:
-        number: the seam's number, which it keeps.
+        number: the seam's number, from 1 on in the order of the movement.
         at: the posture of the variation that it leads from; it leads to the next one.
         start: that posture's number in the piece.
         end: the next posture's number in the piece.
@@ -210,7 +216,8 @@ def apply_edit(state: ReviewState, edit: Edit) -> ReviewState:
                 raise MotionMindError(f"seam {number} has alternatives 1 to {count}, no alternative {alternative}")
             return _change_verdict(state, number, chosen=alternative, decision="open")
         case Cut():
-            return _number_seams(replace(state, sequence=_move_postures(state.sequence, edit)))
+            moved = _number_seams(replace(state, sequence=_move_postures(state.sequence, edit)))
+            return _number_anew(moved) if edit.numbers == "anew" else moved
         case Smooth(transitions):
             return _judge_anew(state, {(one.start, one.end): one for one in transitions})
 
@@ -271,6 +278,13 @@ def _number_seams(state: ReviewState) -> ReviewState:
         if is_seam(*state.order[list(pair)]) and pair not in verdicts:
             verdicts[pair] = Verdict(len(verdicts) + 1)
     return replace(state, verdicts=verdicts)
+
+
+def _number_anew(state: ReviewState) -> ReviewState:
+    """The state with its seams numbered in the order in which they come."""
+    pairs = [(state.sequence[seam.at], state.sequence[seam.at + 1]) for seam in state.seams]
+    verdicts = {pair: replace(state.verdicts[pair], number=number) for number, pair in enumerate(pairs, start=1)}
+    return replace(state, verdicts={**state.verdicts, **verdicts})
 
 
 def is_seam(start: int, end: int) -> bool:

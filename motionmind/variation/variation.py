@@ -56,6 +56,7 @@ NUDGE = 0.1  # of a trajectory that begins where it is told to, in a flow's own 
 SKIP = 10
 ALTERNATIVES = 3
 EXPONENT_STEPS = 200_000
+_MOMENT = 1e-6  # seconds
 MOST_STEPS = 1_000_000_000  # of a transient: some minutes
 LONGEST = 1_000_000  # postures that a variation may have
 
@@ -143,6 +144,30 @@ class Variation:
         insertions = {seam.at: seam.insertion.motion for seam in self.seams if seam.insertion}
         return self.piece.arrange(self.postures, insertions)
 
+    def around(self, seam: int, alternative: int | None = None, *, seconds: float = 1.0) -> Motion:
+        """Return the movement around a seam: what is inserted there, and some of what comes before and after.
+
+        Args:
+            seam: the seam's number.
+            alternative: the number, from 1, of the movement to insert; None for what is inserted now.
+            seconds: how much comes before and after.
+
+        Raises:
+            MotionMindError: there is no such seam or alternative.
+
+        >>> from motionmind import Engine, vary
+        >>> engine = Engine.load("ballet")
+        >>> motion = engine.corpus.motion(engine.corpus.clips[0])
+        >>> len(vary(motion, nudge=1.0).around(1, seconds=0.6))
+        4
+        """
+        shown = self if alternative is None else self.replace(seam, alternative)
+        motion, frames = shown.arrange()
+        at = next(one.at for one in shown.seams if one.number == self._state.seam(check_whole("seam", seam)).number)
+        begin, end = motion.times[frames[at]] - seconds, motion.times[frames[at + 1]] + seconds
+        first = int(np.searchsorted(motion.times, begin - _MOMENT))
+        return motion.slice(first, int(np.searchsorted(motion.times, end + _MOMENT)))
+
     def report(self) -> dict[str, Any]:
         """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
         report: dict[str, Any] = msgspec.to_builtins(
@@ -180,13 +205,14 @@ class Variation:
     def cut(self, first: int, last: int, before: int) -> Variation:
         """Move postures `first` to `last` before posture `before`.
 
-        All are numbered from 0 as they stand now; `before` may be the number of postures, which means the end. Seams
-        keep their numbers; new seams get the next ones.
+        All are numbered from 0 as they stand now; `before` may be the number of postures, which means the end. Then
+        seams are numbered anew, in the order in which they come.
 
         Raises:
             MotionMindError: there are no such postures, or `before` is one of those that move.
         """
-        return self._after(Cut(check_whole("first", first), check_whole("last", last), check_whole("before", before)))
+        places = check_whole("first", first), check_whole("last", last), check_whole("before", before)
+        return self._after(Cut(*places, numbers="anew"))
 
     def smooth(
         self,

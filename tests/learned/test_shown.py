@@ -104,3 +104,20 @@ def test_trifles_are_not_told() -> None:
     trembles = raised(still, 0.0003 * np.sin(np.arange(31)))
     assert not limits.shown(trembles)["bounce"].is_beyond
     assert limits.shown(raised(still, 0.003 * np.sin(np.arange(31))))["bounce"].is_beyond
+
+
+def test_feet_that_slide_longer_than_the_corpus_lets_them_are_told() -> None:
+    karate = Engine.load("karate")
+    motion = stretches(karate, 1)[0]
+    still = replace(motion, rotations=np.tile(motion.rotations[:1], (31, 1, 1)), root=np.tile(motion.root[:1], (31, 1)))
+    for frames in (0, 3, 12, 30):  # carried off, standing, for so many frames
+        way = np.minimum(np.arange(31), frames)[:, None] * [0.04, 0.0, 0.0]
+        found = karate.plausibility.shown(replace(still, root=still.root + way))["sliding"]
+        assert found.value == pytest.approx(frames / 30)
+        assert found.most is not None
+        assert found.is_beyond == (frames / 30 > found.most)
+        lifted = replace(still, root=still.root + way + [0.0, 0.2, 0.0])
+        assert karate.plausibility.shown(lifted)["sliding"].value == 0.0
+    assert 0.2 <= found.most < 0.9
+    creeps = replace(still, root=still.root + np.arange(31)[:, None] * [0.02, 0.0, 0.0])
+    assert karate.plausibility.shown(creeps)["sliding"].value == 0.0

@@ -202,7 +202,7 @@ def test_a_variation_is_read_reviewed_and_written(archive: Path, name: str, run:
     assert len(before.transitions) == 2
     assert len(before.edits) == (2 if name == "reviewed.json" else 0)
     assert run("corpus", "build", "piece", PIECE).code == 0
-    assert run("review", file, "--approve", "2", "--cut", "0..1", "--paste", "3", "-o", "again.json").code == 0
+    assert run("review", file, "--approve", "1,2", "--cut", "0..1", "--paste", "3", "-o", "again.json").code == 0
     after = read_variation(tmp_path / "again.json")
     assert judged(after) == judged(before)
     assert after.edits[: len(before.edits)] == before.edits

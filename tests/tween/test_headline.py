@@ -81,6 +81,11 @@ def test_a_viewer_winces_at_what_the_corpus_never_shows_and_at_far_bridges(
     assert beyond(tween) == []
     for name, sighting, said in (
         ("balance", Sighting(0.31, 0.1, "m"), "it leans 0.31 m over what it stands on, in the corpus 0.10 at most"),
+        (
+            "sliding",
+            Sighting(0.8, 0.4, ""),
+            "feet slide: near the floor one moves in 80% of a second, in the",
+        ),
         ("pace", Sighting(3.0, 1.5, "", "left_hip"), "left_hip is 3.0 times as fast as is fast in the corpus"),
     ):
         (sentence,) = beyond(shown(tween, name, sighting))

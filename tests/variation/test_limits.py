@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -16,8 +18,10 @@ from hypothesis import strategies as st
 from motionmind._typing import Ints, Singles
 from motionmind.chaos.flows import FLOWS, flow_of
 from motionmind.chaos.reorder import Itinerary, reorder
+from motionmind.cli.variations import print_seams_beyond
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.formats import write_motion
+from motionmind.learned.plausibility import MEASURES
 from motionmind.tween.engine import Engine
 from motionmind.variation.departure import departure
 from motionmind.variation.insertion_times import estimate_insertions
@@ -190,3 +194,32 @@ def test_what_cannot_be_reached_is_refused_in_a_line(kata: Piece, karate: Engine
     write_motion("piece.json", ballet_clip("jump"))
     ran = run("vary", "piece.json", "--inserted", 0.1, "-o", "v.json")
     assert (ran.code, "--inserted is for --corpus, which is not given" in ran.err) == (2, True)
+
+
+def test_seams_that_a_viewer_would_wince_at_are_named(
+    kata: Piece, karate: Engine, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = vary(kata, karate, inserted=0.3, alternatives=1)
+    lenient, strict = (
+        replace(karate, plausibility=replace(karate.plausibility, most=np.full(len(MEASURES), most)))
+        for most in (1e9, 0.0)
+    )
+    print_seams_beyond(found, lenient)
+    assert capsys.readouterr().out == ""
+    monkeypatch.setattr("motionmind.learned.plausibility.TRIFLES", np.full(len(MEASURES), 1e-3))
+    print_seams_beyond(found, strict)
+    (slides,) = [line for line in capsys.readouterr().out.splitlines() if "feet slide" in line]
+    values = {
+        seam.number: strict.plausibility.shown(seam.insertion.motion)["sliding"].value or 0.0
+        for seam in found.seams
+        if seam.insertion
+    }
+    worst = max(values, key=lambda number: values[number])
+    assert slides.startswith(f"beware    seam {worst}: feet slide: near the floor one moves in {values[worst]:.0%} of")
+    assert run_of(slides) == sorted(number for number, value in values.items() if value > 1e-3 and number != worst)
+
+
+def run_of(line: str) -> list[int]:
+    """The other seams that a line names."""
+    found = re.search(r"\(seams? ([\d, ]+), too\)", line)
+    return list(map(int, found[1].split(", "))) if found else []
