@@ -19,11 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Floats
-<<<<<<< HEAD
-from motionmind.body.contact import RATE, floor_height, lowest_height
-=======
-from motionmind.body.contact import FAR, RATE, find_feet, find_floor, foot_slides
->>>>>>> 720956e
+from motionmind.body.contact import FAR, RATE, find_feet, floor_height, foot_slides, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
@@ -134,23 +130,10 @@ def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-<<<<<<< HEAD
 def _show(sampled: Motion, fastest: Floats, floor: float) -> tuple[Floats, Floats]:
     """Return what movement shows in each frame at 30 a second [T, M], above a floor at a height in metres, and how many
     times as fast as its fastest each part is between frames [T - 1, J + 2]."""
     frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
-=======
-def _show(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Floats, Floats]:
-    """Return what a movement shows in each frame at 30 a second [T, M], and how many times as fast as its fastest each
-    part is between frames [T - 1, J + 2].
-
-    The floor's height is in metres; None stands for 0, or lower where the body is.
-    """
-    sampled = at_rate(motion)
-    where = sampled.skeleton, sampled.rotations, sampled.root
-    floor = floor_of(*where) if floor is None else floor
-    frames = implausibility(*where, RATE, floor)
->>>>>>> 720956e
     pace = np.full((len(sampled), 1), np.nan)
     speeds = RATE * way_of(sampled).parts / fastest
     pace[1:, 0] = speeds.max(axis=1)
