@@ -194,7 +194,7 @@ def draw() -> None:
         bound = Heuristic.of_messages(trws.no_messages(trellis))
         astar.search(trellis, bound, np.inf, astar.SAME, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
         write_picture(Path(folder) / "clip.svg", clip.slice(0, 2))
-        write_attractor(Path(folder) / "attractor.png", vary(clip))
+        write_attractor(Path(folder) / "attractor.png", vary(clip, stretch=4))
 
 
 def _problem() -> Problem:
