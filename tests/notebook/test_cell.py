@@ -87,6 +87,14 @@ def test_the_frame_knows_nothing_of_the_notebook(opened: Callable[..., Any]) -> 
     assert frame.evaluate("fetch('https://example.org').then(() => 'open', () => 'shut')") == "shut"
 
 
+def test_a_film_is_saved_from_the_frame(opened: Callable[..., Any]) -> None:
+    tab = opened(html_of(ADAGIO.slice(0, 3)))
+    with tab.expect_download(timeout=60_000) as download:
+        tab.frames[1].click("#film")
+    assert download.value.suggested_filename.endswith(".webm")
+    assert download.value.failure() is None
+
+
 def test_cells_stand_beside_each_other(opened: Callable[..., Any]) -> None:
     tab = opened(*(html_of(ADAGIO.slice(0, frames)) for frames in (3, 5, 8)))
     assert [frame.evaluate("motionmind.motion.length") for frame in tab.frames[1:]] == [3, 5, 8]
