@@ -145,6 +145,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
             {"piece": variation.piece, "course": variation.course, "order": variation.order},
         ),
         "Variation.approve": (variation.approve, {}),
+        "Variation.around": (variation.around, {"seam": 1}),
         "Variation.cut": (variation.cut, {"first": 2, "last": 4, "before": 8}),
         "Variation.discard": (variation.discard, {}),
         "Variation.replace": (variation.replace, {"seam": 1, "alternative": 1}),

@@ -161,6 +161,7 @@ class Variation:
         >>> len(vary(motion, nudge=1.0).around(1, seconds=0.6))
         4
         """
+        seconds = check_number("seconds", seconds)
         shown = self if alternative is None else self.replace(seam, alternative)
         motion, frames = shown.arrange()
         at = next(one.at for one in shown.seams if one.number == self._state.seam(check_whole("seam", seam)).number)
