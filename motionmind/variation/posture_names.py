@@ -10,6 +10,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.names.finding import Collection
 from motionmind.variation.piece import Piece
 
+_MOMENT = 1e-3  # seconds
 _SAME = np.radians(1.0)  # in every joint, of postures that have one name
 
 
@@ -47,7 +48,12 @@ def _first_frame(motion: Motion, collection: Collection | None) -> int:
     """Return the number that the first frame of a part of a clip has in the whole clip, told by its time."""
     if collection is not None and motion.name in collection.clips:
         times = collection.motions([motion.name])[0].times
-        return int(np.abs(times - motion.times[0]).argmin())
+        first = int(np.abs(times - motion.times[0]).argmin())
+        own = times[first : first + len(motion)]
+        if (
+            len(own) == len(motion) and np.abs(own - motion.times).max() < _MOMENT
+        ):  # else a recording that it is made of
+            return first
     return round(float(motion.times[0]) * motion.fps) if len(motion) > 1 else 0
 
 
