@@ -19,7 +19,6 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from motionmind.cli.options import command
 from motionmind.errors import MotionMindError
@@ -145,6 +144,8 @@ def search() -> None:
 
 def realise() -> None:
     """Realise moves of the corpus, which no search has to find, and learn the corpus anew."""
+    import numpy as np
+
     from motionmind.body.motion import Velocity
     from motionmind.discretize import make_discretization
     from motionmind.realise.detail import likest_moves
@@ -175,6 +176,8 @@ def realise() -> None:
 
 def draw() -> None:
     """Film a clip; search by A* alone, which a search comes to last; draw in all other ways."""
+    import numpy as np
+
     from motionmind.plots.attractor import write_attractor
     from motionmind.render.pictures import write_picture
     from motionmind.search import astar, trws

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import pytest
@@ -35,6 +35,8 @@ def names_called(function: FunctionType) -> set[str]:
     while left:
         one = left.pop()
         named = [one.__globals__.get(name) for name in one.__code__.co_names]
+        modules = [thing for thing in named if isinstance(thing, ModuleType)]
+        named += [getattr(module, name, None) for module in modules for name in one.__code__.co_names]
         for other in [thing.py_func for thing in named if isinstance(thing, CPUDispatcher)] + [one]:
             package, stem = other.__module__.split(".")[1:3]
             if (name := f"{package}/{stem}.{other.__name__}") not in found:
