@@ -11,7 +11,7 @@ from motionmind.body.limbs import limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support
 from motionmind.geometry import rotations as rot
-from motionmind.realise.balance import WALKS, falls_without, is_beyond, walks
+from motionmind.realise.balance import ROOM, WALKS, balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.leaning import shift_weight
 from motionmind.realise.root import stand
 
@@ -76,6 +76,26 @@ def test_a_body_in_balance_or_walking_or_with_a_leg_that_must_not_change_is_let_
     fixed = FREE.copy()
     fixed[human23().index("left_knee")] = True
     assert shift_weight(human23(), q, root, ALLOWED, ENDS, FREE, fixed, 30.0)[0] is q
+
+
+def test_what_brings_the_weight_back_measures_how_far_its_zero_moment_point_is_beyond_the_support() -> None:
+    """A mass that sways over a square, faster than it may: the floor pushes at a point that is ahead of its turns."""
+    fps, gravity, height = 30.0, 9.81, np.full(FRAMES, 0.9)
+    corners = np.array([[-0.1, -0.1], [-0.1, 0.1], [0.1, -0.1], [0.1, 0.1]])
+    points, touches = np.tile(corners, (FRAMES, 1, 1)), np.ones((FRAMES, 4), dtype=np.bool_)
+    own = np.stack([0.02 * np.cos(np.arange(FRAMES) / 5.0), np.zeros(FRAMES)], axis=1)
+    rise = np.sin(np.linspace(0.0, np.pi, FRAMES)) ** 2
+    centre = np.stack([0.09 * rise * np.sin(np.arange(FRAMES) / 3.0), 0.01 * rise], axis=1)
+    pressed = centre[1:-1, 0] - height[1:-1] / gravity * np.diff(centre[:, 0], 2) * fps**2
+    beyond = np.abs(pressed) - 0.1 - ROOM
+    assert np.sum(beyond > 0.01) > 10
+    assert np.abs(centre[:, 0]).max() < 0.1  # the mass itself is over the square
+    along = balance_rows(points, touches, centre, own, height, ALLOWED, gravity, fps)[0]
+    root = np.insert(centre - own, 1, 0.8, axis=1)
+    windows = np.stack([root[:-2], root[1:-1], root[2:]], axis=1).reshape(FRAMES - 2, 9)
+    misses = np.sum(along.coefficients * windows, axis=1) - along.targets
+    np.testing.assert_array_equal(along.weights > 0.0, beyond > 0.0)
+    np.testing.assert_allclose(misses[beyond > 0.0], beyond[beyond > 0.0], atol=1e-12)
 
 
 def test_a_body_falls_without_the_foot_that_it_is_over_and_not_without_the_other() -> None:
