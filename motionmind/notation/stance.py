@@ -86,7 +86,7 @@ class _Bones:
 
 
 class _Leg:
-    """What stays as it is while the pelvis moves, of one side's legs in T postures; all of it mirrored for the right.
+    """Constants of one side's legs in T postures, while the pelvis moves; mirrored for the right side.
 
     Attributes:
         ankle: places of the ankles of legs that stand [T, 3], metres.
