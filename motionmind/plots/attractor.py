@@ -98,15 +98,18 @@ def _heading(portrait: Portrait) -> Iterator[Mark]:
             f"{_count(portrait.parting, 'posture')} of {len(portrait.points)}, "
             f"and jumps {_count(len(portrait.jumps), 'time')}."
         )
+    about = (
+        "The cells are those of the map, in all coordinates, where they cut the attractor; of its sheets that lie "
+        "behind one another the one nearest to the viewer is drawn. Coordinates have no unit."
+    )
     if portrait.variation.kept:
-        stretch = portrait.variation.kept.limits.stretch
-        summary += f" Its stretches have {_count(stretch, 'posture')} at least, so a point may be in a cell nearby."
+        summary += f" Its stretches have {_count(portrait.variation.kept.limits.stretch, 'posture')} at least."
+        about += " A point may lie in a cell nearby."
     yield Words((_MARGIN, _MARGIN + 30), summary, LETTERS, INK)
     yield from _legend(_MARGIN, _MARGIN + 60)
     yield Words(
         (_MARGIN, _MARGIN + 84),
-        "The cells are those of the map, in all coordinates, where they cut the attractor; of its sheets that lie "
-        "behind one another the one nearest to the viewer is drawn. Coordinates have no unit.",
+        about,
         LETTERS,
         PLOT_PALE,
     )

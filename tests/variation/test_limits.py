@@ -152,6 +152,16 @@ def test_of_insertions_no_more_is_given_up_than_needed(kata: Piece, karate: Engi
     assert len(few.seams) > 0.5 * len(free.seams)  # those that need no insertion stay
 
 
+def test_whoever_ends_the_smoothing_gets_an_order_whose_seams_are_smoothed_later(kata: Piece, karate: Engine) -> None:
+    ended = vary(kata, karate, inserted=0.3, alternatives=1, watch=lambda _: True)
+    assert min(stretches(ended.postures)) >= 4
+    assert all(seam.transition for seam in ended.seams)
+    assert any(seam.transition and seam.transition.is_pending for seam in ended.seams)
+    later = ended.smooth(karate, alternatives=1)
+    assert not any(seam.is_abrupt for seam in later.seams)
+    np.testing.assert_array_equal(later.postures, ended.postures)
+
+
 def test_a_variation_within_limits_is_read_as_it_was_written(kata: Piece, karate: Engine, tmp_path: Path) -> None:
     found = vary(kata, karate, inserted=0.3, alternatives=1)
     for name in ("a.json", "b.json"):
