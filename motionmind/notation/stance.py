@@ -86,7 +86,7 @@ class _Bones:
 
 
 class _Leg:
-    """What stays as it is while the pelvis moves, of one side's legs in T postures; all of it mirrored for the right.
+    """Parts that stay while the pelvis moves, of one side's legs in T postures; all of it mirrored for the right.
 
     Attributes:
         ankle: places of the ankles of legs that stand [T, 3], metres.
