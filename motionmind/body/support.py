@@ -182,9 +182,9 @@ def _overhang(points: Floats, supports: Bools, mass: Floats) -> Floats:
         for i in range(len(off)):
             for j in range(i + 1):
                 side = off[j] - off[i]
-                length = side @ side
-                share = 0.0 if length == 0.0 else min(max(-(off[i] @ side) / length, 0.0), 1.0)
-                nearest = off[i] + share * side
-                least = min(least, nearest @ nearest)
+                length = side[0] ** 2 + side[1] ** 2  # not @, which imports SciPy's linear algebra
+                along = off[i, 0] * side[0] + off[i, 1] * side[1]
+                share = 0.0 if length == 0.0 else min(max(-along / length, 0.0), 1.0)
+                least = min(least, (off[i, 0] + share * side[0]) ** 2 + (off[i, 1] + share * side[1]) ** 2)
         out[t] = 0.0 if gap < np.pi else np.sqrt(least)
     return out

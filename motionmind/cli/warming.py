@@ -33,8 +33,8 @@ _LOOK = 0.2  # seconds between two looks at what is compiled
 def warm() -> None:
     """Compile the inner loops, so that no search or film has to wait for it.
 
-    The first search does this on its own. It takes half a minute, once for each version of MotionMind and Python. What
-    is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
+    The first search does what it needs of this on its own. It takes half a minute to a minute, once for each version of
+    MotionMind and Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
     from motionmind.jit import compiled_names, place_of_code
 

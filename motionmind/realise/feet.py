@@ -11,7 +11,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
 from motionmind.realise.knees import bend_of, distance_of, keep_detail, slow_down, smoothed
-from motionmind.realise.least_squares import bending_diagonals
+from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
@@ -218,8 +218,6 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
         slides: how much it is to move level as little as it can [N - 1], from 0 to 1.
         fps: frames a second.
     """
-    from scipy.linalg import solveh_banded
-
     count = len(wanted)
     firm, bend, still = 1e6 * stands**2, (BENDS * fps) ** 4, slides * (SLIDES * fps) ** 2
     diagonals = bending_diagonals(np.full(count - 2, bend))
@@ -232,7 +230,7 @@ def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: fl
     diagonals[1, :-1] -= still
     diagonals[0, [0, -1]] += 1e12
     right[[0, -1]] = 0.0
-    return np.asarray(solveh_banded(diagonals, right, lower=True))
+    return np.stack([solve_diagonals(diagonals, one) for one in right.T], axis=1)
 
 
 class Posed(NamedTuple):

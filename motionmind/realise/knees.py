@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.realise.least_squares import bending_diagonals
+from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 
 SHIFTS = 0.008  # metres that a foot may be off so that its knee keeps the fine detail of a movement
 STIRS = 2.0, 0.3  # rad/s^2 by which it may accelerate otherwise, and share of its own acceleration
@@ -70,8 +70,6 @@ def keep_detail(bends: Floats, own: Floats, fixed: Bools, thigh: float, shank: f
         shank: length of the bone below.
         fps: frames a second.
     """
-    from scipy.linalg import solveh_banded
-
     widest = np.clip(np.maximum(bends, own), 0.0, 0.5 * np.pi)
     lever = thigh * shank * np.sin(widest) / distance_of(bends, thigh, shank)
     quick = fps**2 * np.sqrt(_around(np.diff(own, 2) ** 2, fps).clip(0.0))
@@ -85,7 +83,7 @@ def keep_detail(bends: Floats, own: Floats, fixed: Bools, thigh: float, shank: f
     right = firm * wanted
     for first, share in enumerate((1.0, -2.0, 1.0)):
         right[first : first + len(turns)] += share * turns
-    departure = solveh_banded(diagonals, right, lower=True)
+    departure = solve_diagonals(diagonals, right)
     return np.where(fixed, bends, np.clip(own + departure, 0.0, np.pi))
 
 

@@ -61,15 +61,13 @@ def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
         start: a trajectory with the right places at the fixed frames [N, 3].
         fixed: frames that do not change [N].
     """
-    from scipy.linalg import solveh_banded
-
     joined = Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
     diagonals, right = _normal_equations(*joined, np.ascontiguousarray(start))
     keep = np.repeat(fixed, 3)
     # A change of 0 at the fixed frames: their own equations outweigh all others.
     diagonals[0, keep] = 1e12 * max(diagonals[0].max(), 1.0)
     right[keep] = 0.0
-    change = solveh_banded(diagonals, right, lower=True).reshape(-1, 3)
+    change = solve_diagonals(diagonals, right).reshape(-1, 3)
     change[fixed] = 0.0
     return np.asarray(start + change)
 
@@ -84,6 +82,39 @@ def bending_diagonals(weights: Floats) -> Floats:
     out[1, 1:-1] -= 2.0 * weights
     out[2, :-2] = weights
     return out
+
+
+def solve_diagonals(diagonals: Floats, right: Floats) -> Floats:
+    """Return the solution [M] of a positive definite system with lower diagonals [B, M] and right side [M].
+
+    SciPy does the same, but its linear algebra takes longer to import than a tween to realise.
+    """
+    rows, out = np.zeros(diagonals.shape[::-1]), right.copy()
+    for k, diagonal in enumerate(diagonals):
+        rows[k:, k] = diagonal[: len(diagonal) - k]
+    solve_rows(rows, out)
+    return out
+
+
+@jit
+def solve_rows(matrix: Floats, right: Floats) -> None:
+    """Solve a positive definite system in place, by Cholesky's factors: matrix[i, k] is that of i and i - k [M, B]."""
+    size, width = matrix.shape
+    for i in range(size):
+        for k in range(min(i, width - 1), -1, -1):
+            total = matrix[i, k]
+            for m in range(k + 1, min(i, width - 1) + 1):
+                if m - k < width:
+                    total -= matrix[i, m] * matrix[i - k, m - k]
+            matrix[i, k] = np.sqrt(total) if k == 0 else total / matrix[i - k, 0]
+    for i in range(size):
+        for k in range(1, min(i, width - 1) + 1):
+            right[i] -= matrix[i, k] * right[i - k]
+        right[i] /= matrix[i, 0]
+    for i in range(size - 1, -1, -1):
+        right[i] /= matrix[i, 0]
+        for k in range(1, min(i, width - 1) + 1):
+            right[i - k] -= matrix[i, k] * right[i]
 
 
 @jit

@@ -25,6 +25,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.segments import nearest_points
 from motionmind.jit import jit
+from motionmind.realise.least_squares import solve_rows
 from motionmind.realise.legs import find_legs, reach
 
 ROUNDS = 8  # corrections, each of what those before it have left
@@ -273,29 +274,8 @@ def _smooth(
         for k in range(min(i, 6) + 1):
             if frozen[i // 3] or frozen[(i - k) // 3]:
                 matrix[i, k] = 1.0 if k == 0 else 0.0
-    _solve_banded(matrix, out)
+    solve_rows(matrix, out)
     return out.reshape(count, 3)
-
-
-@jit
-def _solve_banded(matrix: Floats, right: Floats) -> None:
-    """Solve a positive definite system in place, by Cholesky's factors: matrix[i, k] is that of i and i - k [M, B]."""
-    size, width = matrix.shape
-    for i in range(size):
-        for k in range(min(i, width - 1), -1, -1):
-            total = matrix[i, k]
-            for m in range(k + 1, min(i, width - 1) + 1):
-                if m - k < width:
-                    total -= matrix[i, m] * matrix[i - k, m - k]
-            matrix[i, k] = np.sqrt(total) if k == 0 else total / matrix[i - k, 0]
-    for i in range(size):
-        for k in range(1, min(i, width - 1) + 1):
-            right[i] -= matrix[i, k] * right[i - k]
-        right[i] /= matrix[i, 0]
-    for i in range(size - 1, -1, -1):
-        right[i] /= matrix[i, 0]
-        for k in range(1, min(i, width - 1) + 1):
-            right[i - k] -= matrix[i, k] * right[i]
 
 
 @jit
@@ -380,7 +360,7 @@ def _steps(
             points[0] = one[0] + s * (one[1] - one[0])
             points[1] = other[0] + u * (other[1] - other[0])
             if parted:
-                ahead, behind = one @ side, other @ side
+                ahead, behind = _along(one, side), _along(other, side)
                 points[0], points[1] = one[ahead.argmin()], other[behind.argmax()]
                 gap = ahead.min() - behind.max()
             else:
@@ -408,6 +388,16 @@ def _steps(
                     step = levers[k] * excess / size
                     steps[t, limb] = step * min(1.0, MOST / max(np.sqrt(np.sum(step**2)), 1e-9))
     return needed, steps
+
+
+@jit
+def _along(ends: Floats, direction: Floats) -> Floats:
+    """Return how far two points [2, 3] lie along a direction [3]: [2]."""
+    out = np.zeros(2)
+    for end in range(2):
+        for k in range(3):
+            out[end] += ends[end, k] * direction[k]
+    return out
 
 
 @jit

@@ -56,7 +56,7 @@ class Model(Backbone):  # type: ignore[misc]
         """
         self.model_id = engine.corpus.name
         self._engine, self._patience = engine, patience
-        self._one_at_a_time, self._waiting = asyncio.Lock(), 0
+        self._one_at_a_time, self._waiting, self._ends = asyncio.Lock(), 0, False
 
     def capabilities(self) -> ModelSpec:
         """Return what the protocol says of a model."""
@@ -85,6 +85,10 @@ class Model(Backbone):  # type: ignore[misc]
             ),
         )
 
+    def teardown(self) -> None:
+        """End the work under way: the server ends."""
+        self._ends = True
+
     async def generate(self, request: GenerateRequest) -> MotionResult:
         """Answer a request; a few others may wait meanwhile.
 
@@ -104,6 +108,8 @@ class Model(Backbone):  # type: ignore[misc]
         began = monotonic()
 
         def watch(_: Progress) -> bool:
+            if self._ends:
+                raise ProtocolError("model_unavailable", "the server ends")
             spent = monotonic() - began
             if spent > 2.0 * self._patience:
                 raise ProtocolError("timeout", f"nothing was found within {spent:.0f} s: ask for less at once")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,8 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
+
+MOST_ROTATIONS = 2_000_000  # in all samples together, 16 bytes each where they are sent
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,8 @@ class Order:
         novelty: from 0 to 1: see `TweenRequest`.
 
     Raises:
-        MotionMindError: there is no pose; a frame is outside; two poses disagree.
+        MotionMindError: there is no pose; a frame is outside; two poses disagree; two waypoints, or two pins of a
+            joint, are in one frame; there are too many frames.
     """
 
     skeleton: Skeleton
@@ -100,6 +104,12 @@ class Order:
         for frame in [one.frame for some in (self.poses, self.waypoints, self.pins) for one in some]:
             if not 0 <= frame < self.frames:
                 raise MotionMindError(f"frame {frame} is outside 0 to {self.frames - 1}")
+        if (count := self.samples * self.frames * len(self.skeleton)) > MOST_ROTATIONS:
+            raise MotionMindError(f"{count} rotations are asked for; the most in an answer are {MOST_ROTATIONS}")
+        _check_once("waypoints", [one.frame for one in self.waypoints])
+        for joint in {one.joint for one in self.pins}:
+            name = f"pins of {self.skeleton.names[joint]}"
+            _check_once(name, [one.frame for one in self.pins if one.joint == joint])
         object.__setattr__(self, "poses", _merged(self.poses))
         object.__setattr__(self, "waypoints", sorted(self.waypoints, key=lambda one: one.frame))
 
@@ -107,6 +117,12 @@ class Order:
     def lowest(self) -> float:
         """Height of the lowest joint in the rest pose, metres."""
         return float(self.stands[1] + self.skeleton.rest[: len(self.skeleton), 1].min())
+
+
+def _check_once(name: str, frames: Sequence[int]) -> None:
+    twice = sorted(frame for frame, count in Counter(frames).items() if count > 1)
+    if twice:
+        raise MotionMindError(f"there are two {name} in frame {twice[0]}: give one")
 
 
 def _merged(poses: Sequence[Pose]) -> list[Pose]:

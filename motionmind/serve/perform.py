@@ -21,7 +21,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
-from motionmind.search.solve import Watch
+from motionmind.search.solve import Progress, Watch
 from motionmind.serve.order import Order, Pin, Pose, Waypoint
 from motionmind.serve.pins import chain_to, reach
 from motionmind.serve.rig import Rig
@@ -253,6 +253,8 @@ class _Stage:
             turned = [*chain_to(skeleton, joint), joint]
             goals = rotations[frames]
             for goal, pin in zip(goals, mine, strict=True):
+                if self.watch is not None:
+                    self.watch(Progress(0.0, 0.0, 0))  # which may raise: a request can hold thousands of pins
                 goal[:] = reach(skeleton, goal, motion.root[pin.frame], joint, pin.place)
                 if pin.rotation is not None:
                     goal[joint] = pin.rotation

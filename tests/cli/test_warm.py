@@ -35,7 +35,9 @@ def names_called(function: FunctionType) -> set[str]:
     while left:
         one = left.pop()
         named = [one.__globals__.get(name) for name in one.__code__.co_names]
-        modules = [thing for thing in named if isinstance(thing, ModuleType)]
+        modules = [
+            thing for thing in named if isinstance(thing, ModuleType) and thing.__name__.startswith("motionmind.")
+        ]
         named += [getattr(module, name, None) for module in modules for name in one.__code__.co_names]
         for other in [thing.py_func for thing in named if isinstance(thing, CPUDispatcher)] + [one]:
             package, stem = other.__module__.split(".")[1:3]
@@ -78,3 +80,13 @@ def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkey
     assert done.code == 2
     assert done.err.count("\n") == 1
     assert "NUMBA_CACHE_DIR" in done.err
+
+
+def test_a_tween_imports_neither_linear_algebra_nor_the_network() -> None:
+    code = (
+        "import sys; from motionmind.cli import main\n"
+        "try: main(['tween', 'ballet/arabesque', 'ballet/fifth'])\n"
+        "finally: print({'scipy.linalg', 'pgmpy', 'uvicorn', 'motionmcp'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1] == "set()"

@@ -48,7 +48,9 @@ RIG = {
 def serving(application: Any, **options: Any) -> Iterator[str]:
     """Serve an application at a free port of this computer, behind the guard; yield its address."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        config = uvicorn.Config(Guard(application, "127.0.0.1", **options), log_level="critical", ws="none")
+        config = uvicorn.Config(
+            Guard(application, "127.0.0.1", **options), log_level="critical", ws="none", timeout_graceful_shutdown=1
+        )
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
         thread.start()

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -117,6 +118,25 @@ def test_a_search_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     with serving(app(Engine.load("ballet"), patience=0.2)) as url:
         status, answer = send(url, "POST", "/generate", json.dumps(ask(POSES, 41)).encode())
     assert (status, answer["error"]["code"]) == (504, "timeout")
+
+
+def test_a_server_that_ends_does_not_wait_for_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = threading.Event()
+
+    def endless(problem: Any, watch: Any) -> Any:
+        while True:
+            begun.set()
+            watch(solve.Progress(1.0, 0.0, 0))
+
+    monkeypatch.setattr("motionmind.tween.engine.solve", endless)
+    body = json.dumps(ask(POSES, 41)).encode()
+    with serving(app(Engine.load("ballet"))) as url:
+        connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=60)
+        connection.request("POST", "/generate", body)
+        assert begun.wait(30)
+        began = monotonic()
+    connection.close()
+    assert monotonic() - began < 8.0
 
 
 def test_more_requests_than_can_wait_are_sent_away(monkeypatch: pytest.MonkeyPatch) -> None:

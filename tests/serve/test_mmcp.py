@@ -266,6 +266,9 @@ def test_an_insect_is_served_on_its_own_joints_alone() -> None:
 
 
 NAN = float("nan")
+ENDS = [keyframe(0, A), keyframe(60, B)]
+LONG = wire(human23())
+LONG["joints"] += [LONG["joints"][1] | {"name": f"extra {number}", "parent": "pelvis"} for number in range(100)]
 BAD = {
     "no pose": ({"constraints": [], "segments": [{"type": "text", "prompt": "x", "duration_frames": 9}]}, "invalid"),
     "a frame outside": ({"duration_frames": 20}, "frame_out_of_range"),
@@ -298,6 +301,23 @@ BAD = {
     "a path in place of a model": ({"model": "../../etc/passwd"}, "unknown_model"),
     "another protocol": ({"protocol_version": "2.0"}, "version_unsupported"),
     "a joint that cannot be held": ({"options": {"model_options": {"hold": ["left_ankle"]}}}, "invalid_request"),
+    "two waypoints in a frame": (
+        {"constraints": [*ENDS, {"type": "root_path", "frames": [5], "positions_xz": [[0, 0]]}] * 2},
+        "invalid_request",
+    ),
+    "two pins in a frame": (
+        {
+            "constraints": [
+                *ENDS,
+                {"type": "effector_target", "joint": "pelvis", "frames": [5, 5], "positions": [[0, 0, 0]] * 2},
+            ]
+        },
+        "invalid_request",
+    ),
+    "more than an answer holds": (
+        {"duration_frames": 3600, "timing": {"fps": 120.0}, "skeleton": LONG, "options": {"num_samples": 8}},
+        "invalid_request",
+    ),
     "a rest that is turned": (
         {"skeleton": {"joints": [one | {"rest_rotation": [1.0, 0.0, 0.0, 0.0]} for one in wire(human23())["joints"]]}},
         "invalid_skeleton",
