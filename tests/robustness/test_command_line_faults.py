@@ -226,7 +226,7 @@ def test_long_names_are_shortened_wherever_they_are_displayed(tmp_path: Path, ru
     for name in ("clip.svg", "graph.svg"):
         assert LONG[:400] not in (tmp_path / name).read_text("utf-8")
     page = (tmp_path / "clip.html").read_text("utf-8")
-    shown = re.findall(r"<title>.*</title>|<h1>.*</h1>|\"names\":\[.*?\]", page)
+    shown = re.findall(r"<title>.*</title>|<h1 .*</h1>|\"names\":\[.*?\]", page)
     assert [LONG[:100] in words for words in shown] == [False] * 3
     assert run("corpus", "info", "mine", "--json").json["title"] == LONG
     assert json.loads((tmp_path / "report.json").read_bytes())["joints"] == [*joints, "facing"]
