@@ -17,7 +17,7 @@ from motionmind.render import PICTURES
 _TOLERANCE = 12.0  # degrees, for joints that --tolerance does not name
 
 
-@command("motionmind compose corpora/ballet/barre.score --clip tendus -o tendus.bvh")
+@command("motionmind compose ballet/barre.score --clip tendus -o tendus.bvh")
 @click.argument("score", type=FILE)
 @outputs(f"Write {OUTPUTS}.")
 @option(
@@ -32,9 +32,11 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
 
     docs/notation.md explains the language of scores.
     """
+    from motionmind.names.finding import locate_score
     from motionmind.notation import compose as notation
     from motionmind.notation.read import read_score
 
+    score = locate_score(str(score))
     if clip and posture:
         raise click.UsageError("give --clip or --posture, not both")
     if fps and posture:

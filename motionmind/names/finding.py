@@ -82,9 +82,9 @@ class Collection(ABC):
 class _ScoreCollection(Collection):
     """A score's clips and postures, and the postures of scores that it includes."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, home: Path | None) -> None:
         super().__init__(path)
-        self._score = read_score(path)
+        self._score = read_score(locate_score(path, home))
         self._clips = {clip.name: clip for clip in self._score.clips}
 
     @property
@@ -153,7 +153,15 @@ def open_collection(source: Source, home: Path | None = None) -> Collection:
     Raises:
         MotionMindError: it cannot be read.
     """
-    return _ScoreCollection(source.place) if source.kind == "score" else _CorpusCollection(source.place, home)
+    return (_ScoreCollection if source.kind == "score" else _CorpusCollection)(source.place, home)
+
+
+def locate_score(path: str, home: Path | None = None) -> Path:
+    """Return the path of a score: of the file or, where there is none, of a corpus's own, CORPUS/NAME.score."""
+    corpus, _, name = path.rpartition("/")
+    if corpus and not is_file(path) and (folder := store.list_corpora(home).get(corpus)) and (folder / name).is_file():
+        return folder / name
+    return Path(path)
 
 
 def find_motion(

@@ -14,7 +14,7 @@ from motionmind.corpus import store
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.learned.model import LearnedCorpus
-from motionmind.names.finding import find_motion, find_posture, open_collection
+from motionmind.names.finding import find_motion, find_posture, locate_score, open_collection
 from motionmind.names.spelling import Moment, parse_frames, parse_posture, parse_source
 from motionmind.notation.compose import posture
 from motionmind.notation.read import read_score
@@ -145,6 +145,17 @@ def test_a_posture_of_a_score_is_its_own_or_one_that_it_includes() -> None:
     assert_same(find_posture("mine.score/first@0"), find_motion(parse_source("mine.score/first")).posture(0))
     assert_same(find_posture("mine.score@0"), find_posture("mine.score/first@0"))
     assert np.abs(find_posture("mine.score@0").rotations - find_posture("ballet/first").rotations).max() > 0.05
+
+
+def test_a_score_of_a_corpus_needs_no_path_and_a_file_of_that_name_goes_first() -> None:
+    word = "ballet/centre.score/tendu"
+    assert_same(find_posture(parse_posture(word)), posture(read_score(CENTRE), "tendu"))
+    assert locate_score("ballet/nothing.score") == Path("ballet/nothing.score")
+    assert locate_score("ballet/../karate/kata.score") == Path("ballet/../karate/kata.score")
+    Path("ballet").mkdir()
+    shutil.copy(BALLET / "barre.score", "ballet/centre.score")
+    assert locate_score("ballet/centre.score") == Path("ballet/centre.score")
+    assert locate_score("centre.score") == Path("centre.score")
 
 
 def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None:
