@@ -44,16 +44,18 @@ def hold(version: Path) -> Iterator[bool]:
 
 @contextmanager
 def new_version(folder: Path) -> Iterator[Path]:
-    """Make a folder for the next version of `folder`, and hold it."""
+    """Make a folder for the next version of `folder`, and hold it alone."""
     numbers = [int(entry.name) for entry in folder.iterdir() if _is_version(entry)]
     for number in count(max(numbers, default=0) + 1):
         version = folder / str(number)
-        try:
-            version.mkdir()
-        except FileExistsError:  # another writer's
-            continue
-        with hold(version) as there:
-            if there:  # and not taken for a leftover before it was held
+        with ExitStack() as stack:
+            try:
+                version.mkdir()
+                mine = stack.enter_context(_locked(version, alone=True, is_new=True))
+            except (FileExistsError, FileNotFoundError):  # another writer's; or taken for a leftover
+                continue
+            # Another writer may have removed it as a leftover, and made and locked it anew.
+            if mine:
                 yield version
                 return
 
@@ -136,27 +138,35 @@ def _moved_aside(folder: Path, suffix: str) -> list[Path]:
 
 
 @contextmanager
-def _locked(folder: Path, *, alone: bool) -> Iterator[bool]:
+def _locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]:
     """Lock a folder until the context or the process ends: alone, or with others who do not lock it alone.
 
     Yields:
-        Whether it is locked; alone if nobody else has locked it, with others if the folder is still in its place. Where
-        there are no locks, a folder that has not changed for an hour is taken to be unused; and Windows, which has none
-        on folders, removes no file that is open.
+        Whether it is locked; alone if nobody else has locked it, with others, or a new one, if the folder is still in
+        its place. Where there are no locks, a folder that has not changed for an hour is taken to be unused, and no
+        other is removed; and Windows, which has none on folders, removes no file that is open.
     """
-    long_unchanged = time.time() - folder.stat().st_mtime > _UNUSED
+    unused = time.time() - folder.stat().st_mtime > _UNUSED
     if sys.platform == "win32":
-        yield long_unchanged or not alone
+        yield unused or is_new or not alone
         return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
-            locked = alone or (folder.exists() and os.path.samestat(folder.stat(), os.fstat(descriptor)))
+            locked = (alone and not is_new) or _is_in_place(folder, descriptor)
         except BlockingIOError:
             locked = False
         except OSError:
-            locked = long_unchanged or not alone
+            locked = unused or is_new or not alone
         yield locked
     finally:
         os.close(descriptor)
+
+
+def _is_in_place(folder: Path, descriptor: int) -> bool:
+    """Whether an open folder is still the one of its name."""
+    try:
+        return os.path.samestat(folder.stat(), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 
@@ -240,10 +241,11 @@ def writers(mine: Path) -> Iterator[None]:
         for first in (1, 2)
     ]
     yield
+    failed = [process.poll() for process in running]
     for process in running:
-        assert process.poll() is None  # neither failed
         process.kill()
         process.wait()
+    assert failed == [None, None]
 
 
 def test_2000_loads_beside_two_writers_are_each_of_one_version(mine: Path, writers: None) -> None:
@@ -267,6 +269,23 @@ def test_2000_loads_beside_two_writers_are_each_of_one_version(mine: Path, write
     assert not failures
     assert len(seeds) == 2000
     assert len(set(seeds)) > 20  # it was replaced meanwhile
+
+
+def test_a_version_that_another_writer_removed_and_made_anew_is_that_writers(
+    mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine.mkdir(parents=True)
+    others = ExitStack()
+
+    def interrupted(version: Path) -> None:
+        monkeypatch.undo()
+        version.mkdir()
+        versions.remove_others(mine, lambda: None)  # nobody holds it yet
+        assert others.enter_context(versions.new_version(mine)) == version
+
+    monkeypatch.setattr(Path, "mkdir", interrupted)
+    with others, versions.new_version(mine) as version:
+        assert (version, sorted(mine.iterdir())) == (mine / "2", [mine / "1", mine / "2"])
 
 
 def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
