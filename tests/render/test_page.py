@@ -544,19 +544,24 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto((tmp_path / "host.html").as_uri())
     inner = next(one for one in tab.frames if one != tab.main_frame)
-    for _ in range(500):
-        if inner.evaluate("!!window.motionmind"):
-            break
-        tab.wait_for_timeout(20)
+
+    def wait(condition: str) -> None:
+        """Keys reach the frame's own process in their time."""
+        for _ in range(500):
+            if inner.evaluate(condition):
+                return
+            tab.wait_for_timeout(20)
+        raise AssertionError(condition)
+
+    wait("!!window.motionmind")
     assert inner.evaluate("document.documentElement.scrollHeight") == 400
     inner.click("#play")
-    inner.wait_for_timeout(300)
-    assert inner.evaluate("motionmind.player.time") > 0.0
+    wait("motionmind.player.time > 0.0")
     tab.keyboard.press("Space")  # the clicked frame has the keys
-    assert not inner.evaluate("motionmind.player.playing")
+    wait("!motionmind.player.playing")
     inner.evaluate("motionmind.player.seek(0.15)")
     tab.keyboard.press("?")
-    assert inner.is_visible("#sheet")
+    inner.wait_for_selector("#sheet", state="visible")
     tab.keyboard.press("Escape")
     shot = np.array(Image.open(BytesIO(inner.locator("#canvas").screenshot())).convert("RGB")).astype(np.int16)
     assert near(shot, INSERTED["middle"]).sum() > 300
