@@ -26,6 +26,7 @@ from motionmind.errors import MotionMindError
 if TYPE_CHECKING:
     from motionmind.search.problem import Problem
 
+NOTICE = "compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)"
 _LOOK = 0.2  # seconds between two looks at what is compiled
 
 
@@ -73,7 +74,7 @@ def help_first_search() -> None:
 
 
 def _say() -> None:
-    click.echo("compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)", err=True)
+    click.echo(NOTICE, err=True)
 
 
 def _compile() -> None:

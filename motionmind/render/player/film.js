@@ -1,12 +1,13 @@
 /** Films: the whole movement as it is seen, drawn frame by frame and recorded by the browser as WebM. */
 
-import { retimed } from "motionmind/webm";
+import { frameCount, retimed } from "motionmind/webm";
 
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8"];
 const RATE = 30; // frames a second
 const LONGEST = 1280; // pixels, of a picture's longer side
 const BITS = 8_000_000; // a second
-const LAST = 300; // milliseconds that a recorder has for the last frame
+const LAST = 300; // milliseconds that a recorder has for the last frame,
+const LATEST = 3000; // and that it has on a machine so busy that frames are still missing
 
 /** Say why this browser makes no films; undefined if it does. */
 export function obstacle() {
@@ -46,18 +47,32 @@ export async function film(stage, motion, ghosts, onFrame, signal) {
       drawn.push(performance.now());
       onFrame(time);
     }
-    await pause(LAST, drawn.at(-1));
+    do {
+      await pause(LAST, performance.now());
+      signal.throwIfAborted();
+      await flushed(recorder);
+    } while (frameCount(await joined(chunks)) < times.length && performance.now() - drawn.at(-1) < LATEST);
   } finally {
     if (recorder.state !== "inactive") recorder.stop();
   }
   await recorded;
-  const bytes = new Uint8Array(await new Blob(chunks).arrayBuffer());
   const shown = times.map((time) => time - motion.start);
-  return new Blob([retimed(bytes, drawn, shown, motion.end - motion.start)], { type: "video/webm" });
+  return new Blob([retimed(await joined(chunks), drawn, shown, motion.end - motion.start)], { type: "video/webm" });
 }
 
 function type() {
   return TYPES.find((one) => MediaRecorder.isTypeSupported(one));
+}
+
+/** Have a recorder hand out what it holds. */
+function flushed(recorder) {
+  const handed = new Promise((done) => recorder.addEventListener("dataavailable", done, { once: true }));
+  recorder.requestData();
+  return handed;
+}
+
+async function joined(chunks) {
+  return new Uint8Array(await new Blob(chunks).arrayBuffer());
 }
 
 /** Even times from the first posture to the last, both included. */

@@ -63,6 +63,11 @@ export function retimed(bytes, drawn, times, length) {
   return joined([header, element(ID.segment, info, tracks, cues(clusters, start + room), ...clusters.map(({ data }) => data))]);
 }
 
+/** How many frames a recording has so far. */
+export function frameCount(bytes) {
+  return read(bytes).blocks.length;
+}
+
 /** Find the header, the tracks and the frames: {time, in milliseconds; key; data with the track's number}. */
 function read(bytes) {
   const found = { header: undefined, tracks: undefined, blocks: [] };
