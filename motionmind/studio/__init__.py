@@ -1,0 +1,1 @@
+"""The studio: a page in which a choreographer works, and the server that it talks to, on this computer alone."""
