@@ -1,0 +1,273 @@
+"""Laws of edits and of the states that they lead to."""
+
+from itertools import pairwise
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionmind.errors import MotionMindError
+from motionmind.studio import edits as e
+from motionmind.studio.piece import State, Verdict, apply, apply_all, check, question_of
+
+IDS = [f"b{number}" for number in range(8)]
+FRAMES = st.integers(0, 12)
+LENGTH = 10  # frames of each movement
+ids = st.sampled_from(IDS)
+before = st.none() | ids
+sources = st.sampled_from(["ballet/adagio", "~ballet/adagio", "karate/kata", "own/rest"])
+passing = st.builds(e.Passing, sources, FRAMES)
+blocks = st.builds(e.Block, ids, sources, FRAMES, FRAMES, st.booleans())
+singles = st.one_of(
+    st.builds(e.Insert, ids, sources, FRAMES, FRAMES, st.booleans(), before),
+    st.builds(e.Move, ids, before),
+    st.builds(e.Trim, ids, FRAMES, FRAMES),
+    st.builds(e.Split, ids, FRAMES, ids),
+    st.builds(e.Mirror, ids),
+    st.builds(e.Delete, ids),
+    st.builds(e.Choose, ids, ids, st.integers(1, 4)),
+    st.builds(e.Decide, ids, ids, st.sampled_from(["open", "locked", "discarded"])),
+    st.builds(e.Wish, ids, ids, st.none() | st.floats(0.1, 9.0), st.lists(passing, max_size=2).map(tuple)),
+    st.builds(e.Arrange, st.lists(blocks, max_size=4).map(tuple), st.just({"words": "vary the piece"})),
+    st.builds(e.SavePosture, st.sampled_from(["rest", "reach"]), st.none() | st.just("m-1")),
+    st.builds(e.SetCorpus, st.sampled_from(["ballet", "karate"])),
+    st.builds(e.SetTitle, st.text(max_size=5)),
+)
+anything = singles | st.builds(e.Several, st.lists(singles, min_size=1, max_size=3).map(tuple))
+BEGIN = State(
+    corpus="ballet",
+    blocks=tuple(e.Block(name, "ballet/adagio", 2, 8) for name in IDS[:4]),
+    used=frozenset(IDS[:4]),
+    postures={"rest": "m-0"},
+)
+
+
+def fits(state: State, edit: e.Edit) -> State | None:
+    try:
+        return apply(state, edit)
+    except MotionMindError:
+        return None
+
+
+def played(history: list[e.Edit], state: State = BEGIN) -> tuple[list[e.Edit], State]:
+    """The edits of a history that fit, and the state that they lead to."""
+    kept = []
+    for edit in history:
+        after = fits(state, edit)
+        if after is not None:
+            kept.append(edit)
+            state = after
+    return kept, state
+
+
+@given(st.lists(anything, max_size=12))
+def test_state_is_what_its_edits_lead_to_when_read_back(history):
+    kept, state = played(history)
+    written = [msgspec.json.decode(msgspec.json.encode(edit), type=e.Edit) for edit in kept]
+    assert written == kept
+    assert apply_all(written, BEGIN) == state
+
+
+@given(st.lists(anything, max_size=12))
+def test_every_state_is_sound(history):
+    _, state = played(history)
+    names = [block.id for block in state.blocks]
+    assert len(set(names)) == len(names)
+    assert set(names) <= state.used
+    assert BEGIN.used <= state.used
+    for block in state.blocks:
+        assert block.first <= block.last
+        assert not block.source.startswith(("~", "own/"))
+    assert [seam.pair for seam in state.seams] == list(pairwise(names))
+
+
+@given(st.lists(singles, max_size=8), singles)
+def test_what_an_edit_does_not_touch_stays(history, edit):
+    _, state = played(history)
+    after = fits(state, edit)
+    if after is None or isinstance(edit, e.Arrange):
+        return
+    touched = e.touched(edit)
+    now = {block.id: block for block in after.blocks}
+    for block in state.blocks:
+        assert block.id in touched or now.get(block.id) == block
+    rest = [block.id for block in state.blocks if block.id not in touched]
+    assert [block.id for block in after.blocks if block.id not in touched] == rest
+    for pair, verdict in state.verdicts.items():
+        assert touched & {pair, *pair} or after.verdicts.get(pair) == verdict
+    assert "/corpus" in touched or after.corpus == state.corpus
+    assert "/title" in touched or after.title == state.title
+    for name, key in state.postures.items():
+        assert f"own/{name}" in touched or after.postures[name] == key
+
+
+@given(st.lists(singles, max_size=6), singles, st.lists(singles, max_size=4))
+def test_undo_by_replay_takes_back_that_edit_alone(history, taken_back, later):
+    """Where the later edits rest on it in no way, they do the same without it."""
+    _, state = played(history)
+    if isinstance(taken_back, e.Arrange) or fits(state, taken_back) is None:
+        return
+    kept, after = played(later, apply(state, taken_back))
+    mine = e.touched(taken_back)
+    if any(mine & e.touched(edit) or isinstance(edit, e.Arrange) for edit in kept):
+        return
+    try:
+        without = apply_all(kept, state)
+    except MotionMindError:
+        return  # a later edit rests on it
+    others = {block.id: block for block in without.blocks if block.id not in mine}
+    assert others == {block.id: block for block in after.blocks if block.id not in mine}
+    for name in mine & {block.id for block in state.blocks}:
+        assert without.block(name) == state.block(name)
+
+
+@given(st.lists(singles, max_size=6), st.lists(singles, min_size=1, max_size=4))
+def test_several_edits_are_done_together_or_not_at_all(history, together):
+    _, state = played(history)
+    kept, after = played(together, state)
+    whole = fits(state, e.Several(tuple(together)))
+    assert whole == (after if len(kept) == len(together) else None)
+
+
+@given(st.lists(singles, max_size=6), ids)
+def test_a_moved_block_stands_before_the_one_named(history, name):
+    _, state = played(history)
+    for block in state.blocks:
+        after = fits(state, e.Move(block.id, name))
+        if after is not None:
+            assert after.blocks[after.place(block.id) + 1].id == name
+
+
+@given(st.lists(singles, max_size=6), ids)
+def test_mirroring_twice_and_moving_back_change_nothing(history, name):
+    _, state = played(history)
+    once = fits(state, e.Mirror(name))
+    if once is not None:
+        assert once != state
+        assert apply(once, e.Mirror(name)).blocks == state.blocks
+    for block in state.blocks:
+        place = state.place(block.id)
+        after = state.blocks[place + 1].id if place + 1 < len(state.blocks) else None
+        away = apply(state, e.Move(block.id, None))
+        assert away.blocks[-1] == block
+        assert apply(away, e.Move(block.id, after)).blocks == state.blocks
+        assert apply(away, e.Move(block.id, after)).verdicts == state.verdicts
+
+
+@given(FRAMES, FRAMES, st.integers(-1, 14))
+@settings(max_examples=200)
+def test_trimming_and_splitting_stay_in_bounds(first, last, at):
+    state = fits(BEGIN, e.Trim("b1", first, last))
+    assert (state is None) == (first > last)
+    if state is None:
+        return
+    split = fits(state, e.Split("b1", at, "new"))
+    assert (split is None) == (not first < at <= last)
+    if split is not None:
+        one, other = split.block("b1"), split.block("new")
+        assert (one.first, one.last + 1, other.last) == (first, other.first, last)
+        assert split.seam("b1", "new").goes_on
+
+
+def test_an_edit_names_movement_that_is_there_and_long_enough():
+    def frames(key):
+        if "nowhere" in key:
+            raise MotionMindError(f"no movement {key}")
+        return LENGTH
+
+    good = [e.Insert("n", "karate/kata", 0, 9), e.Trim("b1", 0, 9), e.Wish("b0", "b1", 1.0, (e.Passing("own/rest"),))]
+    bad = [
+        e.Insert("n", "karate/kata", 0, 10),
+        e.Insert("n", "nowhere/x", 0, 1),
+        e.Trim("b1", 0, 10),
+        e.Wish("b0", "b1", 1.0, (e.Passing("karate/kata", 10),)),
+        e.Arrange((e.Block("n", "karate/kata", 3, 11),)),
+        e.SavePosture("x", "nowhere/x"),
+        e.Several((e.Mirror("b1"), e.Insert("n", "karate/kata", 0, 10))),
+    ]
+    for edit in good:
+        check(apply(BEGIN, edit), edit, frames)
+    for edit in bad:
+        with pytest.raises(MotionMindError, match=r"has frames 0 to 9|no movement"):
+            check(apply(BEGIN, edit), edit, frames)
+
+
+def test_a_locked_insertion_changes_only_when_it_is_unlocked():
+    state = apply_all([e.Choose("b1", "b2", 3), e.Decide("b1", "b2", "locked")], BEGIN)
+    for edit in (
+        e.Choose("b1", "b2", 1),
+        e.Wish("b1", "b2", 2.0),
+        e.Trim("b1", 2, 7),
+        e.Trim("b2", 3, 8),
+        e.Mirror("b2"),
+    ):
+        with pytest.raises(MotionMindError, match=r"between b1 and b2 is locked: unlock it first"):
+            apply(state, edit)
+    assert apply(state, e.Trim("b1", 3, 8)).verdicts == state.verdicts
+    assert apply(state, e.Split("b1", 5, "n")).seam("n", "b2").verdict == Verdict(chosen=3, decision="locked")
+    open_again = apply_all([e.Decide("b1", "b2", "open"), e.Trim("b1", 2, 7)], state)
+    assert open_again.seam("b1", "b2").verdict == Verdict()
+
+
+def test_a_saved_posture_that_is_used_stays_as_it_was():
+    used = apply(BEGIN, e.Insert("n", "~own/rest", 0, 0))
+    assert used.block("n") == e.Block("n", "m-0", 0, 0, mirrored=True)
+    assert apply(used, e.SavePosture("rest", "m-1")).block("n").source == "m-0"
+    assert apply(used, e.SavePosture("rest", None)).block("n").source == "m-0"
+    with pytest.raises(MotionMindError, match="no posture is saved as reach"):
+        apply(BEGIN, e.Insert("n", "own/reach", 0, 0))
+
+
+def test_a_question_is_told_apart_by_all_that_its_answer_depends_on():
+    seam = apply_all([e.Trim("b2", 4, 8), e.Mirror("b2")], BEGIN).seam("b1", "b2")
+    versions = {"ballet": "v1", "karate": "v1"}
+    asked = question_of(seam.ends, e.Ask(), "ballet", versions)
+    one, other = seam.ends
+    others = [
+        question_of((one, other), e.Ask(), "karate", versions),
+        question_of((one, other), e.Ask(), "ballet", {"ballet": "v2"}),
+        question_of((one, other), e.Ask(2.0), "ballet", versions),
+        question_of((one, other), e.Ask(pins=(e.Pin("left_wrist"),)), "ballet", versions),
+        question_of((one, other), e.Ask(passing=(e.Passing("karate/kata", 3),)), "ballet", versions),
+        question_of((other, one), e.Ask(), "ballet", versions),
+        *(
+            question_of((msgspec.structs.replace(one, **change), other), e.Ask(), "ballet", versions)
+            for change in ({"key": "m-1"}, {"frame": 3}, {"moves": False})
+        ),
+    ]
+    assert len({asked, *others}) == 1 + len(others)
+    assert question_of(seam.ends, e.Ask(), "ballet", versions | {"karate": "v2"}) == asked
+    kata = e.Ask(passing=(e.Passing("karate/kata", 3),))
+    assert question_of(seam.ends, kata, "ballet", versions) != question_of(
+        seam.ends, kata, "ballet", versions | {"karate": "v2"}
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"edit": "insert", "id": "b 1", "source": "ballet/adagio", "first": 0, "last": 1}',
+        '{"edit": "insert", "id": "b1", "source": "", "first": 0, "last": 1}',
+        '{"edit": "insert", "id": "b1", "source": "x", "first": -1, "last": 1}',
+        '{"edit": "trim", "block": "b1", "first": 0, "last": 1e9}',
+        '{"edit": "ask", "left": "b1", "right": "b2", "seconds": 0}',
+        '{"edit": "ask", "left": "b1", "right": "b2", "seconds": NaN}',
+        '{"edit": "choose", "left": "b1", "right": "b2", "alternative": 0}',
+        '{"edit": "several", "edits": []}',
+        '{"edit": "several", "edits": [{"edit": "several", "edits": []}]}',
+        '{"edit": "erase"}',
+        '{"edit": "mirror", "block": "b1", "path": "/etc/passwd"}',
+    ],
+)
+def test_no_edit_is_read_from_what_is_none(text):
+    with pytest.raises(msgspec.DecodeError):
+        msgspec.json.decode(text, type=e.Edit)
+
+
+def test_words_say_what_an_edit_does():
+    assert e.words_of(e.Several((e.Mirror("b1"), e.Decide("b1", "b2", "locked")))) == "lock an insertion"
+    assert e.words_of(e.Several((e.Mirror("b1"),), "turn everything round")) == "turn everything round"
+    assert e.words_of(e.SavePosture("rest", None)) == "forget the posture rest"
+    for kind in e.Single.__args__:
+        assert kind in e._WORDS or kind in (e.Decide, e.Arrange, e.SavePosture)
