@@ -75,6 +75,36 @@ class End(msgspec.Struct, frozen=True):
     moves: bool
 
 
+class Found(msgspec.Struct, frozen=True):
+    """A movement that was found for a seam.
+
+    Attributes:
+        key: the movement.
+        seconds: its length.
+        words: what there is to know of it, in a choreographer's words.
+    """
+
+    key: str
+    seconds: float
+    words: str
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """What the engine found at a seam: a fact, which no undo takes back.
+
+    Attributes:
+        finding: the question that it answers (`question_of`).
+        abrupt: whether the corpus does not know the transition.
+        words: why, or why nothing was found.
+        insertions: what can be inserted, the best first; None as long as nobody has searched.
+    """
+
+    finding: str
+    abrupt: bool
+    words: str
+    insertions: tuple[Found, ...] | None
+
+
 class Seam(NamedTuple):
     """A seam between two neighbours.
 

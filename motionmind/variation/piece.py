@@ -48,7 +48,7 @@ class Arrangement(NamedTuple):
     frames: Ints
 
 
-class _Placement(NamedTuple):
+class Placement(NamedTuple):
     """A turn by `angle` radians about the vertical, then a move by `shift` [3] metres."""
 
     angle: float
@@ -166,13 +166,13 @@ class Piece:
 
     def _stretch_at_origin(self, first: int, stop: int, posture: int) -> Motion:
         """Return the frames from `first` to before `stop`, placed as `_at_origin` places a posture among them."""
-        own, place = self.motion.slice(first, stop), _Placement(-self._headings[posture], np.zeros(3))
+        own, place = self.motion.slice(first, stop), Placement(-self._headings[posture], np.zeros(3))
         root = place.move(own.root - self.motion.root[self.frames[posture]] * _FLOOR)
         return replace(own, rotations=rot.normalise(place.turn(own.rotations)), root=root)
 
     def _at_origin(self, posture: int) -> Posture:
         own = self.motion.posture(int(self.frames[posture]))
-        rotations = _Placement(-self._headings[posture], np.zeros(3)).turn(own.rotations)
+        rotations = Placement(-self._headings[posture], np.zeros(3)).turn(own.rotations)
         return replace(own, rotations=rot.normalise(rotations), root=own.root * _VERTICAL)
 
     @cached_property
@@ -201,8 +201,8 @@ class Piece:
         """
         leaps = np.flatnonzero(np.diff(order) != 1) + 1
         starts, stops = np.concatenate([[0], leaps]), np.concatenate([leaps, [len(order)]])
-        motion, parts = self.motion, _Parts()
-        place, clock = _Placement(0.0, np.zeros(3)), float(motion.times[0] - motion.times[self.frames[order[0]]])
+        motion, parts = self.motion, Parts()
+        place, clock = Placement(0.0, np.zeros(3)), float(motion.times[0] - motion.times[self.frames[order[0]]])
         for start, stop in zip(starts, stops, strict=True):
             first, last = order[start], order[stop - 1]
             chunk = slice(int(self.frames[first]), int(self.frames[last]) + 1)
@@ -218,21 +218,21 @@ class Piece:
             else:
                 inner = slice(1, -1)  # the ends are the postures themselves
                 rotations, root, times = inserted.rotations[inner], inserted.root[inner], inserted.times[inner]
-                parts.add(rotations, root, times, inserted.insertions, _Placement(heading, end), now)
+                parts.add(rotations, root, times, inserted.insertions, Placement(heading, end), now)
                 now += float(inserted.times[-1])
             place, clock = self._continue(order[stop], end, heading, now)
         return parts.join(motion)
 
-    def _continue(self, posture: int, end: Floats, heading: float, now: float) -> tuple[_Placement, float]:
+    def _continue(self, posture: int, end: Floats, heading: float, now: float) -> tuple[Placement, float]:
         """The placement and the clock of a chunk that begins with a posture at `end` [3], at the time `now`."""
         angle = heading - self._headings[posture]
         begins = self.frames[posture]
         turned = rot.mul_vec(rot.about_vertical(angle), self.motion.root[begins] * _FLOOR)
-        return _Placement(float(angle), end - turned), now - float(self.motion.times[begins])
+        return Placement(float(angle), end - turned), now - float(self.motion.times[begins])
 
 
 @dataclass
-class _Parts:
+class Parts:
     """The chunks and insertions of an arrangement, one after another; `count` frames so far."""
 
     count: int = 0
@@ -248,7 +248,7 @@ class _Parts:
         root: Floats,
         times: Floats,
         insertions: Iterable[Insertion],
-        place: _Placement,
+        place: Placement,
         clock: float,
     ) -> None:
         """Add frames [F], placed on the floor and `clock` seconds later."""

@@ -1,0 +1,217 @@
+"""The piece in time and on the floor: when each of its parts begins, where it is set down and which way it faces.
+
+A part is a stretch of a movement: a block, or the insertion at a seam. Each is set down where the one before it ends,
+level place and heading; a block that goes on as recorded stays where the recording has it. The page plays the parts so,
+and `performance` makes them one movement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from math import cos, sin
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
+from motionmind.studio.piece import Seam, State, key_of
+from motionmind.variation.piece import ALONE, Parts, Placement
+
+Movements = Callable[[str], Motion]  # returns the movement of a key; MotionMindError if there is none
+
+
+class Part(msgspec.Struct, frozen=True):
+    """A stretch of a movement, placed.
+
+    Attributes:
+        key: the movement.
+        first: the frame that it begins with.
+        last: the frame that it ends with.
+        at: when it begins in the piece, seconds.
+        seconds: how long it lasts.
+        place: x and z of the shift that comes after the turn, metres.
+        turn: angle about the vertical, radians.
+        inserted: whether it is an insertion.
+    """
+
+    key: str
+    first: int
+    last: int
+    at: float
+    seconds: float
+    place: tuple[float, float]
+    turn: float
+    inserted: bool = False
+
+
+class Mark(NamedTuple):
+    """A body at a frame of a movement: its level place, metres, its heading, radians, and the time, seconds."""
+
+    x: float
+    z: float
+    heading: float
+    time: float
+
+
+class Marks:
+    """Marks of movements' frames, each remembered: a piece asks for the same ones at every edit.
+
+    Args:
+        movement: returns movements by key.
+    """
+
+    def __init__(self, movement: Movements) -> None:
+        self._movement = movement
+        self._marks: dict[tuple[str, int], Mark] = {}
+        self._lengths: dict[str, int] = {}
+
+    def at(self, key: str, frame: int) -> Mark:
+        """Return the mark of a frame; MotionMindError if there is no such movement or frame."""
+        if (known := self._marks.get((key, frame))) is None:
+            motion = self._movement(key)
+            if not 0 <= frame < len(motion):
+                raise MotionMindError(f"{key} has frames 0 to {len(motion) - 1}, no frame {frame}")
+            x, _, z = motion.root[frame].tolist()
+            known = Mark(x, z, float(rot.heading(motion.rotations[frame, 0])), float(motion.times[frame]))
+            self._marks[key, frame] = known
+        return known
+
+    def length(self, key: str) -> int:
+        """Return the number of frames of a movement."""
+        if key not in self._lengths:
+            self._lengths[key] = len(self._movement(key))
+        return self._lengths[key]
+
+    def step(self, key: str, frame: int) -> float:
+        """Return the seconds from a frame to the next one; the last frame lasts as long as the one before it."""
+        count = self.length(key)
+        if count == 1:
+            return ALONE
+        begin = min(frame, count - 2)
+        return self.at(key, begin + 1).time - self.at(key, begin).time
+
+
+class Layout(NamedTuple):
+    """A piece's parts.
+
+    Attributes:
+        blocks: one for each block, in order.
+        insertions: one for each seam, in order; None where nothing is inserted.
+        seconds: length of the piece.
+    """
+
+    blocks: tuple[Part, ...]
+    insertions: tuple[Part | None, ...]
+    seconds: float
+
+    @property
+    def parts(self) -> Iterator[Part]:
+        """All of them in the order in which they come."""
+        for place, block in enumerate(self.blocks):
+            yield block
+            if place < len(self.insertions) and (insertion := self.insertions[place]) is not None:
+                yield insertion
+
+
+def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks) -> Layout:
+    """Place a piece's parts.
+
+    Args:
+        state: the piece.
+        insertion: returns the key of the movement that is inserted at a seam; None for none.
+        marks: of the movements.
+
+    Raises:
+        MotionMindError: a movement or a frame of it is missing.
+    """
+    blocks: list[Part] = []
+    insertions: list[Part | None] = []
+    for place, block in enumerate(state.blocks):
+        if place == 0:
+            blocks.append(_part(marks, key_of(block), block.first, block.last, 0.0, (0.0, 0.0), 0.0))
+            continue
+        seam, before = state.seams[place - 1], blocks[-1]
+        end = before.at + before.seconds
+        if seam.goes_on:
+            at = end + (marks.step(before.key, before.last) if block.first > before.last else 0.0)
+            insertions.append(None)
+            blocks.append(_part(marks, before.key, block.first, block.last, at, before.place, before.turn))
+            continue
+        key = insertion(seam)
+        if key is None:
+            insertions.append(None)
+            end += marks.step(before.key, before.last)
+        else:
+            before = _following(marks, before, key, 0, marks.length(key) - 1, end, inserted=True)
+            insertions.append(before)
+            end += before.seconds
+        blocks.append(_following(marks, before, key_of(block), block.first, block.last, end))
+    length = blocks[-1].at + blocks[-1].seconds if blocks else 0.0
+    return Layout(tuple(blocks), tuple(insertions), length)
+
+
+def _part(marks: Marks, key: str, first: int, last: int, at: float, place: tuple[float, float], turn: float) -> Part:
+    seconds = marks.at(key, last).time - marks.at(key, first).time
+    return Part(key, first, last, at, seconds, place, turn)
+
+
+def _following(
+    marks: Marks, before: Part, key: str, first: int, last: int, at: float, *, inserted: bool = False
+) -> Part:
+    """A part, set down where another one ends."""
+    end, begin = marks.at(before.key, before.last), marks.at(key, first)
+    turn = before.turn + end.heading - begin.heading
+    x, z = _turned(end.x, end.z, before.turn)
+    own_x, own_z = _turned(begin.x, begin.z, turn)
+    place = before.place[0] + x - own_x, before.place[1] + z - own_z
+    part = _part(marks, key, first, last, at, place, turn)
+    return msgspec.structs.replace(part, inserted=True) if inserted else part
+
+
+def _turned(x: float, z: float, angle: float) -> tuple[float, float]:
+    """A level place, turned about the vertical."""
+    return x * cos(angle) + z * sin(angle), z * cos(angle) - x * sin(angle)
+
+
+def performance(parts: Sequence[Part], movement: Movements) -> Motion:
+    """Return a piece's parts as one movement, its insertions marked.
+
+    Args:
+        parts: the parts, in order, at least one.
+        movement: returns movements by key.
+
+    Raises:
+        MotionMindError: there is nothing, or the parts are on different skeletons.
+    """
+    if not parts:
+        raise MotionMindError("the piece is empty: put a posture or a stretch of movement into it first")
+    joined = Parts()
+    whole = movement(parts[0].key)
+    whole = replace(whole, keyframed=all(movement(part.key).keyframed for part in parts))
+    for place, part in enumerate(parts):
+        motion = movement(part.key)
+        if (difference := whole.skeleton.difference(motion.skeleton)) is not None:
+            raise MotionMindError(f"{part.key} is on another skeleton than {parts[0].key}: {difference}")
+        begin, stop = part.first, part.last + 1
+        if part.inserted:
+            begin, stop = begin + 1, stop - 1  # its ends are the postures beside it
+        elif place and _repeats(parts[place - 1], part):
+            begin += 1
+        clock = part.at - float(motion.times[part.first])
+        shift = np.array([part.place[0], 0.0, part.place[1]])
+        frames = slice(begin, stop)
+        times = motion.times[part.first], motion.times[part.last]
+        marks = [one for one in motion.insertions if times[0] <= one.times[0] and one.times[-1] <= times[1]]
+        where = Placement(part.turn, shift)
+        joined.frames.append(np.arange(0))
+        joined.add(motion.rotations[frames], motion.root[frames], motion.times[frames], marks, where, clock)
+    return joined.join(whole).motion
+
+
+def _repeats(before: Part, part: Part) -> bool:
+    """Whether a part begins with the posture, at the moment, with which the one before it ended."""
+    return not before.inserted and before.key == part.key and before.last == part.first

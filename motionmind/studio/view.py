@@ -1,0 +1,99 @@
+"""The piece as the page sees it: plain values for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import msgspec
+
+from motionmind.studio.piece import Finding, Found, Seam, State, key_of
+from motionmind.studio.placement import Layout, Marks, Part, lay_out
+
+SeamState = Literal["smooth", "abrupt", "waiting", "inserted", "discarded", "none found"]
+Findings = Callable[[Seam], Finding | None]  # returns what is known of a seam; None as long as nothing is
+
+_GOES_ON = "goes on as recorded"
+
+
+def state_of(seam: Seam, finding: Finding | None) -> SeamState:
+    """Say how it stands with a seam."""
+    if seam.goes_on:
+        return "smooth"
+    if finding is None:
+        return "waiting"
+    if finding.insertions:
+        return "discarded" if seam.verdict.decision == "discarded" else "inserted"
+    if not finding.abrupt:
+        return "smooth"
+    return "abrupt" if finding.insertions is None else "none found"
+
+
+def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:
+    """Return what is inserted at a seam; None if nothing is."""
+    if finding is None or not finding.insertions or state_of(seam, finding) != "inserted":
+        return None
+    return finding.insertions[min(seam.verdict.chosen, len(finding.insertions)) - 1]
+
+
+def layout_of(state: State, findings: Findings, marks: Marks) -> Layout:
+    """Place a piece's parts with what is known of its seams; errors as of `lay_out`."""
+
+    def insertion(seam: Seam) -> str | None:
+        found = chosen_at(seam, findings(seam))
+        return found.key if found else None
+
+    return lay_out(state, insertion, marks)
+
+
+def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str], str]) -> dict[str, Any]:
+    """Return `piece` of the project's JSON: its length, parts, blocks and seams.
+
+    Args:
+        state: the piece.
+        findings: what is known of its seams.
+        marks: of the movements.
+        title: returns a movement's title by its key.
+
+    Raises:
+        MotionMindError: a movement or a frame of it is missing.
+    """
+    layout = layout_of(state, findings, marks)
+    blocks = [
+        msgspec.structs.asdict(block)
+        | {
+            "key": key_of(block),
+            "title": title(block.source),
+            "frames": marks.length(key_of(block)),
+            "at": part.at,
+            "seconds": part.seconds,
+        }
+        for block, part in zip(state.blocks, layout.blocks, strict=True)
+    ]
+    seams = [
+        _seam_view(seam, number, findings(seam), layout.insertions[number - 1], layout.blocks[number - 1 : number + 1])
+        for number, seam in enumerate(state.seams, start=1)
+    ]
+    parts = [msgspec.to_builtins(part) for part in layout.parts]
+    return {"seconds": layout.seconds, "parts": parts, "blocks": blocks, "seams": seams}
+
+
+def _seam_view(
+    seam: Seam, number: int, finding: Finding | None, insertion: Part | None, sides: tuple[Part, ...]
+) -> dict[str, Any]:
+    before, after = sides
+    begin = before.at + before.seconds
+    found = finding.insertions if finding is not None else None
+    return {
+        "left": seam.left.id,
+        "right": seam.right.id,
+        "number": number,
+        "state": state_of(seam, finding),
+        "words": _GOES_ON if seam.goes_on else finding.words if finding is not None else "",
+        "chosen": min(seam.verdict.chosen, len(found)) if found else seam.verdict.chosen,
+        "alternatives": [msgspec.to_builtins(one) for one in found or ()],
+        "decision": seam.verdict.decision,
+        "ask": msgspec.to_builtins(seam.verdict.ask),
+        "at": begin,
+        "seconds": insertion.seconds if insertion else after.at - begin,
+    }

@@ -1,0 +1,168 @@
+"""Where a piece's parts stand in time and on the floor, against the variation's own arrangement of a piece."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionmind.body.mirror import mirrored
+from motionmind.body.motion import Insertion, Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
+from motionmind.studio import edits as e
+from motionmind.studio.piece import Finding, Found, State, apply_all
+from motionmind.studio.placement import Marks, lay_out, performance
+from motionmind.studio.view import layout_of, state_of, view_of
+from motionmind.variation.piece import Piece
+
+BODY = Skeleton(
+    "stick", ("root", "left_arm", "right_arm"), (-1, 0, 0), np.array([[0, 1, 0], [0.3, 0, 0], [-0.3, 0, 0.0]])
+)
+
+
+def wander(seed: int, frames: int) -> Motion:
+    """A body that walks and turns at random."""
+    rng = np.random.default_rng(seed)
+    turns = rot.exp(rng.normal(0.0, 0.4, (frames, 3, 3)))
+    turns[:, 0] = rot.mul(rot.about_vertical(np.cumsum(rng.normal(0.0, 0.3, frames))), turns[:, 0])
+    root = np.cumsum(rng.normal(0.0, 0.2, (frames, 3)), axis=0) + np.array([3.0, 1.0, -2.0])
+    return Motion(BODY, turns, root, np.arange(frames) / 10.0, name=f"wander {seed}")
+
+
+MOVEMENTS = {"c/one": wander(1, 30), "c/two": wander(2, 20), "c/posture": wander(3, 1), "m-found": wander(4, 6)}
+MOVEMENTS["~c/one"] = mirrored(MOVEMENTS["c/one"])
+
+
+def movement(key: str) -> Motion:
+    if key not in MOVEMENTS:
+        raise MotionMindError(f"no movement {key}")
+    return MOVEMENTS[key]
+
+
+def piece_of(*blocks: tuple[str, int, int]) -> State:
+    return apply_all([e.Insert(f"b{n}", *block) for n, block in enumerate(blocks)])
+
+
+stretches = st.lists(
+    st.tuples(st.sampled_from(["c/one", "c/two", "~c/one"]), st.integers(0, 19), st.integers(0, 19)).map(
+        lambda drawn: (drawn[0], min(drawn[1:]), max(drawn[1:]))
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+@given(stretches, st.sets(st.integers(0, 4)))
+@settings(max_examples=60, deadline=None)
+def test_each_part_is_set_down_where_the_one_before_ends(blocks, inserted):
+    state = piece_of(*blocks)
+    marks = Marks(movement)
+    places = {seam.pair: n for n, seam in enumerate(state.seams)}
+    layout = lay_out(state, lambda seam: "m-found" if places[seam.pair] in inserted else None, marks)
+    parts = list(layout.parts)
+    assert parts[0].at == 0.0
+    assert layout.seconds == pytest.approx(parts[-1].at + parts[-1].seconds)
+    for before, after in pairwise(parts):
+        goes_on = before.key == after.key and after.first == before.last + 1
+        gap = after.at - before.at - before.seconds
+        repeats = before.key == after.key and before.last == after.first
+        step = marks.step(before.key, before.last)
+        assert gap == pytest.approx(0.0 if before.inserted or after.inserted or repeats else step)
+        if goes_on:
+            assert (after.place, after.turn) == (before.place, before.turn)
+            continue
+        end, begin = (
+            performance([msgspec.structs.replace(part, inserted=False)], movement) for part in (before, after)
+        )
+        assert end.root[-1, [0, 2]] == pytest.approx(begin.root[0, [0, 2]])
+        turned = rot.heading(end.rotations[-1, 0]) - rot.heading(begin.rotations[0, 0])
+        assert np.cos(turned) == pytest.approx(1.0)
+
+
+@given(stretches)
+@settings(max_examples=40, deadline=None)
+def test_the_performance_is_the_variation_s_arrangement(blocks):
+    """The same stretches of one movement, arranged as a variation is."""
+    blocks = [("c/one", first, last) for _, first, last in blocks]
+    state = piece_of(*blocks)
+    motion = performance(list(lay_out(state, lambda _: None, Marks(movement)).parts), movement)
+    order, last = [], -1
+    for _, first, stop in blocks:
+        order += list(range(first + (first == last), stop + 1))  # a variation holds a posture that comes twice
+        last = stop
+    arranged = Piece.of(MOVEMENTS["c/one"]).arrange(np.array(order), {}).motion
+    assert np.abs(motion.times - motion.times[0] - (arranged.times - arranged.times[0])).max() < 1e-9
+    assert rot.angle(motion.rotations, arranged.rotations).max() < 1e-6
+    assert motion.root == pytest.approx(arranged.root, abs=1e-9)
+
+
+def test_insertions_begin_and_end_with_the_postures_beside_them():
+    one, two = MOVEMENTS["c/one"].posture(9), MOVEMENTS["c/two"].posture(4)
+
+    def level(posture):
+        turned = posture.rotations.copy()
+        turned[0] = rot.mul(rot.about_vertical(-rot.heading(turned[0])), turned[0])
+        return turned
+
+    frames = np.stack([level(one), level(two), level(two)])
+    root = np.array([[0, one.root[1], 0], [0.2, 1.1, 0.3], [0.5, two.root[1], 0.7]])
+    MOVEMENTS["m-led"] = Motion(
+        BODY, frames, root, np.array([0.0, 0.4, 0.8]), insertions=(Insertion(np.array([0.0, 0.8])),)
+    )
+    state = piece_of(("c/one", 2, 9), ("c/two", 4, 12))
+    layout = lay_out(state, lambda _: "m-led", Marks(movement))
+    motion = performance(list(layout.parts), movement)
+    assert len(motion) == 8 + 1 + 9
+    assert motion.insertions[0].times == pytest.approx([0.7, 1.5])
+    assert motion.times[[7, 8, 9]] == pytest.approx([0.7, 1.1, 1.5])
+    assert motion.inserted().tolist() == [False] * 8 + [True] + [False] * 9
+    # What follows is as far from where the insertion began, and turned, as the insertion says.
+    heading = rot.heading(motion.rotations[7, 0])
+    way = rot.mul_vec(rot.about_vertical(heading), np.array([0.5, 0.0, 0.7]))
+    assert (motion.root[9] - motion.root[7])[[0, 2]] == pytest.approx(way[[0, 2]])
+
+
+def test_states_of_a_seam():
+    seam = piece_of(("c/one", 0, 5), ("c/two", 0, 5)).seams[0]
+    found = (Found("m-found", 0.5, "usual"),)
+    assert state_of(seam, None) == "waiting"
+    assert state_of(seam, Finding("q", False, "", ())) == "smooth"
+    assert state_of(seam, Finding("q", True, "", None)) == "abrupt"
+    assert state_of(seam, Finding("q", True, "", ())) == "none found"
+    assert state_of(seam, Finding("q", True, "", found)) == "inserted"
+    discarded = seam._replace(verdict=type(seam.verdict)(decision="discarded"))
+    assert state_of(discarded, Finding("q", True, "", found)) == "discarded"
+    assert state_of(piece_of(("c/one", 0, 5), ("c/one", 6, 9)).seams[0], None) == "smooth"
+
+
+def test_the_view_names_what_stands_where():
+    state = piece_of(("c/one", 0, 5), ("c/two", 3, 5), ("c/posture", 0, 0))
+    finding = Finding("q", True, "it leaps", (Found("m-found", 0.5, "usual"),))
+    view = view_of(state, lambda seam: finding if seam.left.id == "b0" else None, Marks(movement), str.upper)
+    assert [part["key"] for part in view["parts"]] == ["c/one", "m-found", "c/two", "c/posture"]
+    assert [seam["state"] for seam in view["seams"]] == ["inserted", "waiting"]
+    assert [(block["id"], block["title"], block["frames"]) for block in view["blocks"]] == [
+        ("b0", "C/ONE", 30),
+        ("b1", "C/TWO", 20),
+        ("b2", "C/POSTURE", 1),
+    ]
+    at = [view["seams"][0]["at"], view["blocks"][1]["at"], view["seams"][1]["at"], view["seconds"]]
+    assert at == pytest.approx([0.5, 1.0, 1.2, 1.3])
+    empty = view_of(State(), lambda _: None, Marks(movement), str.upper)
+    assert empty == {"seconds": 0.0, "parts": [], "blocks": [], "seams": []}
+
+
+def test_parts_that_cannot_be_one_movement_are_refused():
+    with pytest.raises(MotionMindError, match="the piece is empty"):
+        performance([], movement)
+    other = replace(MOVEMENTS["c/two"], skeleton=replace(BODY, names=("root", "left_arm", "tail")))
+    parts = list(lay_out(piece_of(("c/one", 0, 5), ("c/two", 3, 5)), lambda _: None, Marks(movement)).parts)
+    with pytest.raises(MotionMindError, match="c/two is on another skeleton than c/one"):
+        performance(parts, {**MOVEMENTS, "c/two": other}.__getitem__)
+    with pytest.raises(MotionMindError, match="c/two has frames 0 to 19, no frame 25"):
+        layout_of(piece_of(("c/two", 3, 25)), lambda _: None, Marks(movement))
