@@ -145,6 +145,14 @@ SEARCH_OPTIONS = (
         "SHARE",
     ),
     SearchOption(
+        "within",
+        "--within",
+        _SEARCH,
+        "Take an alternative that is proven to cost at most this share more than the best: 0.05 is soon found.",
+        Number(min=0, max=1),
+        "SHARE",
+    ),
+    SearchOption(
         "node_budget", "--node-budget", _SEARCH, "Hold at most N search nodes at once.", COUNT, "N", advanced=True
     ),
     SearchOption(

@@ -58,7 +58,9 @@ def difference(path: Int32s, other: Int32s) -> float:
     return float((path[1:-1] != other[1:-1]).mean()) if len(path) > 2 else 0.0
 
 
-def solve_apart(problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None = None) -> Certificate:
+def solve_apart(
+    problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None = None, within: float = 0.0
+) -> Certificate:
     """Find the cheapest path that differs by at least a share from each of some earlier ones.
 
     Args:
@@ -66,6 +68,7 @@ def solve_apart(problem: Problem, earlier: Sequence[Int32s], share: float, watch
         earlier: places of earlier paths [T + 1, L] each, at least one.
         share: from 0 to 1.
         watch: as for `solve`; its costs are those of paths that differ by enough.
+        within: the search ends where the cost is proven to be at most this share above the least.
 
     Returns:
         The certificate. Cost and bound are the problem's own, without any price of agreement. It is "optimal" where
@@ -75,7 +78,7 @@ def solve_apart(problem: Problem, earlier: Sequence[Int32s], share: float, watch
         InfeasibleError: no path satisfies the problem; a TooAlikeError if none was found that differs by so much.
     """
     began = perf_counter()
-    search = _Search(problem, earlier, share, watch)
+    search = _Search(problem, earlier, share, watch, within)
     search.run()
     best, seconds = search.best, search.seconds
     seconds["search"] += perf_counter() - began - sum(seconds.values())
@@ -112,11 +115,13 @@ class _Search:
         ended: whether whoever watches ended it.
     """
 
-    def __init__(self, problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None) -> None:
+    def __init__(
+        self, problem: Problem, earlier: Sequence[Int32s], share: float, watch: Watch | None, within: float
+    ) -> None:
         model, moves, chains = problem.model, problem.rules.longest, len(problem.model.parents)
         budget = max(problem.rules.node_budget // ROUNDS, 1)
         self._problem = replace(problem, rules=replace(problem.rules, node_budget=budget))
-        self._earlier, self._watch = np.stack(earlier), watch
+        self._earlier, self._watch, self._within = np.stack(earlier), watch, within
         self._on_the_way = max(moves - 1, 0) * chains  # states
         self._allowed = float(np.floor((1.0 - share) * self._on_the_way + 1e-9))  # the margin is for rounding
         chain_of_row = np.repeat(np.arange(chains), np.diff(model.starts))
@@ -129,7 +134,7 @@ class _Search:
         self.seconds = {"problem": 0.0, "bound": 0.0, "search": 0.0}
 
     def run(self) -> None:
-        """Try prices until the bound cannot rise, or it meets the best path, or the search is to end."""
+        """Try prices until the bound cannot rise, or is near enough to the best path, or the search is to end."""
         prices = np.zeros(len(self._earlier))
         self._take(self._find_far(), prices)
         cuts = [_Cut(self.best.cost, self._excess(self.best.states))]
@@ -142,6 +147,8 @@ class _Search:
             cuts.append(_Cut(self.best.cost, self._excess(self.best.states)))
             prices, promised = _greatest(cuts)
             if self.ended or min(promised, self.best.cost) - self.lower_bound <= PROVEN:
+                return
+            if self.best.cost - self.lower_bound <= self._within * self.lower_bound:
                 return
 
     def _excess(self, states: Int32s) -> Floats:

@@ -65,6 +65,8 @@ class TweenRequest:
         unlike: tweens to differ from, of one number of moves, which this one has too.
         differ: share of the joints' states on the way that has to be other than in each tween of `unlike`, compared
             move by move, from 0 to 1.
+        within: share by which a tween that differs from others may cost more than is proven of all that do; 0 seeks the
+            best of them.
         what_if: search again without each pin, held joint, state to avoid and via, and without the given length, and
             report what each costs.
         sample: sample a path with probability proportional to exp(-cost), instead of finding the best one; it has as
@@ -110,6 +112,7 @@ class TweenRequest:
     via: Sequence[Posture | tuple[Posture, int]] = ()
     unlike: Sequence[HasPath] = ()
     differ: float = 0.2
+    within: float = 0.0
     what_if: bool = False
     sample: bool = False
     seed: int = 0
@@ -159,7 +162,7 @@ class TweenRequest:
             raise MotionMindError(f"pace must be a factor of the speed from {slowest} to {fastest:g}, not {self.pace}")
         if self.duration is not None and self.pace != 1.0:
             raise MotionMindError("a duration says how fast to move; leave out pace")
-        for name in ("novelty", "differ"):
+        for name in ("novelty", "differ", "within"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise MotionMindError(f"{name} must be a number from 0 to 1, not {getattr(self, name)}")
         for name in ("lambda_", "beta", "tau", "bridge_price", "guide"):
@@ -178,7 +181,7 @@ class TweenRequest:
         check_integer("memory", self.memory, or_none=True)
         check_integer("seed", self.seed)
         check_real("duration", self.duration, or_none=True)
-        for name in ("pace", "differ", "novelty", "lambda_", "beta", "tau", "bridge_price", "guide", "fps"):
+        for name in ("pace", "differ", "within", "novelty", "lambda_", "beta", "tau", "bridge_price", "guide", "fps"):
             check_real(name.rstrip("_"), getattr(self, name))
         for name in ("what_if", "sample", "strict", "posturewise"):
             check_flag(name, getattr(self, name))

@@ -188,3 +188,22 @@ def test_a_watcher_ends_the_search_with_a_path_that_differs_and_a_bound() -> Non
             assert all(a.cost >= b.cost and a.lower_bound <= b.lower_bound + ROUNDING for a, b in pairwise(told))
             statuses.add(found.status)
     assert {"optimal", "interrupted"} <= statuses
+
+
+def test_a_path_that_is_near_enough_ends_the_search_sooner() -> None:
+    sooner = 0
+    for seed in range(30):
+        toy = small_toy(seed)
+        guide = random_guide(toy, seed)
+        every = listed(toy, 3, np.ones(sum(toy.sizes), dtype=bool), [], guide)
+        if all(difference(path, every[0]) < 0.5 for path in every):
+            continue
+        problem = toy.problem(toy.rules(3, 3), [], guide)
+        best, near = (solve_apart(problem, every[:1], 0.5, within=within) for within in (0.0, 0.3))
+        assert difference(near.path, every[0]) >= 0.5
+        assert near.lower_bound <= best.lower_bound + ROUNDING
+        assert best.cost <= near.cost + ROUNDING
+        assert near.cost <= 1.3 * near.lower_bound + ROUNDING or near.cost <= best.cost + ROUNDING
+        assert near.expansions <= best.expansions
+        sooner += near.expansions < best.expansions
+    assert sooner > 0

@@ -492,6 +492,7 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
         ({"novelty": np.nan}, "novelty must be"),
         ({"differ": 1.5}, "differ must be a number from 0 to 1, not 1.5"),
         ({"differ": np.nan}, "differ must be"),
+        ({"within": -0.1}, "within must be a number from 0 to 1, not -0.1"),
         ({"seed": -1}, "seed must be a whole number of at least 0, not -1"),
         ({"coordination": "all"}, "coordination must be 'posture', 'progression' or 'none', not 'all'"),
         ({"memory": 10}, "memory of 10 bytes holds not one node"),
