@@ -191,7 +191,9 @@ class Engine(LearnedCorpus):
         request = formulation.request
         try:
             if request.unlike:
-                return solve_apart(searched, [other.path for other in request.unlike], request.differ, watch, request.within)
+                return solve_apart(
+                    searched, [other.path for other in request.unlike], request.differ, watch, request.within
+                )
             return solve(searched, watch)
         except TooAlikeError as error:
             raise _no_other_path(request, error.most) from error

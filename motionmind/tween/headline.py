@@ -39,8 +39,8 @@ def headline(tween: Tween) -> str:
     """
     if tween.moves == 0:
         return "no move: A and B are the same posture"
-    parts = [f"{_count(tween.moves, 'move')} in {tween.motion.times[-1]:.1f} s, {_seen(tween)}", _proof(tween)]
-    return "; ".join([*parts, *_feet(tween.motion)])
+    parts = [f"{_count(tween.moves, 'move')} in {tween.motion.times[-1]:.1f} s, {seen_in(tween)}", _proof(tween)]
+    return "; ".join([*parts, *feet_staying(tween.motion)])
 
 
 def beyond(tween: Tween) -> list[str]:
@@ -65,8 +65,8 @@ def shown_beyond(name: str, one: Sighting) -> str:
     return _SHOWN[name].format(one.value, one.most, displayed(one.part))
 
 
-def _seen(tween: Tween) -> str:
-    """Say whether the corpus attests the moves."""
+def seen_in(tween: Tween) -> str:
+    """Say whether the corpus attests the moves: "every one seen in ballet"."""
     sources = (source for row in tween.sources for source in row if source is not None)
     times = Counter(source.corpus for source in sources)
     corpora = enumerated((displayed(name) for name, _ in times.most_common()), 3) or "the corpus"
@@ -90,7 +90,7 @@ def _proof(tween: Tween) -> str:
     return f"{ended}proven to cost at most {percent}% more than the best {kind}"
 
 
-def _feet(motion: Motion) -> list[str]:
+def feet_staying(motion: Motion) -> list[str]:
     """Say which feet stay in their places, if any do."""
     feet = [motion.skeleton.names[joint] for joint in find_feet(motion.skeleton)]
     if len(motion) < 2 or not feet:

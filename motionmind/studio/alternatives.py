@@ -1,0 +1,210 @@
+"""Alternatives from one posture to another, found while someone waits for them, and what there is to say of each.
+
+They are said in the words of whoever dances: how sure it is that nothing better is to be found, how usual the movement
+is in the corpus, and for each joint where it was seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Posture
+from motionmind.corpus.corpus import Corpus
+from motionmind.display import displayed
+from motionmind.errors import NoPathError
+from motionmind.tween.certificate import Source
+from motionmind.tween.engine import Engine
+from motionmind.tween.headline import beyond, feet_staying, seen_in
+from motionmind.tween.result import Tween
+
+COUNT = 4
+# To prove the last percent of an alternative takes most of its time: four within 6 % of the best, of as many moves as
+# people wait for, take a second or two, and proofs would take six.
+WITHIN = 0.06
+_MOVES = 2000  # of the corpus, at most, beside which a movement is usual or rare
+_USUAL, _RARE = 25.0, 5.0  # percentiles of the corpus's own moves, below which movement is less usual, and rare
+
+How = Literal["seen", "waits", "new", "between"]
+
+
+class Stretch(msgspec.Struct, frozen=True):
+    """A joint's way for some moves.
+
+    Attributes:
+        begins: seconds from the beginning of the movement.
+        ends: seconds from the beginning.
+        how: whether the corpus shows the moves, the joint waits, no clip shows them, or the movement does not follow
+            them closely enough to say that it was seen.
+        where: in words, such as "adagio at 0:12"; "" where it was not seen.
+        key: of the movement where it was seen; "" where it was not.
+        at: seconds in that movement.
+        degrees: angle by which the joint turns.
+    """
+
+    begins: float
+    ends: float
+    how: How
+    where: str
+    key: str
+    at: float
+    degrees: float
+
+
+class Account(msgspec.Struct, frozen=True):
+    """An alternative in words.
+
+    Attributes:
+        words: it in a line.
+        sure: how sure it is that there is nothing better of its kind.
+        usual: how usual the movement is.
+        beyond: what a viewer may wince at, a line each.
+        joints: the way of each joint, by its name in words.
+    """
+
+    words: str
+    sure: str
+    usual: str
+    beyond: list[str]
+    joints: dict[str, list[Stretch]]
+
+
+def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: Any) -> Iterator[Tween]:
+    """Find movements from `a` to `b` that differ, the best first, near enough to the best and soon.
+
+    Args:
+        engine: what was learned.
+        a: where they start.
+        b: where they end.
+        count: how many to find; there are fewer where nothing else differs by enough.
+        options: further arguments of `Engine.tween`.
+
+    Raises:
+        NoPathError: nothing joins the postures.
+        MotionMindError: an option is out of its range.
+    """
+    found = 0
+    try:
+        for tween in engine.alternatives(a, b, count, within=WITHIN, **options):
+            found += 1
+            yield tween
+            if tween.moves < 2:
+                return  # nothing on the way could differ
+    except NoPathError:
+        if not found:
+            raise
+
+
+def account(tween: Tween, corpus: Corpus, own: Floats) -> Account:
+    """Say what there is to say of an alternative.
+
+    Args:
+        tween: the alternative.
+        corpus: what it was learned from.
+        own: `usual_likelihoods` of the corpus [101].
+    """
+    if tween.moves == 0:
+        return Account("no movement: both postures are the same", "nothing is better", "", [], {})
+    seconds = float(tween.motion.times[-1] - tween.motion.times[0])
+    words = "; ".join([f"{seconds:.1f} s", *feet_staying(tween.motion)])
+    said = [line.replace("_", " ") for line in beyond(tween)]
+    return Account(words, _sure(tween), _usual(tween, own), said, _stretches(tween, corpus))
+
+
+def usual_likelihoods(engine: Engine) -> Floats:
+    """Return how likely the corpus's own moves are: quantiles of the mean over the joints that move, of ln P [101]."""
+    moves, graph = engine.corpus.moves, engine.grammar.transitions
+    chosen = np.unique(np.linspace(0, len(moves.begins) - 1, _MOVES).astype(int))
+    states = np.asarray(engine.states)
+    before, after = states[moves.begins[chosen]], states[moves.ends[chosen]]
+    logs = -graph.weights("conditional")
+    means = []
+    for row, other in zip(before, after, strict=True):
+        edges = [graph.edge(int(chain), int(row[chain]), int(other[chain])) for chain in np.flatnonzero(row != other)]
+        if edges:
+            means.append(float(np.mean(logs[edges])))
+    return np.percentile(means, np.arange(101)) if means else np.zeros(101)
+
+
+def key_of(source: Source, corpus: Corpus) -> str:
+    """Return the key of the movement that a source is in."""
+    origin = f"{source.corpus}: " * (source.corpus != corpus.name)
+    return f"{corpus.name}/{origin}{source.clip}{' (mirrored)' * source.mirrored}"
+
+
+def clock(seconds: float) -> str:
+    """Return a time as people read it off a clock: 12.4 is "0:12"."""
+    minutes, rest = divmod(int(seconds), 60)
+    return f"{minutes}:{rest:02}"
+
+
+def _clip(source: Source, corpus: Corpus) -> str:
+    changes = ", ".join(["mirrored"] * source.mirrored + ["backwards"] * source.reversed)
+    origin = f"{displayed(source.corpus)}: " * (source.corpus != corpus.name)
+    return f"{origin}{displayed(source.clip)}" + (f" ({changes})" if changes else "")
+
+
+def _sure(tween: Tween) -> str:
+    """Say how sure it is that nothing of its kind is better."""
+    kind = "so different" if tween.differs else "of its kind"
+    if tween.status == "optimal":
+        return f"nothing {kind} is better"
+    percent = max(1, math.ceil(100.0 * (tween.cost / tween.lower_bound - 1.0) - 1e-6)) if tween.lower_bound > 0 else 100
+    return f"at most {percent}% from the best that is {kind}" if percent < 100 else "not known to be near the best"
+
+
+def _usual(tween: Tween, own: Floats) -> str:
+    """Say how usual the movement is beside the corpus's own moves, and whether all of it was seen."""
+    moved = (tween.path[1:] != tween.path[:-1]) & (tween.costs.likelihood > 0.0)
+    seen = seen_in(tween).replace("every one", "every move").replace("_", " ")
+    if not moved.any():
+        return seen
+    mean = float(np.log(tween.costs.likelihood[moved]).mean())
+    word = "usual" if mean >= own[int(_USUAL)] else "less usual" if mean >= own[int(_RARE)] else "rare"
+    return f"{word}; {seen}"
+
+
+def _stretches(tween: Tween, corpus: Corpus) -> dict[str, list[Stretch]]:
+    """Return the way of each joint, moves that follow one another in one clip as one stretch."""
+    bridges = {(bridge.joint, bridge.move) for bridge in tween.bridges}
+    waits = {(wait.joint, wait.move) for wait in tween.waits}
+    times, degrees = tween.motion.insertions[0].times, tween.costs.degrees
+    out: dict[str, list[Stretch]] = {}
+    for chain, joint in enumerate(tween.joints):
+        ways: list[Stretch] = []
+        last: Source | None = None
+        for move in range(tween.moves):
+            source = tween.sources[move][chain]
+            how: How = "seen" if source else "between"
+            if (joint, move) in bridges:
+                how = "new"
+            elif (joint, move) in waits:
+                how, source = "waits", None
+            turned = float(degrees[move, chain])
+            if ways and how == ways[-1].how and (source is None or (last is not None and _goes_on(last, source))):
+                ways[-1] = msgspec.structs.replace(
+                    ways[-1], ends=float(times[move + 1]), degrees=ways[-1].degrees + turned
+                )
+            else:
+                where = f"{_clip(source, corpus)} at {clock(source.seconds)}" if source else ""
+                key, at = (key_of(source, corpus), source.seconds) if source else ("", 0.0)
+                ways.append(Stretch(float(times[move]), float(times[move + 1]), how, where, key, at, turned))
+            last = source
+        out[displayed(joint).replace("_", " ")] = ways
+    return out
+
+
+def _goes_on(one: Source, other: Source) -> bool:
+    """Return whether a move was seen in a clip right after another."""
+    same = (one.clip, one.corpus, one.mirrored, one.reversed) == (
+        other.clip,
+        other.corpus,
+        other.mirrored,
+        other.reversed,
+    )
+    return same and other.posture - one.posture == (-1 if one.reversed else 1)

@@ -1,0 +1,107 @@
+"""Alternatives between postures of ballet: that they differ, are near enough to the best, and what is said is true."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import msgspec
+import numpy as np
+import pytest
+
+from motionmind import Engine, Tween
+from motionmind.errors import NoPathError
+from motionmind.names.finding import find_motion, find_posture
+from motionmind.names.spelling import Source
+from motionmind.studio.alternatives import COUNT, WITHIN, Account, account, clock, find, key_of, usual_likelihoods
+
+ENDS = [
+    ("ballet/arabesque", "ballet/fifth"),
+    ("ballet/adagio@3", "ballet/adagio@40"),
+    ("ballet/second", "ballet/first"),
+]
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+@pytest.fixture(scope="module", params=ENDS, ids=" to ".join)
+def found(request: pytest.FixtureRequest, ballet: Engine) -> list[tuple[Tween, Account]]:
+    a, b = map(find_posture, request.param)
+    own = usual_likelihoods(ballet)
+    return [(tween, account(tween, ballet.corpus, own)) for tween in find(ballet, a, b)]
+
+
+def test_alternatives_differ_and_are_near_enough(found: list[tuple[Tween, Account]]) -> None:
+    assert len(found) == COUNT
+    for number, (tween, _) in enumerate(found):
+        assert len(tween.differs) == number
+        assert min(tween.differs, default=1.0) >= 0.2 - 1e-9
+        assert tween.cost <= (1.0 + WITHIN) * tween.lower_bound + 1e-6
+
+
+def test_words_say_what_is_proven(found: list[tuple[Tween, Account]]) -> None:
+    for tween, said in found:
+        assert (tween.status == "optimal") == ("is better" in said.sure)
+        assert (not tween.bridges) == ("every move seen" in said.usual)
+        assert "_" not in "".join([said.words, said.sure, said.usual, *said.beyond])
+        assert f"{tween.motion.times[-1]:.1f} s" in said.words
+        assert b"nat" not in msgspec.json.encode([said.words, said.sure, said.usual, said.beyond])
+
+
+def test_each_joint_is_accounted_for_from_the_first_moment_to_the_last(found: list[tuple[Tween, Account]]) -> None:
+    for tween, said in found:
+        times = tween.motion.insertions[0].times
+        assert len(said.joints) == len(tween.joints)
+        for joint, stretches in zip(tween.joints, said.joints.values(), strict=True):
+            assert stretches[0].begins == times[0]
+            assert stretches[-1].ends == times[-1]
+            assert all(one.ends == other.begins for one, other in pairwise(stretches))
+            chain = tween.joints.index(joint)
+            assert sum(one.degrees for one in stretches) == pytest.approx(float(tween.costs.degrees[:, chain].sum()))
+            bridged = {bridge.move for bridge in tween.bridges if bridge.joint == joint}
+            new = [one for one in stretches if one.how == "new"]
+            assert all(any(one.begins <= times[move] < one.ends for one in new) for move in bridged)
+            assert bool(bridged) == bool(new)
+
+
+def test_where_a_joint_was_seen_is_a_movement_that_there_is(found: list[tuple[Tween, Account]]) -> None:
+    for key, at in {(one.key, one.at) for _, said in found for way in said.joints.values() for one in way if one.key}:
+        corpus, _, clip = key.partition("/")
+        motion = find_motion(Source(key, "corpus", corpus, clip))
+        assert motion.times[0] <= at <= motion.times[-1]
+
+
+def test_seen_stretches_name_the_place_in_words(found: list[tuple[Tween, Account]]) -> None:
+    for tween, said in found:
+        for way in said.joints.values():
+            for one in way:
+                assert (one.how == "seen") == bool(one.key)
+                assert (one.how == "seen") == one.where.endswith(f" at {clock(one.at)}")
+        sources = {key_of(source, Engine.load("ballet").corpus) for row in tween.sources for source in row if source}
+        assert {one.key for way in said.joints.values() for one in way} - {""} <= sources
+
+
+def test_equal_postures_need_no_movement(ballet: Engine) -> None:
+    posture = find_posture("ballet/fifth")
+    (tween,) = find(ballet, posture, posture)
+    said = account(tween, ballet.corpus, usual_likelihoods(ballet))
+    assert said.words.startswith("no movement")
+    assert said.joints == {}
+
+
+def test_a_wish_that_cannot_be_met_is_an_error(ballet: Engine) -> None:
+    with pytest.raises(NoPathError):
+        list(find(ballet, find_posture("ballet/arabesque"), find_posture("ballet/fifth"), moves=1, strict=True))
+
+
+def test_the_corpus_itself_is_usual(ballet: Engine) -> None:
+    own = usual_likelihoods(ballet)
+    assert np.all(np.diff(own) >= 0.0)
+    assert own[-1] <= 0.0
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(0.0, "0:00"), (12.4, "0:12"), (75.0, "1:15"), (3600.0, "60:00")])
+def test_times_are_read_off_a_clock(seconds: float, shown: str) -> None:
+    assert clock(seconds) == shown
