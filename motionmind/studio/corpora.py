@@ -1,0 +1,192 @@
+"""Corpora seen from the studio: which there are, sheets of their clips, and learning one of what somebody brought."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from motionmind.body.motion import Motion
+from motionmind.corpus import store
+from motionmind.corpus.corpus import Corpus
+from motionmind.display import displayed
+from motionmind.errors import CorpusError, MotionMindError
+from motionmind.studio.reading import Facts, load_clip
+
+Report = Callable[[int, int, str], None]  # called with how much is done, how much there is, and what comes next
+
+PICTURES = 6  # of a clip on its sheet, at most
+_LINE = 200  # characters of a title
+
+
+class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A clip of an upload to learn from."""
+
+    upload: str
+    clip: Annotated[int, msgspec.Meta(ge=0)] = 0
+
+
+class Mixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A corpus to mix in, and how much each of its moves counts."""
+
+    name: str
+    weight: Annotated[float, msgspec.Meta(ge=1e-6, le=1e6)] = 1.0
+
+
+class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A wish for a new corpus.
+
+    Attributes:
+        name: its name.
+        title: what it is, in a line.
+        parts: clips that were brought.
+        mix: corpora to learn from as well.
+        mirror: whether to learn from all clips with left and right exchanged, too.
+        rate: postures a second; None for what suits each clip.
+    """
+
+    name: Annotated[str, msgspec.Meta(max_length=200)]
+    title: Annotated[str, msgspec.Meta(max_length=_LINE)] = ""
+    parts: Annotated[tuple[Part, ...], msgspec.Meta(max_length=1_000)] = ()
+    mix: Annotated[tuple[Mixed, ...], msgspec.Meta(max_length=50)] = ()
+    mirror: bool = False
+    rate: Annotated[float, msgspec.Meta(gt=0.0, le=1_000.0)] | None = None
+
+
+class Recording(NamedTuple):
+    """A clip to learn from, where a child has put it.
+
+    Attributes:
+        folder: of the upload.
+        facts: of the upload.
+        clip: number of the clip.
+        skip: frames to leave out at its beginning.
+    """
+
+    folder: Path
+    facts: Facts
+    clip: int
+    skip: int
+
+
+def known(name: str, home: Path | None) -> str:
+    """Return the name of a corpus that there is; CorpusError if there is none, also for what is a path."""
+    if name not in store.list_corpora(home):
+        raise CorpusError(f"no corpus {displayed(name)}")
+    return name
+
+
+def list_all(home: Path | None) -> list[dict[str, Any]]:
+    """List all corpora with what their manifests say; one that cannot be read says why."""
+    found = []
+    for name, folder in store.list_corpora(home).items():
+        entry: dict[str, Any] = {"name": name, "title": "", "own": _is_own(name, folder, home), "error": ""}
+        try:
+            manifest = store.read_manifest(folder)
+            entry["title"] = displayed(str(manifest.get("title") or ""), _LINE)
+            entry["rate"] = manifest.get("rate")
+            if manifest["format"] == store.BUILT:
+                entry["clips"] = len(manifest.get("clips", ()))
+        except MotionMindError as error:
+            entry["error"] = displayed(str(error), _LINE)
+        found.append(entry)
+    return found
+
+
+def _is_own(name: str, folder: Path, home: Path | None) -> bool:
+    try:
+        return store.place_for(name, home) == folder
+    except CorpusError:  # it is bundled
+        return False
+
+
+def sheet_of(corpus: Corpus) -> dict[str, Any]:
+    """Return a corpus's clips with the frames that show them, and where it comes from."""
+    clips = []
+    for clip in corpus.clips:
+        count = len(clip)
+        frames = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int)).tolist()
+        times = corpus.times[clip.start : clip.stop]
+        clips.append(
+            {
+                "key": f"{corpus.name}/{clip.label}",
+                "name": displayed(clip.label),
+                "about": displayed(clip.about, _LINE),
+                "frames": count,
+                "seconds": round(float(times[-1] - times[0]), 2),
+                "pictures": frames,
+                "mended": len(clip.repairs),
+            }
+        )
+    about = {key: displayed(str(getattr(corpus, key)), _LINE) for key in ("title", "author", "source", "licence")}
+    body = f"{len(corpus.skeleton)} joints"
+    return {"name": corpus.name, **about, "body": body, "postures": len(corpus), "rate": corpus.rate, "clips": clips}
+
+
+def check_lesson(lesson: Lesson, home: Path | None) -> None:
+    """Check, before any work, that a corpus can be learned under this name.
+
+    Raises:
+        CorpusError: the name is invalid or taken, there is nothing to learn from, or no such corpus to mix.
+    """
+    store.place_for(lesson.name, home)
+    if lesson.name in store.list_corpora(home):
+        raise CorpusError(f"there is a corpus {lesson.name} already: choose another name, or delete that one first")
+    if not (lesson.parts or lesson.mix):
+        raise CorpusError("choose what to learn from: files that were read, or corpora to mix")
+    for one in lesson.mix:
+        known(one.name, home)
+
+
+def learn(report: Report, lesson: Lesson, recordings: list[Recording], home: Path | None) -> dict[str, Any]:
+    """Learn a corpus and keep it; the work of a worker process, which may be ended at any moment.
+
+    Args:
+        report: called with the progress.
+        lesson: the wish.
+        recordings: the clips that were brought.
+        home: the folder of the user's corpora; None for the usual one.
+
+    Returns:
+        Its name, how much it holds, and what is doubtful, for the page.
+
+    Raises:
+        MotionMindError: it cannot be learned from these.
+    """
+    from motionmind.tween.engine import Engine
+
+    steps = len(recordings) + 2
+
+    def clips() -> Iterator[Motion]:
+        for number, one in enumerate(recordings):
+            motion = load_clip(one.folder, one.facts, one.clip)
+            report(number, steps, f"takes up {displayed(motion.name)}")
+            if one.skip >= len(motion):
+                raise CorpusError(f"{displayed(motion.name)}: leaving out {one.skip} frames leaves none")
+            yield replace(motion.slice(one.skip, len(motion)), name=motion.name)
+        report(len(recordings), steps, "learns")
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        engine = Engine.fit(
+            clips(),
+            name=lesson.name,
+            home=home,
+            mix={one.name: one.weight for one in lesson.mix},
+            rate="auto" if lesson.rate is None else lesson.rate,
+            mirror=lesson.mirror,
+            title=lesson.title,
+        )
+    report(len(recordings) + 1, steps, "writes it down")
+    engine.save(store.place_for(lesson.name, home))
+    notes = list(dict.fromkeys(displayed(str(one.message), _LINE) for one in caught))[:5]
+    corpus = engine.corpus
+    mended = sum(len(clip.repairs) for clip in corpus.clips)
+    if mended:
+        notes.append(f"{mended} places where a joint jumped were mended")
+    return {"name": lesson.name, "clips": len(corpus.clips), "postures": len(corpus), "notes": notes}

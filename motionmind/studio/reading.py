@@ -1,0 +1,334 @@
+"""Reads a file of movement from a stranger, in a process of its own whose memory and time are limited.
+
+The parent puts the file and an order into an empty folder and starts `python -m motionmind.studio.reading` there. The
+child answers with `facts.json`, and each clip's arrays in a file of its own; whatever goes wrong is a line of the
+answer.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+from unicodedata import normalize
+
+import msgspec
+import numpy as np
+
+from motionmind.display import displayed
+from motionmind.errors import FormatError, MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
+    from motionmind.corpus.corpus import JointFlip
+
+SUFFIXES = (".bvh", ".glb", ".vrm", ".vrma", ".amc", ".npz", ".json", ".score")  # that can be read alone
+SECONDS = 60.0  # in which a file must be read
+MEMORY = 2 * 2**30  # bytes of addresses; Python's libraries take some hundred million of them
+ORDER, FACTS = "order.json", "facts.json"
+_MOST_FILE = 2**30  # bytes of a file that the child writes
+_MOST_CLIPS = 500
+_MOST_SHOWN = 12  # faults, and joints, that the facts list
+_LINE = 400  # characters
+_ZERO = 1e-3  # radians within which a joint is not turned
+_LEAP = 4.0  # times as far as in any of the next frames: an added first frame lies so far from the second
+_LEAST_LEAP = np.radians(10.0)
+_NEXT = 10  # frames
+_ARM_SLOPE = 0.35  # of an arm that is stretched out level; 1 is upright
+
+
+class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to read.
+
+    Attributes:
+        file: name of the file in the folder.
+        name: its name where it came from.
+        unit: its unit of length; None guesses it.
+        fps: its frames a second; None takes what it states.
+        asf: name of the file with an AMC's skeleton.
+    """
+
+    file: str
+    name: str
+    unit: str | None = None
+    fps: float | None = None
+    asf: str | None = None
+
+
+class Fault(msgspec.Struct, frozen=True):
+    """A joint that jumps, as no body can.
+
+    Attributes:
+        joint: its name.
+        times: how often it does.
+        seconds: when it does first, in the clip.
+        degrees: how far at most.
+        clip: number of the clip.
+    """
+
+    joint: str
+    times: int
+    seconds: float
+    degrees: float
+    clip: int = 0
+
+
+class ClipFacts(msgspec.Struct, frozen=True):
+    """A clip that was read.
+
+    Attributes:
+        name: its name.
+        frames: number of its frames.
+        seconds: its length.
+        fps: its frames a second; None for keyframes, which have times of their own.
+        posed_first: whether its first frame seems to be a pose that was put before the recording.
+    """
+
+    name: str
+    frames: int
+    seconds: float
+    fps: float | None
+    posed_first: bool
+
+
+class Body(msgspec.Struct, frozen=True):
+    """A body that was read.
+
+    Attributes:
+        names: of its joints [J].
+        parents: of its joints [J].
+        offsets: of its joints [J][3], metres.
+        tips: of its joints [J][3], metres.
+        name: of the skeleton.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: list[list[float]]
+    tips: list[list[float]]
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """What was understood of a file.
+
+    Attributes:
+        clips: its clips.
+        body: the body that they move, the corpora's where the file's joints map to it.
+        joints: number of the file's own joints.
+        rig: name of the rig that its joints are known as; "" if they are not.
+        filled: joints of the corpora's body that it lacks.
+        height: of a person with such bones, metres: it shows whether the unit is right.
+        unit: the unit that was taken; "" where the format states it.
+        is_guessed: whether the unit was guessed.
+        doubt: how the movement contradicts the clock; "" if it does not.
+        faults: the joints that jump, those first that do so most often; not onto or off a first frame that was added.
+        notes: what was repaired while it was read.
+    """
+
+    clips: tuple[ClipFacts, ...] = ()
+    body: Body | None = None
+    joints: int = 0
+    rig: str = ""
+    filled: tuple[str, ...] = ()
+    height: float = 0.0
+    unit: str = ""
+    is_guessed: bool = False
+    doubt: str = ""
+    faults: tuple[Fault, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """The child's answer: facts, or why there are none."""
+
+    facts: Facts | None = None
+    error: str = ""
+
+
+def clip_file(number: int) -> str:
+    """Return the name of the file that holds a clip's arrays."""
+    return f"clip-{number}.npz"
+
+
+def load_clip(folder: Path, facts: Facts, number: int) -> Motion:
+    """Return a clip that the child has read.
+
+    Raises:
+        MotionMindError: there is no such clip.
+    """
+    from motionmind.body.motion import Motion
+    from motionmind.body.skeleton import Skeleton
+
+    if not (0 <= number < len(facts.clips) and facts.body):
+        raise MotionMindError(f"the file has {len(facts.clips)} clips, no clip {number + 1}")
+    body, clip = facts.body, facts.clips[number]
+    shape = len(body.names), 3
+    skeleton = Skeleton(
+        body.name, body.names, body.parents, np.reshape(body.offsets, shape), np.reshape(body.tips, shape)
+    )
+    with np.load(folder / clip_file(number), allow_pickle=False) as arrays:
+        return Motion(
+            skeleton, arrays["rotations"], arrays["root"], arrays["times"], name=clip.name, keyframed=clip.fps is None
+        )
+
+
+# --- in the child -----------------------------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Read the file of the order in this folder, and answer."""
+    _limit()
+    order = msgspec.json.decode(Path(ORDER).read_bytes(), type=Order)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            motions = _read(order)
+            facts = _understand(order, motions)
+        notes = tuple(dict.fromkeys(_worded(str(one.message), order) for one in caught))[:_MOST_SHOWN]
+        answer = Answer(msgspec.structs.replace(facts, notes=notes))
+    except MotionMindError as error:
+        answer = Answer(error=_worded(str(error), order))
+    except MemoryError:
+        answer = Answer(error=f"{displayed(order.name)}: would take more memory than is given to a file")
+    Path(FACTS).write_bytes(msgspec.json.encode(answer))
+
+
+def _limit() -> None:
+    """Limit this process, where the system can."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    for what, most in (
+        (resource.RLIMIT_AS, MEMORY),
+        (resource.RLIMIT_CPU, int(SECONDS)),
+        (resource.RLIMIT_FSIZE, _MOST_FILE),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        _, hard = resource.getrlimit(what)
+        resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def _worded(message: str, order: Order) -> str:
+    """A message that names the file as its owner knows it, in one line."""
+    for file, name in ((order.file, order.name), (order.asf or "", "the .asf")):
+        message = message.replace(file, name) if file else message
+    return displayed(message.replace(f"{Path.cwd()}{os.sep}", ""), _LINE)
+
+
+def _read(order: Order) -> list[Motion]:
+    """Read the clips of a file, each as it is: on the file's own joints."""
+    from motionmind.formats import read_motion
+
+    path, stem = Path(order.file), displayed(Path(order.name).stem)
+    if path.suffix == ".score":
+        from motionmind.notation.compose import motions
+        from motionmind.notation.read import read_score
+
+        _check_alone(path)
+        found = motions(read_score(path))
+        if not found:
+            raise FormatError("holds no clip: a clip is what moves", path=path)
+        if len(found) > _MOST_CLIPS:
+            raise FormatError(f"holds {len(found)} clips; {_MOST_CLIPS} are the most", path=path)
+        return [replace(one, name=displayed(one.name)) for one in found]
+    return [replace(read_motion(path, unit=order.unit, asf=order.asf, fps=order.fps), name=stem)]
+
+
+def _check_alone(path: Path) -> None:
+    """Raise a FormatError if a score takes in other files: a stranger's is not to name files of this machine."""
+    from motionmind.formats.text import read_lines
+
+    for number, line in enumerate(read_lines(path), start=1):
+        word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").strip().partition(" ")
+        if word == "include" or (word == "body" and rest.strip().endswith(".toml")):
+            raise FormatError("takes in another file: bring a score that stands alone", path=path, line=number)
+
+
+def _understand(order: Order, motions: list[Motion]) -> Facts:
+    """Write the clips, on the corpora's body where their joints map to it, and say what was understood."""
+    from motionmind.body.tempo import question_tempo
+    from motionmind.corpus.flips import find_flips
+    from motionmind.formats.units import HEIGHT_PER_SPAN, bone_span
+    from motionmind.retarget.joint_mapping import filled_joints, known_rig
+    from motionmind.retarget.retarget import own_skeleton
+
+    raw = motions[0].skeleton
+    known = known_rig(raw)
+    own = [own_skeleton(motion) for motion in motions]
+    body = own[0].skeleton
+    faults: list[Fault] = []
+    clips = []
+    for number, motion in enumerate(own):
+        np.savez(clip_file(number), rotations=motion.rotations, root=motion.root, times=motion.times)
+        is_posed = is_posed_first(motion)
+        faults += _faults([flip for flip in find_flips(motion) if not (is_posed and flip.frame == 1)], motion, number)
+        seconds, still = float(motion.times[-1] - motion.times[0]), motion.keyframed or len(motion) == 1
+        clips.append(ClipFacts(motion.name, len(motion), seconds, None if still else float(motion.fps), is_posed))
+    unit, is_guessed = _unit(order)
+    return Facts(
+        clips=tuple(clips),
+        body=Body(body.name, body.names, tuple(map(int, body.parents)), body.offsets.tolist(), body.tips.tolist()),
+        joints=len(raw),
+        rig=known[0].name if known else "",
+        filled=tuple(filled_joints(known[1])) if known and len(body) == 23 else (),
+        height=HEIGHT_PER_SPAN * bone_span(np.array(raw.parents), raw.offsets, raw.tips),
+        unit=unit,
+        is_guessed=is_guessed,
+        doubt=next(filter(None, map(question_tempo, own)), ""),
+        faults=tuple(sorted(faults, key=lambda fault: -fault.times)[:_MOST_SHOWN]),
+    )
+
+
+def _faults(flips: Sequence[JointFlip], motion: Motion, clip: int) -> Iterator[Fault]:
+    """Yield the joints of a clip that jump."""
+    for joint in dict.fromkeys(flip.joint for flip in flips):
+        own = [flip for flip in flips if flip.joint == joint]
+        first = float(motion.times[min(flip.frame for flip in own)])
+        yield Fault(displayed(joint), len(own), first, max(flip.degrees for flip in own), clip)
+
+
+def _unit(order: Order) -> tuple[str, bool]:
+    """The unit of a file that does not state its own, and whether it was guessed."""
+    if order.unit is not None:
+        return order.unit, False
+    if not order.file.endswith(".bvh"):
+        return "", False
+    from motionmind.formats.bvh import bvh_unit
+
+    return bvh_unit(order.file)[0], True
+
+
+def is_posed_first(motion: Motion) -> bool:
+    """Tell whether the first frame of a recording seems to be a pose that a program put before it, such as a T-pose.
+
+    It is one from which the body leaps, and in which no joint is turned or both arms are stretched out level.
+    """
+    from motionmind.geometry import rotations as rot
+
+    if len(motion) < _NEXT or motion.keyframed:
+        return False
+    turned = rot.angle(motion.rotations[: _NEXT - 1], motion.rotations[1:_NEXT]).max(axis=1)
+    if turned[0] < _LEAST_LEAP or turned[0] < _LEAP * turned[1:].max():
+        return False
+    unturned = float(rot.angle(motion.rotations[0, 1:], np.array([0.0, 0.0, 0.0, 1.0])).max()) < _ZERO
+    return unturned or _has_level_arms(motion)
+
+
+def _has_level_arms(motion: Motion) -> bool:
+    """Whether both arms are stretched out level in the first frame; never of a body without human arms."""
+    names = motion.skeleton.names
+    if not {"left_shoulder", "left_wrist", "right_shoulder", "right_wrist"} <= set(names):
+        return False
+    place = motion.skeleton.positions(motion.rotations[:1], motion.root[:1])[0]
+    arms = [place[names.index(f"{side}_wrist")] - place[names.index(f"{side}_shoulder")] for side in ("left", "right")]
+    return all(abs(arm[1]) < _ARM_SLOPE * np.linalg.norm(arm) for arm in arms)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,234 @@
+"""Files that somebody brought: kept in a folder of this process, each read by a child (`motionmind.studio.reading`).
+
+Names that come with files are shown and never used as paths: a file gets a name of our own in a folder of its own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import secrets
+import shutil
+import sys
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import msgspec
+
+from motionmind.body.motion import Motion
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError
+from motionmind.formats.units import UNITS
+from motionmind.studio.reading import FACTS, ORDER, SECONDS, SUFFIXES, Answer, Facts, Order, load_clip
+
+MOST_BYTES = 64 * 2**20  # of a file
+_MOST_ALL = 2**30  # bytes of all files
+_MOST_FILES = 300
+_AT_ONCE = 2  # files that are read
+_GRACE = 5.0  # seconds that starting a child may take besides
+_SKELETON = ".asf"  # is not read alone
+_REFUSED = {
+    ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
+    ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
+    ".gltf": "a .gltf takes in other files: export it as one .glb",
+}
+
+
+class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Answers to what a file leaves open.
+
+    Attributes:
+        unit: its unit of length; None guesses it.
+        fps: its frames a second; None takes what it states.
+        asf: id of the upload that is an AMC's skeleton.
+        skip: frames to leave out at the beginning of each clip; None leaves out a pose that was put there.
+    """
+
+    unit: Annotated[str, msgspec.Meta(max_length=20)] | None = None
+    fps: Annotated[float, msgspec.Meta(gt=0.0, le=10_000.0)] | None = None
+    asf: str | None = None
+    skip: Annotated[int, msgspec.Meta(ge=0, le=100_000)] | None = None
+
+
+class Upload(msgspec.Struct, frozen=True):
+    """A file that somebody brought.
+
+    Attributes:
+        id: its name here.
+        name: its name where it came from, as it is shown.
+        size: bytes.
+        kind: its suffix, without the dot.
+        choices: the answers with which it was read.
+        facts: what was understood; None if it was not read, or is an AMC's skeleton.
+        error: why it was not read; "" if it was.
+    """
+
+    id: str
+    name: str
+    size: int
+    kind: str
+    choices: Choices = Choices()
+    facts: Facts | None = None
+    error: str = ""
+
+    def skip(self, clip: int) -> int:
+        """Return the frames that are left out at the beginning of a clip."""
+        if self.choices.skip is not None:
+            return self.choices.skip
+        return int(self.facts is not None and self.facts.clips[clip].posed_first)
+
+
+class Uploads:
+    """The files that were brought since the studio was started; they go with it."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="motionmind-studio-")
+        self._uploads: dict[str, Upload] = {}
+        self._reading = asyncio.Semaphore(_AT_ONCE)
+
+    def list(self) -> tuple[Upload, ...]:
+        """Return all of them, the earliest first."""
+        return tuple(self._uploads.values())
+
+    def get(self, upload: str) -> Upload:
+        """Return an upload; MotionMindError if there is none of this id."""
+        if upload not in self._uploads:
+            raise MotionMindError("this file is no longer here: bring it again")
+        return self._uploads[upload]
+
+    async def take(self, name: str, chunks: AsyncIterator[bytes]) -> Upload:
+        """Keep a file and read it.
+
+        Args:
+            name: its name where it comes from.
+            chunks: its content.
+
+        Raises:
+            MotionMindError: it is of no kind that can be read, too large, or too much was brought already.
+        """
+        shown, suffix = displayed(name), Path(name).suffix.lower()
+        if suffix not in (*SUFFIXES, _SKELETON):
+            reason = _REFUSED.get(suffix, f"files that can be read end in {', '.join((*SUFFIXES, _SKELETON))}")
+            raise MotionMindError(f"{shown}: {reason}")
+        if len(self._uploads) >= _MOST_FILES:
+            raise MotionMindError(f"{shown}: {_MOST_FILES} files are here already; take some away first")
+        upload = secrets.token_hex(8)
+        folder = self._place(upload)
+        folder.mkdir()
+        try:
+            size = await self._write(folder / f"upload{suffix}", shown, chunks)
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        self._uploads[upload] = Upload(upload, shown, size, suffix[1:])
+        if suffix == _SKELETON:
+            return self._uploads[upload]
+        asf = next((one.id for one in reversed(self.list()) if one.kind == "asf"), None)
+        return await self.read(upload, Choices(asf=asf if suffix == ".amc" else None))
+
+    async def _write(self, path: Path, shown: str, chunks: AsyncIterator[bytes]) -> int:
+        room = _MOST_ALL - sum(one.size for one in self._uploads.values())
+        size = 0
+        with path.open("xb") as file:
+            async for chunk in chunks:
+                size += len(chunk)
+                if size > MOST_BYTES:
+                    raise MotionMindError(f"{shown}: is larger than {MOST_BYTES >> 20} MB; bring a part of it")
+                if size > room:
+                    raise MotionMindError(f"{shown}: there is no room for it; take some files away first")
+                file.write(chunk)
+        return size
+
+    async def read(self, upload: str, choices: Choices) -> Upload:
+        """Read an upload, anew if it was read before.
+
+        Raises:
+            MotionMindError: there is no such upload, or a choice is out of its range.
+        """
+        own = self.get(upload)
+        if choices.unit is not None and choices.unit not in UNITS:
+            raise MotionMindError(f"no unit {displayed(choices.unit)}: there are {', '.join(UNITS)}")
+        folder = self._place(upload)
+        asf = None
+        if choices.asf is not None:
+            skeleton = self.get(choices.asf)
+            if skeleton.kind != "asf":
+                raise MotionMindError(f"{skeleton.name} is no skeleton of an AMC: those end in .asf")
+            asf = "upload.asf"
+            shutil.copyfile(self._place(skeleton.id) / asf, folder / asf)
+        if own.kind == "amc" and asf is None:
+            answer = Answer(error=f"{own.name}: bring the .asf that belongs to it, too: an .amc holds no body")
+        else:
+            order = Order(f"upload.{own.kind}", own.name, choices.unit, choices.fps, asf)
+            async with self._reading:
+                answer = await _read(folder, order)
+        facts = answer.facts
+        error = answer.error if facts is None else ""
+        new = msgspec.structs.replace(own, choices=choices, facts=facts, error=error)
+        if upload in self._uploads:  # nobody took it away meanwhile
+            self._uploads[upload] = new
+        return new
+
+    def motion(self, upload: str, clip: int) -> Motion:
+        """Return a clip of an upload, without the frames that are left out.
+
+        Raises:
+            MotionMindError: there is no such clip, or all of it is left out.
+        """
+        own = self.get(upload)
+        if own.facts is None:
+            raise MotionMindError(own.error or f"{own.name} holds no movement")
+        motion = load_clip(self._place(upload), own.facts, clip)
+        skip = own.skip(clip)
+        if skip >= len(motion):
+            raise MotionMindError(f"{motion.name} has {len(motion)} frames; leaving out {skip} leaves none")
+        return motion.slice(skip, len(motion)) if skip else motion
+
+    def folder(self, upload: str) -> Path:
+        """Return the folder of an upload; MotionMindError if there is none of this id."""
+        return self._place(self.get(upload).id)
+
+    def forget(self, upload: str) -> None:
+        """Take an upload away; MotionMindError if there is none of this id."""
+        folder = self.folder(upload)
+        del self._uploads[upload]
+        shutil.rmtree(folder, ignore_errors=True)
+
+    def close(self) -> None:
+        """Take all of them away."""
+        self._uploads.clear()
+        self._folder.cleanup()
+
+    def _place(self, upload: str) -> Path:
+        return Path(self._folder.name) / upload
+
+
+async def _read(folder: Path, order: Order) -> Answer:
+    """Have a child read a file, and end it when its time is over."""
+    shown = displayed(order.name)
+    (folder / FACTS).unlink(missing_ok=True)
+    (folder / ORDER).write_bytes(msgspec.json.encode(order))
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    child = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", "motionmind.studio.reading"),
+        cwd=folder,
+        env=os.environ | threads,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        await asyncio.wait_for(child.wait(), SECONDS + _GRACE)
+    except TimeoutError:
+        return Answer(error=f"{shown}: took longer to read than {SECONDS:g} s")
+    finally:
+        with suppress(ProcessLookupError):
+            child.kill()
+        await child.wait()
+    try:
+        return msgspec.json.decode((folder / FACTS).read_bytes(), type=Answer)
+    except (OSError, msgspec.MsgspecError):
+        return Answer(error=f"{shown}: cannot be read: it takes more time or memory than a file is given")

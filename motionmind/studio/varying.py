@@ -1,0 +1,358 @@
+"""Varies a piece of stretches: its postures in the order of a trajectory, but for what is kept where it is.
+
+A *unit* is a posture of the piece with the frames up to the next one, at the corpus's rate: so units in their own order
+are the piece again, frame by frame. The units that are not kept are laid out along a trajectory; another one, begun
+nearby, says which of them comes at each place (`motionmind.chaos.reorder`). Kept stretches stand between these, each
+after as many places as before. To stay in a unit is no stretch of its own: it is left out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.chaos.flows import FLOWS, Flow
+from motionmind.chaos.reorder import Itinerary, reorder
+from motionmind.chaos.trajectories import trajectory
+from motionmind.errors import MotionMindError, suggestion
+from motionmind.studio.edits import Block
+from motionmind.variation.departure import departure, find_nudge
+from motionmind.variation.limits import check_departure, check_limits
+from motionmind.variation.stretches import cheapest_order
+from motionmind.variation.variation import SKIP
+
+MOST = 4_000  # units of a piece: stretches of more than one unit hold the square of them in memory
+EVERY = SKIP + 1  # steps of a trajectory from one place to the next
+_COARSELY = 5  # each of so many nudges is tried where stretches are long
+_SHEETS = 12_000  # points that show an attractor
+_MOST_DRAWN = 6_000  # points of a trajectory that a map is sent
+_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not in their own order
+
+Times = Callable[[str], Floats]  # returns the times of the frames of a movement [T], seconds
+
+
+class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A stretch that stays.
+
+    Attributes:
+        block: the stretch.
+        place: units that are not kept before it.
+    """
+
+    block: Block
+    place: Annotated[int, msgspec.Meta(ge=0)]
+
+
+class Wanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A wish for a variation.
+
+    Attributes:
+        flow: name of the flow.
+        depart: share of the steps that are to leave the piece's order.
+        nudge: the offset of the variation's trajectory, in place of `depart`, in the flow's first coordinate.
+        start: where the piece's trajectory begins, on the attractor [3]; None for the flow's own start.
+        stretch: units that each stretch has at least, but for those beside kept ones.
+        kept: the stretches that stay, in their order.
+    """
+
+    flow: str = "lorenz"
+    depart: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.25
+    nudge: float | None = None
+    start: tuple[float, float, float] | None = None
+    stretch: Annotated[int, msgspec.Meta(ge=1, le=100)] = 1
+    kept: Annotated[tuple[Kept, ...], msgspec.Meta(max_length=1_000)] = ()
+
+
+class Unit(NamedTuple):
+    """A posture of a piece and the frames up to the next one.
+
+    Attributes:
+        block: number of the stretch that it is in.
+        source: key of the movement.
+        mirrored: whether left and right are exchanged.
+        first: its first frame.
+        last: its last frame.
+    """
+
+    block: int
+    source: str
+    mirrored: bool
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """An order of N units at L places, and the trajectories that it comes from.
+
+    Attributes:
+        indices: the unit at each place [L].
+        nudge: the offset of the variation's trajectory in the flow's first coordinate.
+        piece: the piece's trajectory, every step [(N - 1) * 11 + 1, d].
+        other: the variation's trajectory, every step [(L - 1) * 11 + 1, d].
+    """
+
+    indices: Ints
+    nudge: float
+    piece: Floats
+    other: Floats
+
+    @property
+    def departs(self) -> float:
+        """The share of steps that leave the piece's order."""
+        return departure(self.indices)
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A variation of a piece.
+
+    Attributes:
+        blocks: its stretches.
+        places: units that are not kept before each stretch.
+        kept: ids of the stretches that were kept.
+        order: the order of the units that were not.
+    """
+
+    blocks: tuple[Block, ...]
+    places: tuple[int, ...]
+    kept: frozenset[str]
+    order: Order
+
+
+def units_of(blocks: Sequence[Block], times: Times, rate: float | None) -> list[Unit]:
+    """Cut stretches into units.
+
+    Args:
+        blocks: the stretches.
+        times: returns the times of a movement's frames.
+        rate: units a second; None for a unit a frame.
+    """
+    found = []
+    for number, block in enumerate(blocks):
+        own = times(block.source)[block.first : block.last + 1]
+        begins = np.arange(len(own))
+        if rate is not None and len(own) > 1:
+            wanted = own[0] + np.arange(np.floor((own[-1] - own[0]) * rate + 1e-3) + 1.0) / rate
+            after = np.minimum(np.searchsorted(own, wanted), len(own) - 1)
+            before = np.maximum(after - 1, 0)
+            begins = np.unique(np.where(wanted - own[before] <= own[after] - wanted, before, after))
+        ends = np.append(begins[1:] - 1, len(own) - 1)
+        found += [
+            Unit(number, block.source, block.mirrored, block.first + int(first), block.first + int(last))
+            for first, last in zip(begins, ends, strict=True)
+        ]
+    return found
+
+
+def vary_blocks(
+    blocks: Sequence[Block],
+    wanted: Wanted,
+    times: Times,
+    rate: float | None,
+    *,
+    present: Collection[Block] = (),
+    used: Collection[str] = (),
+) -> Proposal:
+    """Vary a piece.
+
+    Args:
+        blocks: the piece's stretches.
+        wanted: the wish.
+        times: returns the times of a movement's frames.
+        rate: units a second; None for a unit a frame.
+        present: stretches whose ids new ones of the same frames may take.
+        used: ids that no other stretch may take.
+
+    Raises:
+        MotionMindError: there is nothing to vary, or the wish cannot be met.
+    """
+    units = units_of(blocks, times, rate)
+    kept = [(one, units_of([one.block], times, rate)) for one in wanted.kept]
+    free = _without(units, [unit for _, own in kept for unit in own])
+    length = len(units) - sum(len(own) for _, own in kept)
+    if len(free) < 2 or length < 2:
+        raise MotionMindError("nothing is left to vary: let go of a stretch that is kept, or put more into the piece")
+    if len(free) > MOST:
+        raise MotionMindError(f"a piece of {len(free):,} postures is too long to vary at once: {MOST:,} are the most")
+    order = find_order(wanted, len(free), length)
+    runs, places = _runs(order.indices, free, {one.place for one in wanted.kept})
+    naming = _Naming(present, used, [one.block for one in wanted.kept])
+    found: list[tuple[int, bool, Block]] = [(one.place, False, one.block) for one in wanted.kept]
+    found += [(place, True, naming.block(run)) for run, place in zip(runs, places, strict=True)]
+    found.sort(key=lambda entry: entry[:2])  # a kept stretch goes before what comes after as many places
+    return Proposal(
+        tuple(block for _, _, block in found),
+        tuple(place for place, _, _ in found),
+        frozenset(one.block.id for one in wanted.kept),
+        order,
+    )
+
+
+def find_order(wanted: Wanted, count: int, length: int) -> Order:
+    """Order `count` units at `length` places.
+
+    Raises:
+        MotionMindError: no flow has this name, or the wish cannot be met.
+    """
+    stretch = min(wanted.stretch, count, length)
+    course = _course(_flow(wanted.flow).name, wanted.start, count, length, stretch)
+    nudge = wanted.nudge
+    if nudge is None:
+        limits = check_limits(None, stretch, count, length) if stretch > 1 else None
+        depart = min(wanted.depart, 1.0 / stretch)
+        check_departure(depart, limits)
+        nudge = find_nudge(course.order, depart, every=1 if stretch == 1 else _COARSELY)
+    return Order(course.order(nudge), nudge, course.piece, course.follow(nudge))
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """A piece's trajectory, and the orders that nudges of it give; those that were found are kept.
+
+    Attributes:
+        flow: the flow.
+        piece: the trajectory, every step [(N - 1) * 11 + 1, d].
+        length: places of the orders.
+        stretch: units that each stretch has at least.
+        found: orders by nudge.
+    """
+
+    flow: Flow
+    piece: Floats
+    length: int
+    stretch: int
+    found: dict[float, Ints]
+
+    def follow(self, nudge: float) -> Floats:
+        """Return the variation's trajectory, every step [(L - 1) * 11 + 1, d]."""
+        begin = self.piece[0] + nudge * np.eye(1, self.piece.shape[1])[0]
+        return trajectory(self.flow, begin, count=(self.length - 1) * EVERY + 1, every=1, transient=0)
+
+    def order(self, nudge: float) -> Ints:
+        """Return the unit at each place [L]."""
+        if nudge not in self.found:
+            sites, points = self.piece[::EVERY], self.follow(nudge)[::EVERY]
+            indices = reorder(sites, points)
+            if self.stretch > 1:
+                free = np.zeros((len(sites), len(sites)), dtype=np.float32)
+                indices = cheapest_order(Itinerary(sites, points, indices), free, 0.0, self.stretch)
+            self.found[nudge] = indices
+        return self.found[nudge]
+
+
+@lru_cache(maxsize=8)
+def _course(flow: str, start: tuple[float, float, float] | None, count: int, length: int, stretch: int) -> _Course:
+    """Return the course of a wish; a start that a hand set is on the attractor, so nothing is dropped after it."""
+    own = _flow(flow)
+    transient = own.transient if start is None else 0
+    piece = trajectory(own, start, count=(count - 1) * EVERY + 1, every=1, transient=transient)
+    return _Course(own, piece, length, stretch, {})
+
+
+def _flow(name: str) -> Flow:
+    if name not in FLOWS or len(FLOWS[name].start) != 3:
+        known = [known for known, flow in FLOWS.items() if len(flow.start) == 3]
+        raise MotionMindError(f"no attractor {name!r:.60}{suggestion(name, known)}")
+    return FLOWS[name]
+
+
+def _without(units: Sequence[Unit], kept: Sequence[Unit]) -> list[Unit]:
+    """The units without those that are kept: of several with the same frames the first goes."""
+    taken: dict[tuple[object, ...], int] = {}
+    for unit in kept:
+        taken[unit[1:4]] = taken.get(unit[1:4], 0) + 1
+    free = []
+    for unit in units:
+        if taken.get(unit[1:4], 0):
+            taken[unit[1:4]] -= 1
+        else:
+            free.append(unit)
+    return free
+
+
+def _runs(indices: Ints, units: Sequence[Unit], breaks: Collection[int]) -> tuple[list[list[Unit]], list[int]]:
+    """The runs of units that go on as recorded, and how many places there are before each.
+
+    Args:
+        indices: the unit at each place [L].
+        units: the units.
+        breaks: places before which a run ends.
+    """
+    runs: list[list[Unit]] = []
+    places: list[int] = []
+    for place, index in enumerate(indices.tolist()):
+        unit = units[index]
+        last = runs[-1][-1] if runs and place not in breaks else None
+        if last is unit:
+            continue
+        if last and last.block == unit.block and last.last + 1 == unit.first:
+            runs[-1].append(unit)
+        else:
+            runs.append([unit])
+            places.append(place)
+    return runs, places
+
+
+class _Naming:
+    """Gives stretches ids: one that is in the piece keeps its own, new ones get ids that never were."""
+
+    def __init__(self, present: Collection[Block], used: Collection[str], kept: Sequence[Block]) -> None:
+        self._taken = {block.id for block in kept}
+        self._present = {_frames(block): block.id for block in present if block.id not in self._taken}
+        self._used = set(used)
+
+    def block(self, run: Sequence[Unit]) -> Block:
+        """The stretch that a run of units is."""
+        unit = run[0]
+        bare = Block("", unit.source, unit.first, run[-1].last, unit.mirrored)
+        name = self._present.pop(_frames(bare), None) or self._new(bare)
+        self._taken.add(name)
+        return msgspec.structs.replace(bare, id=name)
+
+    def _new(self, block: Block) -> str:
+        number = 0
+        while True:
+            text = repr((*_frames(block), number))
+            name = f"v{hashlib.sha256(text.encode()).hexdigest()[:10]}"
+            if name not in self._used and name not in self._taken:
+                return name
+            number += 1
+
+
+def _frames(block: Block) -> tuple[str, int, int, bool]:
+    return block.source, block.first, block.last, block.mirrored
+
+
+# --- the map ----------------------------------------------------------------------------------------------------------
+
+
+def axes_of(flow: Flow) -> tuple[int, int, int]:
+    """Return the coordinates to the right, up and towards the viewer on a map of a flow."""
+    return _USUAL.get(flow.name, (0, 1, 2))
+
+
+@lru_cache(maxsize=4)
+def map_of(name: str) -> dict[str, Any]:
+    """Return what a map of an attractor shows, whatever the piece: points all over it [M][3], and its axes.
+
+    Raises:
+        MotionMindError: no flow in three dimensions has this name.
+    """
+    flow = _flow(name)
+    points = trajectory(flow, count=_SHEETS, every=3)
+    return {"flow": name, "axes": axes_of(flow), "points": points.round(4).tolist(), "about": flow.about}
+
+
+def drawn(points: Floats) -> list[list[float]]:
+    """Thin a trajectory out, but for its sites, to what a map is sent [M][3]."""
+    every = EVERY if len(points) > _MOST_DRAWN else 1
+    thinned: list[list[float]] = points[::every].round(4).tolist()
+    return thinned

@@ -1,0 +1,288 @@
+"""Files that somebody brings: what is understood of them, and that no file does harm."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import time
+import zipfile
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pytest
+
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError
+from motionmind.formats import write_motion
+from motionmind.geometry import rotations as rot
+from motionmind.studio import uploads as module
+from motionmind.studio.corpora import Lesson, Mixed, Part, Recording, check_lesson, learn, list_all
+from motionmind.studio.reading import is_posed_first
+from motionmind.studio.uploads import Choices, Upload, Uploads
+
+T = TypeVar("T")
+SCORE = """title  Two bends of the knees
+body   human23
+legs
+  stand = stand out 10 turn 8
+  bend = stand out 10 turn 8, bend 30
+clip bends: Down and up
+  start | stand
+  1     | bend
+  1     | stand
+"""
+
+
+@pytest.fixture
+def uploads() -> Iterator[Uploads]:
+    found = Uploads()
+    yield found
+    found.close()
+
+
+async def once(data: bytes) -> AsyncIterator[bytes]:
+    yield data
+
+
+def bring(uploads: Uploads, name: str, data: bytes) -> Upload:
+    return asyncio.run(uploads.take(name, once(data)))
+
+
+def recording(count: int = 60, fps: float = 30.0) -> Motion:
+    """A body that lifts its arms and turns a little, recorded."""
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (count, 23, 1))
+    angle = 0.4 * np.sin(np.arange(count) / 9.0)
+    axis = np.zeros((count, 3))
+    axis[:, 2] = angle + 0.5
+    for name in ("left_shoulder", "left_elbow", "right_hip"):
+        rotations[:, human23().index(name)] = rot.exp(axis)
+    root = np.tile([0.0, 0.9, 0.0], (count, 1)) + np.arange(count)[:, None] * [0.01, 0.0, 0.0]
+    return Motion(human23(), rotations, root, np.arange(count) / fps, name="turn")
+
+
+def bvh(tmp_path: Path, motion: Motion) -> bytes:
+    path = tmp_path / "turn.bvh"
+    write_motion(path, motion)
+    return path.read_bytes()
+
+
+def test_understands_a_recording(uploads: Uploads, tmp_path: Path) -> None:
+    motion = recording()
+    found = bring(uploads, "My turn.BVH", bvh(tmp_path, motion))
+    assert found.error == ""
+    facts = found.facts
+    assert facts is not None
+    assert (facts.joints, facts.rig, facts.unit, facts.is_guessed) == (23, "human23", "cm", True)
+    assert facts.height == pytest.approx(1.7, abs=0.15)
+    (clip,) = facts.clips
+    assert (clip.name, clip.frames, round(clip.fps or 0)) == ("My turn", 60, 30)
+    assert facts.faults == ()
+    read = uploads.motion(found.id, 0)
+    assert read.positions() == pytest.approx(motion.positions(), abs=1e-4)
+
+
+def test_unit_and_rate_are_choices(uploads: Uploads, tmp_path: Path) -> None:
+    found = bring(uploads, "turn.bvh", bvh(tmp_path, recording()))
+    again = asyncio.run(uploads.read(found.id, Choices(unit="m", fps=60.0, skip=2)))
+    assert again.facts is not None
+    assert again.facts.height == pytest.approx(170.0, abs=15.0)
+    assert again.facts.clips[0].fps == pytest.approx(60.0)
+    assert len(uploads.motion(found.id, 0)) == 58
+    with pytest.raises(MotionMindError, match="no unit ell: there are cm"):
+        asyncio.run(uploads.read(found.id, Choices(unit="ell")))
+
+
+def test_a_pose_that_was_put_first_is_left_out(uploads: Uploads, tmp_path: Path) -> None:
+    motion = recording()
+    rotations = motion.rotations.copy()
+    rotations[0] = [0.0, 0.0, 0.0, 1.0]
+    rotations[1:, human23().index("left_knee")] = rot.exp(np.array([0.9, 0.0, 0.0]))
+    posed = replace(motion, rotations=rotations)
+    assert is_posed_first(posed)
+    assert not is_posed_first(motion)
+    found = bring(uploads, "turn.bvh", bvh(tmp_path, posed))
+    assert found.facts is not None
+    assert found.facts.clips[0].posed_first
+    assert len(uploads.motion(found.id, 0)) == 59
+    kept = asyncio.run(uploads.read(found.id, Choices(skip=0)))
+    assert len(uploads.motion(kept.id, 0)) == 60
+
+
+def test_names_joints_that_jump(uploads: Uploads, tmp_path: Path) -> None:
+    motion = recording(90, 120.0)
+    rotations = motion.rotations.copy()
+    hip = human23().index("left_hip")
+    rotations[30:40, hip] = rot.mul(rotations[30:40, hip], rot.exp(np.array([0.0, 3.0, 0.0])))
+    found = bring(uploads, "turn.bvh", bvh(tmp_path, replace(motion, rotations=rotations)))
+    assert found.facts is not None
+    (fault,) = found.facts.faults
+    assert (fault.joint, fault.times) == ("left_hip", 2)
+    assert fault.seconds == pytest.approx(0.25, abs=0.01)
+
+
+def test_reads_a_score(uploads: Uploads) -> None:
+    found = bring(uploads, "bends.score", SCORE.encode())
+    assert found.facts is not None
+    assert [(clip.name, clip.frames, clip.fps) for clip in found.facts.clips] == [("bends", 3, None)]
+    assert uploads.motion(found.id, 0).keyframed
+
+
+def test_recorded_movement(uploads: Uploads, shared_data: Path) -> None:
+    found = bring(uploads, "05_06.bvh", (shared_data / "cmu-05" / "05_06.bvh").read_bytes())
+    assert found.facts is not None
+    assert (found.facts.unit, found.facts.joints, len(found.facts.body.names if found.facts.body else ())) == (
+        "cmu",
+        31,
+        23,
+    )
+    assert found.facts.clips[0].posed_first
+    assert found.facts.faults[0].joint == "right_hip"
+
+
+def test_an_amc_needs_its_asf(uploads: Uploads, shared_data: Path) -> None:
+    amc, asf = ((shared_data / "cmu-135" / name).read_bytes() for name in ("135_04.amc", "135.asf"))
+    alone = bring(uploads, "135_04.amc", amc)
+    assert "bring the .asf" in alone.error
+    skeleton = bring(uploads, "135.asf", asf)
+    assert (skeleton.facts, skeleton.error) == (None, "")
+    again = asyncio.run(uploads.read(alone.id, Choices(asf=skeleton.id)))
+    assert again.error == ""
+    assert bring(uploads, "135_04.amc", amc).facts is not None  # the .asf is there already
+
+
+def test_goes_with_the_studio(tmp_path: Path) -> None:
+    uploads = Uploads()
+    found = bring(uploads, "bends.score", SCORE.encode())
+    folder = uploads.folder(found.id)
+    assert folder.is_dir()
+    uploads.forget(found.id)
+    assert not folder.exists()
+    with pytest.raises(MotionMindError, match="no longer here"):
+        uploads.motion(found.id, 0)
+    other = uploads.folder(bring(uploads, "bends.score", SCORE.encode()).id)
+    uploads.close()
+    assert not other.exists()
+
+
+# --- files that mean harm ---------------------------------------------------------------------------------------------
+
+
+def zeros(count: int) -> bytes:
+    """An array of zeros that unpacks to eight bytes for each of `count`, and is packed to a thousandth of that."""
+    out = io.BytesIO()
+    with (
+        zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("poses.npy", "w", force_zip64=True) as member,
+    ):
+        header = io.BytesIO()
+        np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (count,)})
+        member.write(header.getvalue())
+        for _ in range(count // 2**17):
+            member.write(bytes(2**20))
+    return out.getvalue()
+
+
+HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "garbage": ("noise.bvh", lambda: np.random.default_rng(0).bytes(50 * 2**20)),
+    "garbage in an archive": ("noise.npz", lambda: np.random.default_rng(0).bytes(2**20)),
+    "an array of gigabytes": ("bomb.npz", lambda: zeros(2**28)),
+    "JSON nested deep": ("deep.json", lambda: b"[" * 10**6),
+    "a score that reads another file": ("nosy.score", lambda: b"include /etc/passwd\n"),
+    "a score with a body of its own": ("body.score", lambda: b"body ../../secret.toml\n"),
+    "a score without end": (
+        "endless.score",
+        lambda: (
+            SCORE.partition("clip")[0].encode()
+            + b"phrase q0 (W)\n  1 | W\n"
+            + b"".join(b"phrase q%d (W)\n  q%d (W W)\n" % (i, i - 1) for i in range(1, 40))
+            + b"clip c\n  start | stand\n  q39 (stand)\n"
+        ),
+    ),
+    "nothing": ("empty.glb", lambda: b""),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
+    name, data = HOSTILE[kind]
+    before = time.monotonic()
+    found = bring(uploads, name, data())
+    assert found.facts is None
+    assert found.error.startswith(name)
+    assert "\n" not in found.error
+    assert str(uploads.folder(found.id)) not in found.error
+    assert "root:" not in found.error
+    assert time.monotonic() - before < 60.0
+
+
+@pytest.mark.parametrize(
+    "name", ["../../up.bvh", "/etc/cron.d/up.bvh", "a\x00b.bvh", "x" * 5000 + ".bvh", "\x1b[31m.bvh"]
+)
+def test_names_are_no_paths(uploads: Uploads, name: str) -> None:
+    found = bring(uploads, name, b"HIERARCHY")
+    assert [path.name for path in uploads.folder(found.id).iterdir() if path.suffix == ".bvh"] == ["upload.bvh"]
+    assert "\x1b" not in found.name + found.error
+    assert "\x00" not in found.name + found.error
+    assert len(found.error) <= 400
+
+
+@pytest.mark.parametrize("name", ["virus.exe", "dance.fbx", "markers.c3d", "text", "scene.gltf", "aist.pkl"])
+def test_other_files_are_refused(uploads: Uploads, name: str) -> None:
+    with pytest.raises(MotionMindError, match=name):
+        bring(uploads, name, b"anything")
+    assert uploads.list() == ()
+
+
+def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_BYTES", 2**20)
+    with pytest.raises(MotionMindError, match="larger than 1 MB"):
+        bring(uploads, "large.bvh", bytes(2**20 + 1))
+    assert uploads.list() == ()
+    assert list(Path(uploads._folder.name).iterdir()) == []
+
+
+def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "SECONDS", 0.01)
+    monkeypatch.setattr(module, "_GRACE", 0.0)
+    found = bring(uploads, "bends.score", SCORE.encode())
+    assert "took longer" in found.error
+
+
+# --- corpora ----------------------------------------------------------------------------------------------------------
+
+
+def test_learns_a_corpus_of_what_was_brought(uploads: Uploads, tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    found = bring(uploads, "turn.bvh", bvh(tmp_path, recording()))
+    assert found.facts is not None
+    lesson = Lesson("mine", "Turns", (Part(found.id),), (Mixed("ballet", 0.5),), rate=1.0)
+    check_lesson(lesson, home)
+    seen: list[Any] = []
+    result = learn(
+        lambda *told: seen.append(told), lesson, [Recording(uploads.folder(found.id), found.facts, 0, 0)], home
+    )
+    assert result["name"] == "mine"
+    assert result["clips"] > 1
+    assert [done for done, _, _ in seen] == sorted(done for done, _, _ in seen)
+    entry = next(one for one in list_all(home) if one["name"] == "mine")
+    assert (entry["title"], entry["own"], entry["clips"]) == ("Turns", True, result["clips"])
+    with pytest.raises(MotionMindError, match="already"):
+        check_lesson(lesson, home)
+
+
+@pytest.mark.parametrize(
+    ("lesson", "words"),
+    [
+        (Lesson("ballet", parts=(Part("a"),)), "bundled"),
+        (Lesson("../up", parts=(Part("a"),)), "cannot be a corpus's name"),
+        (Lesson("new"), "choose what to learn from"),
+        (Lesson("new", mix=(Mixed("/etc"),)), "no corpus /etc"),
+    ],
+)
+def test_what_cannot_be_learned(lesson: Lesson, words: str, tmp_path: Path) -> None:
+    with pytest.raises(MotionMindError, match=words):
+        check_lesson(lesson, tmp_path)

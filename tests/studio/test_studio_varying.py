@@ -1,0 +1,102 @@
+"""Laws of varying a piece of stretches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats
+from motionmind.errors import MotionMindError
+from motionmind.studio.edits import Arrange, Block, Insert
+from motionmind.studio.piece import State, apply
+from motionmind.studio.varying import Kept, Proposal, Wanted, drawn, find_order, map_of, units_of, vary_blocks
+
+PIECE = (Block("b1", "ballet/adagio", 0, 59), Block("b2", "m-0011223344556677", 10, 250, mirrored=True))
+
+
+def times(key: str) -> Floats:
+    """A clip with a posture every 0.2 s, and a recording of 120 frames a second."""
+    return np.arange(60) / 5.0 if key.startswith("ballet") else np.arange(400) / 120.0
+
+
+def vary(wanted: Wanted, blocks: tuple[Block, ...] = PIECE) -> Proposal:
+    return vary_blocks(blocks, wanted, times, 5.0, present=blocks, used={"b1", "b2"})
+
+
+def frames(blocks: tuple[Block, ...]) -> list[tuple[str, bool, int]]:
+    return [(b.source, b.mirrored, frame) for b in blocks for frame in range(b.first, b.last + 1)]
+
+
+def test_units_hold_each_frame_once() -> None:
+    units = units_of(PIECE, times, 5.0)
+    held = [(u.source, u.mirrored, frame) for u in units for frame in range(u.first, u.last + 1)]
+    assert held == frames(PIECE)
+    assert [u.last - u.first + 1 for u in units[60:-1]] == [24] * (len(units) - 61)  # 120 frames a second, 5 units
+
+
+@pytest.mark.parametrize("flow", ["lorenz", "rossler"])
+def test_no_departure_gives_the_piece_back(flow: str) -> None:
+    assert vary(Wanted(flow=flow, nudge=0.0)).blocks == PIECE
+
+
+@pytest.mark.parametrize("stretch", [1, 2, 4])
+def test_departs_as_it_is_asked_to(stretch: int) -> None:
+    little, much = (vary(Wanted(depart=depart, stretch=stretch)) for depart in (0.05, 0.2))
+    assert little.order.departs < much.order.departs
+    assert len(little.blocks) < len(much.blocks)
+    assert len({block.id for block in much.blocks}) == len(much.blocks)
+    assert set(frames(much.blocks)) <= set(frames(PIECE))
+
+
+def test_kept_stretches_stay_in_their_places() -> None:
+    first = vary(Wanted(depart=0.2))
+    kept = tuple(Kept(block, place) for block, place in list(zip(first.blocks, first.places, strict=True))[2:9:3])
+    again = vary(Wanted(depart=0.2, start=(10.0, 5.0, 40.0), kept=kept))
+    found = dict(zip((block.id for block in again.blocks), zip(again.blocks, again.places, strict=True), strict=True))
+    for one in kept:
+        assert found[one.block.id] == (one.block, one.place)
+    assert again.blocks != first.blocks
+    rest = [block for block in again.blocks if block.id not in again.kept]
+    held = set(frames(tuple(one.block for one in kept)))
+    assert not held & set(frames(tuple(rest)))
+    # What is kept of this one stays where it is in the next one, too.
+    third = vary(Wanted(depart=0.1, kept=kept))
+    assert again.kept == third.kept
+    assert [b.id for b in third.blocks if b.id in third.kept] == [one.block.id for one in kept]
+
+
+def test_a_variation_is_an_edit_of_the_piece() -> None:
+    state = State()
+    for block in PIECE:
+        state = apply(state, Insert(block.id, block.source, block.first, block.last, block.mirrored))
+    found = vary(Wanted(depart=0.2))
+    assert apply(state, Arrange(found.blocks)).blocks == found.blocks
+    assert vary(Wanted(depart=0.2)).blocks == found.blocks  # the same wish gives the same
+
+
+def test_a_nudge_is_the_one_of_the_command_line() -> None:
+    from motionmind.chaos.flows import FLOWS
+    from motionmind.chaos.reorder import itinerary
+
+    order = find_order(Wanted(nudge=0.3), 80, 80)
+    assert order.indices.tolist() == itinerary(FLOWS["lorenz"], 80, nudge=0.3).indices.tolist()
+
+
+def test_a_start_on_the_map_is_where_the_piece_begins() -> None:
+    point = tuple(map_of("lorenz")["points"][700])
+    order = find_order(Wanted(start=point, nudge=0.1), 30, 30)
+    assert drawn(order.piece)[0] == pytest.approx(point)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        (Wanted(flow="opera"), "no attractor 'opera'"),
+        (Wanted(flow="duffing"), "no attractor"),  # in four dimensions
+        (Wanted(start=(1e12, 0.0, 0.0)), "diverges"),
+        (Wanted(kept=(Kept(PIECE[0], 0), Kept(PIECE[1], 0))), "let go"),
+    ],
+)
+def test_what_cannot_be_varied(wanted: Wanted, words: str) -> None:
+    with pytest.raises(MotionMindError, match=words):
+        vary(wanted)
