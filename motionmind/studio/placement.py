@@ -16,12 +16,25 @@ import msgspec
 import numpy as np
 
 from motionmind.body.motion import Motion
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
 from motionmind.variation.piece import ALONE, Parts, Placement
 
 Movements = Callable[[str], Motion]  # returns the movement of a key; MotionMindError if there is none
+
+
+def check_body(key: str, motion: Motion, other_key: str, other: Motion) -> None:
+    """Check that two movements can be one; the keys are for the message.
+
+    Raises:
+        SkeletonError: they are on different skeletons.
+    """
+    difference = motion.skeleton.difference(other.skeleton)
+    if difference is None and motion.skeleton.names != other.skeleton.names:
+        difference = "its joints come in another order"
+    if difference is not None:
+        raise SkeletonError(f"{other_key} is on another body than {key}: {difference}")
 
 
 class Part(msgspec.Struct, frozen=True):
@@ -185,7 +198,8 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         movement: returns movements by key.
 
     Raises:
-        MotionMindError: there is nothing, or the parts are on different skeletons.
+        MotionMindError: there is nothing.
+        SkeletonError: the parts are on different skeletons.
     """
     if not parts:
         raise MotionMindError("the piece is empty: put a posture or a stretch of movement into it first")
@@ -194,8 +208,7 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
     whole = replace(whole, keyframed=all(movement(part.key).keyframed for part in parts))
     for place, part in enumerate(parts):
         motion = movement(part.key)
-        if (difference := whole.skeleton.difference(motion.skeleton)) is not None:
-            raise MotionMindError(f"{part.key} is on another skeleton than {parts[0].key}: {difference}")
+        check_body(parts[0].key, whole, part.key, motion)
         begin, stop = part.first, part.last + 1
         if part.inserted:
             begin, stop = begin + 1, stop - 1  # its ends are the postures beside it

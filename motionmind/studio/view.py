@@ -24,9 +24,9 @@ def state_of(seam: Seam, finding: Finding | None) -> SeamState:
         return "waiting"
     if finding.insertions:
         return "discarded" if seam.verdict.decision == "discarded" else "inserted"
-    if not finding.abrupt:
-        return "smooth"
-    return "abrupt" if finding.insertions is None else "none found"
+    if finding.insertions is None:
+        return "abrupt" if finding.abrupt else "waiting"
+    return "none found" if finding.abrupt else "smooth"
 
 
 def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:

@@ -133,6 +133,7 @@ def test_states_of_a_seam():
     assert state_of(seam, None) == "waiting"
     assert state_of(seam, Finding("q", False, "", ())) == "smooth"
     assert state_of(seam, Finding("q", True, "", None)) == "abrupt"
+    assert state_of(seam, Finding("q", False, "", None)) == "waiting"
     assert state_of(seam, Finding("q", True, "", ())) == "none found"
     assert state_of(seam, Finding("q", True, "", found)) == "inserted"
     discarded = seam._replace(verdict=type(seam.verdict)(decision="discarded"))
@@ -162,7 +163,7 @@ def test_parts_that_cannot_be_one_movement_are_refused():
         performance([], movement)
     other = replace(MOVEMENTS["c/two"], skeleton=replace(BODY, names=("root", "left_arm", "tail")))
     parts = list(lay_out(piece_of(("c/one", 0, 5), ("c/two", 3, 5)), lambda _: None, Marks(movement)).parts)
-    with pytest.raises(MotionMindError, match="c/two is on another skeleton than c/one"):
+    with pytest.raises(MotionMindError, match="c/two is on another body than c/one"):
         performance(parts, {**MOVEMENTS, "c/two": other}.__getitem__)
     with pytest.raises(MotionMindError, match="c/two has frames 0 to 19, no frame 25"):
         layout_of(piece_of(("c/two", 3, 25)), lambda _: None, Marks(movement))

@@ -1,0 +1,114 @@
+"""The movement on both sides of a seam, as the engine is asked for what lies between: postures, speeds, passing ones.
+
+It goes by the variation's own rules (`motionmind.variation.piece`): both ends stand above the origin and face ahead,
+and show how fast the body moves there as far as the recording does. A held posture does not move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motionmind.body.limbs import limbs_of
+from motionmind.body.motion import Motion, Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.studio.edits import Ask
+from motionmind.studio.piece import End
+from motionmind.studio.placement import Marks, Movements, check_body
+from motionmind.variation.piece import Piece
+
+_LEAD = 1.0  # seconds of movement beside a seam that are looked at; `Piece.around` takes what it needs of them
+_OPTIONS = {"start": "A", "end": "B"}
+
+
+class Sides(NamedTuple):
+    """What is asked of the engine at a seam.
+
+    Attributes:
+        a: the posture that the seam leads from.
+        b: the posture that it leads to.
+        before: frames that lead up to `a`; None where the body is held there, or the recording does not show it.
+        after: frames that follow `b`, in the same way.
+        seconds: from `a` to `b` where nothing is inserted.
+    """
+
+    a: Posture
+    b: Posture
+    before: Motion | None
+    after: Motion | None
+    seconds: float
+
+
+def sides_of(ends: tuple[End, End], movement: Movements) -> Sides:
+    """Return the movement on both sides of a seam.
+
+    Args:
+        ends: where the seam leads from, and to.
+        movement: returns movements by key.
+
+    Raises:
+        MotionMindError: there is no such movement.
+        SkeletonError: the two are on different skeletons.
+    """
+    one, other = (movement(end.key) for end in ends)
+    check_body(ends[0].key, one, ends[1].key, other)
+    begin, stop = ends[0].frame, ends[1].frame + 1
+    if ends[0].moves:
+        begin = min(int(np.searchsorted(one.times, one.times[begin] - _LEAD)), max(begin - 1, 0))
+    if ends[1].moves:
+        stop = max(int(np.searchsorted(other.times, other.times[stop - 1] + _LEAD)), min(stop + 1, len(other)))
+    before, after = one.slice(begin, ends[0].frame + 1), other.slice(ends[1].frame, stop)
+    seconds = Marks(movement).step(ends[0].key, ends[0].frame)
+    clock = float(before.times[-1]) + seconds - float(after.times[0])
+    both = replace(
+        before,
+        rotations=np.concatenate([before.rotations, after.rotations]),
+        root=np.concatenate([before.root, after.root]),
+        times=np.concatenate([before.times, after.times + clock]),
+        insertions=(),
+    )
+    i = len(before) - 1
+    piece = Piece.of(both)
+    return Sides(*piece.ends(i, i + 1), *piece.around(i, i + 1), seconds)
+
+
+def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, Any]:
+    """Return a wish as options of the engine.
+
+    Args:
+        ask: the wish.
+        skeleton: the body.
+        movement: returns movements by key.
+
+    Raises:
+        MotionMindError: there is no such joint, movement or frame.
+    """
+    options: dict[str, Any] = {}
+    if ask.seconds is not None:
+        options["duration"] = ask.seconds
+    if ask.passing:
+        options["via"] = [movement(one.posture).posture(one.frame) for one in ask.passing]
+    pin: dict[str, str] = {}
+    hold: list[str] = []
+    for one in ask.pins:
+        limb = _limb(skeleton, one.joint)
+        if one.hold == "throughout":
+            hold += [joint for joint in limb if joint not in hold]
+        else:
+            pin |= dict.fromkeys(limb, _OPTIONS[one.hold])
+    if pin:
+        options["pin"] = pin
+    if hold:
+        options["hold"] = hold
+    return options
+
+
+def _limb(skeleton: Skeleton, joint: str) -> list[str]:
+    """Names of the joints that carry a hand or a foot: those of its limb, down to it."""
+    wanted = skeleton.index(joint)
+    for limb in limbs_of(skeleton):
+        if wanted in limb:
+            return [skeleton.names[one] for one in limb[: limb.index(wanted) + 1]]
+    return [joint]
