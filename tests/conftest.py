@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import random
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from motionmind.cli import main
 from motionmind.cli.warming import NOTICE
 from motionmind.discretize import Codebook
 from motionmind.formats import read_motion
+from motionmind.jit import compiled_names, decorated_names
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 
@@ -28,7 +31,22 @@ settings.register_profile(
 settings.load_profile("motionmind")
 
 _FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-SHARED_DATA = Path(__file__).parents[1].parent / "shared" / "data"
+TESTS = Path(__file__).parent
+SHARED_DATA = TESTS.parents[1] / "shared" / "data"
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the inner loops before all tests: else each worker would compile them, all at the same moment.
+
+    A few tests compile what they need.
+    """
+    config = session.config
+    asked = {(config.invocation_params.dir / argument).resolve() for argument in config.args}
+    is_whole = not asked.isdisjoint({TESTS, TESTS.parent})
+    is_worker, only_lists = hasattr(config, "workerinput"), config.option.collectonly
+    if is_whole and not is_worker and not only_lists and decorated_names() != compiled_names():
+        config.pluginmanager.getplugin("terminalreporter").write_line(NOTICE)
+        subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
 
 
 @pytest.fixture(scope="session")
