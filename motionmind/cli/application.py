@@ -23,6 +23,7 @@ from motionmind.cli.scores import compose, library
 from motionmind.cli.serving import serve
 from motionmind.cli.shells import completion
 from motionmind.cli.streams import forgiving
+from motionmind.cli.studio import studio
 from motionmind.cli.tweens import INTERRUPTED, tween
 from motionmind.cli.variations import attractor, vary
 from motionmind.cli.warming import warm
@@ -47,7 +48,7 @@ def app(context: click.Context) -> None:
 
 for _command in (
     *(tween, postures, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
-    *(vary, review, attractor, serve, warm, completion),
+    *(vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 import click
 
+from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import CORPUS, HOME, Section, command, option
 from motionmind.cli.printing import note
 from motionmind.cli.warming import warm_once
@@ -54,16 +54,11 @@ def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> N
 
     engine = Engine.load(corpus, home)
     warm_once()
-    try:
-        listening = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
-    except OSError as error:
-        raise MotionMindError(f"cannot listen at {host}:{port}: {(error.strerror or str(error)).lower()}") from None
-    with listening:
-        address, at = listening.getsockname()[:2]
-        if not address.startswith("127.") and address != "::1":
-            note(f"whoever reaches {address} may ask for movement: there is no password")
-        shown = f"[{address}]" if ":" in address else address
-        click.echo(f"serving {displayed(engine.corpus.name)} at http://{shown}:{at} (Ctrl-C ends)")
+    with listen(host, port) as listening:
+        url, is_open = address_of(listening)
+        if is_open:
+            note(f"whoever reaches {url.removeprefix('http://')} may ask for movement: there is no password")
+        click.echo(f"serving {displayed(engine.corpus.name)} at {url} (Ctrl-C ends)")
         config = uvicorn.Config(
             Guard(app(engine), host),
             log_level="error",

@@ -48,7 +48,7 @@ def page(motion: Motion, first: int = 0) -> str:
         motion: the motion, on any skeleton.
         first: number of the motion's first frame in the longer motion that it is a part of.
     """
-    return _filled(motion, _data(motion, first), "main")
+    return _filled(motion, player_data(motion, first), "main")
 
 
 def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
@@ -60,7 +60,7 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
         data: the data that this module reads, as `beside` in the page's data.
     """
     style, beside = (_text(f"{folder}/beside.{suffix}") for suffix in ("css", "html"))
-    return _filled(motion, {**_data(motion, 0), "beside": data}, f"{folder}/beside", style, beside)
+    return _filled(motion, {**player_data(motion), "beside": data}, f"{folder}/beside", style, beside)
 
 
 def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
@@ -99,7 +99,7 @@ def _modules(start: str) -> str:
     return msgspec.json.encode({"imports": urls}).decode()
 
 
-def _data(motion: Motion, first: int) -> dict[str, Any]:
+def player_data(motion: Motion, first: int = 0) -> dict[str, Any]:
     """Build the data that the player reads, as documented in player/README.md."""
     skeleton = motion.skeleton
     body = shape_of(skeleton)

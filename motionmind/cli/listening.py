@@ -1,0 +1,22 @@
+"""Sockets at which commands listen, and their addresses."""
+
+from __future__ import annotations
+
+import socket
+
+from motionmind.errors import MotionMindError
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Open a socket that listens; MotionMindError if that is not possible, as where the port is taken."""
+    try:
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except OSError as error:
+        raise MotionMindError(f"cannot listen at {host}:{port}: {(error.strerror or str(error)).lower()}") from None
+
+
+def address_of(listening: socket.socket) -> tuple[str, bool]:
+    """Return the URL of a socket that listens, and whether others than this computer reach it."""
+    address, port = listening.getsockname()[:2]
+    shown = f"[{address}]" if ":" in address else address
+    return f"http://{shown}:{port}", not address.startswith("127.") and address != "::1"

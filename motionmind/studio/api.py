@@ -1,0 +1,163 @@
+"""The project over HTTP: its state, edits, movement, small pictures, jobs and events."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import BaseRoute, Route
+
+from motionmind.errors import MotionMindError
+from motionmind.render.page import player_data
+from motionmind.studio.edits import Edit
+from motionmind.studio.project import RefusedError
+from motionmind.studio.studio import Studio
+from motionmind.studio.thumbnails import thumbnail
+
+T = TypeVar("T")
+Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
+_HEIGHT = 96  # pixels of a small picture
+_FOREVER = "private, max-age=31536000, immutable"
+
+
+class Edited(msgspec.Struct, forbid_unknown_fields=True):
+    """What a window sends to edit."""
+
+    window: Window
+    edit: Edit
+
+
+class Windowed(msgspec.Struct, forbid_unknown_fields=True):
+    """What a window sends to take back, or do again."""
+
+    window: Window
+
+
+def json(value: Any, status: int = 200) -> Response:
+    """Return plain values, in which numpy's numbers may stand, as JSON."""
+    return Response(msgspec.json.encode(value, enc_hook=float), status, media_type="application/json")
+
+
+def error(words: str, status: int = 400) -> Response:
+    """Return an error in one line."""
+    return json({"error": words}, status)
+
+
+async def body_of(request: Request, schema: type[T]) -> T:
+    """Read the body of a request; MotionMindError if it is not what the schema says."""
+    try:
+        return msgspec.json.decode(await request.body(), type=schema)
+    except (ValueError, RecursionError) as problem:
+        raise MotionMindError(f"this was not understood: {problem}") from problem
+
+
+def number(text: str | None, words: str) -> int:
+    """Return the whole number that a text is; MotionMindError, with words for it, if it is none."""
+    if text is None or not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise MotionMindError(f"{words} must be a whole number")
+    return int(text)
+
+
+def window_of(request: Request) -> str:
+    """Return the window that a request names by `?window=`; MotionMindError if that can be none."""
+    try:
+        return msgspec.convert(request.query_params.get("window", "-"), Window)
+    except msgspec.ValidationError:
+        raise MotionMindError("a window's name is of letters, digits, - and _") from None
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return the routes."""
+    return [*_project_routes(studio), *_movement_routes(studio)]
+
+
+def _project_routes(studio: Studio) -> list[BaseRoute]:
+    async def project(request: Request) -> Response:
+        window = window_of(request)
+        if window != "-":
+            studio.project.greet(window)
+        return json(studio.view(window))
+
+    def written(window: str, write: Callable[[], None]) -> Response:
+        """Write, and return what the window sees then."""
+        try:
+            write()
+        except RefusedError as refusal:
+            return error(str(refusal), 409)
+        return json(studio.view(window))
+
+    async def edits(request: Request) -> Response:
+        given = await body_of(request, Edited)
+        return written(given.window, lambda: studio.project.edit(given.window, given.edit))
+
+    async def undo(request: Request) -> Response:
+        given = await body_of(request, Windowed)
+        return written(given.window, lambda: studio.project.undo(given.window))
+
+    async def redo(request: Request) -> Response:
+        given = await body_of(request, Windowed)
+        return written(given.window, lambda: studio.project.redo(given.window))
+
+    async def events(request: Request) -> Response:
+        window_of(request)
+        first: dict[tuple[str, str], Any] = {("project", ""): {"sequence": studio.project.sequence}}
+        first |= {("job", job.id): job.view() for job in studio.workers.jobs}
+        headers = {"cache-control": "no-store"}
+        return StreamingResponse(studio.events.open(first), headers=headers, media_type="text/event-stream")
+
+    async def job(request: Request) -> Response:
+        try:
+            found = studio.workers.find(request.path_params["id"])
+        except MotionMindError as missing:
+            return error(str(missing), 404)
+        if request.method == "DELETE":
+            found.cancel()
+        return json(found.view())
+
+    return [
+        Route("/api/project", project),
+        Route("/api/edits", edits, methods=["POST"]),
+        Route("/api/undo", undo, methods=["POST"]),
+        Route("/api/redo", redo, methods=["POST"]),
+        Route("/api/events", events),
+        Route("/api/jobs/{id}", job, methods=["GET", "DELETE"]),
+    ]
+
+
+def _movement_routes(studio: Studio) -> list[BaseRoute]:
+    drawing = asyncio.Lock()  # one small picture at a time leaves a processor to the engine
+
+    async def movement(request: Request) -> Response:
+        key = request.path_params["key"]
+        try:
+            motion = studio.movements.get(key)
+        except MotionMindError as missing:
+            return error(str(missing), 404)
+        answer = json(player_data(motion) | {"name": studio.movements.title(key)})
+        if key.lstrip("~").startswith("m-"):
+            answer.headers["cache-control"] = _FOREVER
+        return answer
+
+    async def picture(request: Request) -> Response:
+        key, frame = request.path_params["key"], number(request.path_params["frame"], "a frame")
+        height = number(request.query_params.get("height", str(_HEIGHT)), "the height")
+        stable = studio.project.state.stable(key)
+        try:
+            motion = studio.movements.get(stable)
+        except MotionMindError as missing:
+            return error(str(missing), 404)
+        if (drawn := studio.thumbnails.find(stable, frame, height)) is None:
+            async with drawing:
+                drawn = await asyncio.to_thread(thumbnail, motion, frame, height)
+            studio.thumbnails.hold(stable, frame, height, drawn)
+        lasting = _FOREVER if stable == key and stable.lstrip("~").startswith("m-") else "private, max-age=60"
+        return Response(drawn, media_type="image/png", headers={"cache-control": lasting})
+
+    return [
+        Route("/api/movements/{key:path}", movement),
+        Route("/api/thumbnails/{key:path}/{frame}.png", picture),
+    ]

@@ -1,0 +1,96 @@
+"""The studio's application: the routes of its parts, the page's files, and the guard around them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from importlib import import_module
+from importlib.util import find_spec
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route, Router
+
+from motionmind.studio import api
+from motionmind.studio.guard import ENTER, Application, Guard, Message, Receive, Send, policy
+from motionmind.studio.pages import read_page
+from motionmind.studio.studio import Studio
+from motionmind.studio.token import Keys
+
+_PARTS = ("seams", "between", "export", "varied", "imports", "corpora", "posing", "postures")
+
+
+class _Entering(msgspec.Struct, forbid_unknown_fields=True):
+    token: str
+
+
+def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
+    """Build the application of a studio.
+
+    Args:
+        studio: the studio.
+        keys: who is let in.
+        host: the name or address at which it listens.
+        port: its port.
+    """
+
+    @asynccontextmanager
+    async def lifespan(_: object) -> AsyncIterator[None]:
+        studio.start()
+        tasks = [asyncio.create_task(part.keep_smooth(studio)) for part in parts if hasattr(part, "keep_smooth")]
+        yield
+        studio.events.close()
+        for task in tasks:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+        studio.close()
+
+    parts = [import_module(f"motionmind.studio.{name}") for name in _PARTS if find_spec(f"motionmind.studio.{name}")]
+    found: list[BaseRoute] = [*_open_routes(keys, port), *api.routes(studio)]
+    for part in parts:
+        if hasattr(part, "routes"):
+            found += part.routes(studio)
+
+    router = Router(found, lifespan=lifespan)
+
+    async def routed(scope: Message, receive: Receive, send: Send) -> None:
+        scope["app"] = router  # or it would answer by itself, in plain text, what it does not know
+        await router(scope, receive, send)
+
+    return Guard(routed, host, port, keys)
+
+
+def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
+    """Return the routes that need no cookie."""
+    page = read_page()
+    headers = {"cache-control": "no-cache", "content-security-policy": policy(page.script)}
+
+    async def file(request: Request) -> Response:
+        if (found := page.files.get(request.url.path)) is None:
+            return api.error("there is nothing here", 404)
+        sent = headers | {"etag": found.tag}
+        if request.headers.get("if-none-match") == found.tag:
+            return Response(status_code=304, headers=sent)
+        return Response(found.data, media_type=found.type, headers=sent)
+
+    async def health(_: Request) -> Response:
+        return api.json({"ready": True})
+
+    async def enter(request: Request) -> Response:
+        given = await api.body_of(request, _Entering)
+        if not keys.admits(given.token):
+            return api.error("this address is of another studio: open the one that the terminal shows", 403)
+        answer = api.json({})
+        answer.headers["set-cookie"] = keys.cookie(port)
+        return answer
+
+    return [
+        Route("/", file),
+        Route("/page/{path:path}", file),
+        Route("/player/{path:path}", file),
+        Route("/health", health),
+        Route(ENTER, enter, methods=["POST"]),
+    ]

@@ -1,0 +1,201 @@
+"""The guard between the network and the studio: who may ask, what for, how much and how long.
+
+A page elsewhere that a browser shows cannot ask: after DNS rebinding its requests have a Host that is a name; those
+that it sends across have its Origin, lack the header that asks a browser for leave, and carry no cookie.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import json
+import sys
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from typing import Any
+from urllib.parse import urlsplit
+
+from starlette.exceptions import HTTPException
+
+from motionmind.display import printable
+from motionmind.errors import MotionMindError
+from motionmind.studio.token import Keys
+
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Application = Callable[[Message, Receive, Send], Awaitable[None]]
+
+HEADER, VALUE = "x-motionmind", "studio"
+ENTER, UPLOADS = "/api/enter", "/api/imports"
+_METHODS = {"GET", "HEAD", "POST", "DELETE"}
+_READING = {"GET", "HEAD"}
+_MOST, _MOST_UPLOADED = 4 * 2**20, 64 * 2**20  # bytes of a request's body
+_SECONDS, _SECONDS_UPLOADED = 20.0, 120.0  # in which it must have come
+_ALWAYS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "x-frame-options": "DENY",
+}
+
+
+def policy(*scripts: str) -> str:
+    """Return the Content-Security-Policy of a page whose inline scripts have these hashes, and which runs no others."""
+    inline = "".join(f" '{script}'" for script in scripts)
+    return (
+        f"default-src 'none'; script-src 'self'{inline}; style-src 'self'; img-src 'self' blob: data:; "
+        "connect-src 'self'; media-src 'self' blob:; font-src 'self'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    )
+
+
+class TooLargeError(Exception):
+    """The body of a request is larger than it may be."""
+
+
+class Guard:
+    """An ASGI application around another."""
+
+    def __init__(
+        self, application: Application, host: str, port: int, keys: Keys, *, seconds: float = _SECONDS
+    ) -> None:
+        """Guard an application.
+
+        Args:
+            application: the application.
+            host: the name or address at which it listens.
+            port: its port.
+            keys: who is let in.
+            seconds: in which the body of a request must have come.
+        """
+        self._application, self._port, self._keys, self._seconds = application, port, keys, seconds
+        names = {"127.0.0.1", "::1", "localhost", host.lower().strip("[]")}
+        self._names = names
+        # Listening at all addresses of this computer, it is asked for by any of them.
+        self._any_address = host in ("0.0.0.0", "::", "")
+
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] == "lifespan":
+            await self._application(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        has_begun = False
+
+        async def sent(message: Message) -> None:
+            nonlocal has_begun
+            if message["type"] == "http.response.start":
+                has_begun = True
+                message = {**message, "headers": _with_headers(message.get("headers", ()), scope["path"])}
+            await send(message)
+
+        async def refuse(status: int, words: str) -> None:
+            if not has_begun:  # otherwise the connection ends amid the answer, and the other side knows
+                await _answer(sent, status, words)
+
+        if fault := self._fault(scope):
+            await refuse(*fault)
+            return
+        is_upload = scope["path"] == UPLOADS
+        most, seconds = (_MOST_UPLOADED, _SECONDS_UPLOADED) if is_upload else (_MOST, self._seconds)
+        try:
+            await self._application(scope, _limited(receive, most, seconds), sent)
+        except TimeoutError:
+            await refuse(408, f"the request did not come within {seconds:g} s")
+        except TooLargeError:
+            await refuse(413, f"this is too much at once: {most // 2**20} MB are the most")
+        except MotionMindError as error:
+            await refuse(400, printable(str(error)))
+        except HTTPException as error:
+            await refuse(error.status_code, "there is nothing here" if error.status_code == 404 else "this cannot be")
+        except Exception as error:
+            print(f"motionmind studio: {type(error).__name__}: {error}", file=sys.stderr)
+            await refuse(500, "this cannot be answered; the terminal says why")
+
+    def _fault(self, scope: Message) -> tuple[int, str] | None:
+        """Return the status and words for a request that is not to be answered; None for others."""
+        headers: dict[str, list[str]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
+        return self._foreign(headers, scope["method"]) or self._unwelcome(headers, scope["path"])
+
+    def _foreign(self, headers: Mapping[str, list[str]], method: str) -> tuple[int, str] | None:
+        """Return the fault of a request that another page may have sent."""
+        hosts, origins = headers.get("host", []), headers.get("origin", [])
+        if len(hosts) != 1 or not self._is_own(hosts[0]):
+            return 403, "the studio is not at this host"
+        sites = headers.get("sec-fetch-site", [])
+        if any(origin != f"http://{hosts[0]}" for origin in origins) or not {*sites} <= {"same-origin", "none"}:
+            return 403, "other pages may not ask"
+        if method not in _METHODS:
+            return 405, "there is no such method"
+        if method not in _READING and (len(origins) != 1 or headers.get(HEADER) != [VALUE]):
+            return 403, f"what writes needs Origin and {HEADER}"
+        return None
+
+    def _unwelcome(self, headers: Mapping[str, list[str]], path: str) -> tuple[int, str] | None:
+        """Return the fault of a request that is too large, or of somebody who has not been let in."""
+        length = headers.get("content-length", ["0"])[0]
+        most = _MOST_UPLOADED if path == UPLOADS else _MOST
+        if not length.isascii() or not length.isdigit() or len(length) > 15 or int(length) > most:
+            return 413, f"this is too much at once: {most // 2**20} MB are the most"
+        needs_cookie = path.startswith("/api/") and path != ENTER
+        if needs_cookie and not self._keys.is_let_in("; ".join(headers.get("cookie", [])), self._port):
+            return 401, "open the studio at the address that the terminal shows"
+        return None
+
+    def _is_own(self, host: str) -> bool:
+        """Whether a request's Host is this server."""
+        try:
+            parts = urlsplit(f"//{host}")
+            name, port = parts.hostname or "", parts.port or 80
+            if port != self._port or parts.username is not None or parts.path:
+                return False
+            if name in self._names:
+                return True
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return self._any_address
+
+
+def _limited(receive: Receive, most: int, seconds: float) -> Receive:
+    """Return `receive`, which raises an error where a body is too large or has not come whole in time."""
+    until = asyncio.get_running_loop().time() + seconds
+    is_whole, size = False, 0
+
+    async def limited() -> Message:
+        nonlocal is_whole, size
+        if is_whole:  # what follows is that the other side has gone
+            return await receive()
+        async with asyncio.timeout_at(until):
+            message = await receive()
+        size += len(message.get("body", b""))
+        if size > most:
+            raise TooLargeError
+        is_whole = message["type"] != "http.request" or not message.get("more_body", False)
+        return message
+
+    return limited
+
+
+def _with_headers(headers: Any, path: str) -> list[tuple[bytes, bytes]]:
+    found = {name.lower() for name, _ in headers}
+    added = {**_ALWAYS, "content-security-policy": policy()}
+    if path.startswith("/api/"):
+        added["cache-control"] = "no-store"
+    more = [(name.encode(), value.encode()) for name, value in added.items() if name.encode() not in found]
+    return [*headers, *more]
+
+
+async def _answer(send: Send, status: int, words: str) -> None:
+    body = json.dumps({"error": words}).encode()
+    headers = [
+        (b"content-type", b"application/json"),
+        (b"connection", b"close"),
+        (b"content-length", str(len(body)).encode()),
+    ]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})

@@ -1,0 +1,274 @@
+"""Movement by its key: clips and postures of corpora, saved postures, and what the project keeps.
+
+ballet/adagio    a clip of a corpus
+ballet/arabesque    a posture that a corpus names: a movement of one frame
+own/bow    a posture that is saved in the project
+m-0123456789abcdef    a movement that the project keeps; the hash of its content
+~KEY    the same with left and right exchanged
+"""
+
+from __future__ import annotations
+
+import hashlib
+from base64 import b64decode, b64encode
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.mirror import mirrored
+from motionmind.body.motion import Insertion, Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus import store
+from motionmind.corpus.corpus import Corpus
+from motionmind.display import displayed
+from motionmind.errors import FormatError, MotionMindError, suggestion
+from motionmind.names.finding import Collection, open_collection
+from motionmind.names.spelling import Source
+from motionmind.studio.journal import Journal, Line
+
+_MIRRORED, _KEPT, _OWN = "~", "m-", "own"
+_HELD = 64 * 2**20  # bytes of movement that are kept in memory
+
+
+class Packed(msgspec.Struct, frozen=True):
+    """Numbers as bytes.
+
+    Attributes:
+        type: "<f4" if that is exact, else "<f8".
+        shape: the array's shape.
+        data: the numbers in base64.
+    """
+
+    type: str
+    shape: tuple[int, ...]
+    data: str
+
+    @classmethod
+    def of(cls, array: Floats) -> Packed:
+        """Pack an array."""
+        small = array.astype("<f4")
+        kept = small if np.array_equal(small.astype("<f8"), array) else array.astype("<f8")
+        return cls(kept.dtype.str, kept.shape, b64encode(np.ascontiguousarray(kept).tobytes()).decode("ascii"))
+
+    def array(self) -> Floats:
+        """Return the array; ValueError if it is none."""
+        if self.type not in ("<f4", "<f8"):
+            raise ValueError(f"numbers of type {self.type!r:.20}")
+        data = b64decode(self.data, validate=True)
+        return np.frombuffer(data, self.type).reshape(self.shape).astype(np.float64)
+
+
+class MotionRecord(msgspec.Struct, frozen=True):
+    """A motion in a project's file; the fields are those of `Motion` and `Skeleton`."""
+
+    body: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Packed
+    tips: Packed
+    rotations: Packed
+    root: Packed
+    times: Packed
+    insertions: tuple[tuple[tuple[float, ...], tuple[tuple[str, int], ...]], ...] = ()
+    keyframed: bool = False
+
+    @classmethod
+    def of(cls, motion: Motion) -> MotionRecord:
+        """Record a motion, without its name."""
+        body = motion.skeleton
+        return cls(
+            body.name,
+            body.names,
+            body.parents,
+            Packed.of(body.offsets),
+            Packed.of(body.tips),
+            Packed.of(motion.rotations),
+            Packed.of(motion.root),
+            Packed.of(motion.times),
+            tuple((tuple(one.times.tolist()), one.bridged) for one in motion.insertions),
+            motion.keyframed,
+        )
+
+    def motion(self, name: str) -> Motion:
+        """Return the motion; MotionMindError if it is none."""
+        try:
+            offsets, tips, rotations, root, times = (
+                packed.array() for packed in (self.offsets, self.tips, self.rotations, self.root, self.times)
+            )
+        except ValueError as error:
+            raise MotionMindError(f"{displayed(name)}: its numbers cannot be read: {error}") from error
+        skeleton = Skeleton(self.body, self.names, self.parents, offsets, tips)
+        insertions = tuple(Insertion(np.array(times), bridged) for times, bridged in self.insertions)
+        return Motion(skeleton, rotations, root, times, name, insertions, self.keyframed)
+
+
+class MovementLine(msgspec.Struct, frozen=True):
+    """A line of the project's file that holds a movement."""
+
+    movement: str
+    title: str
+    motion: msgspec.Raw
+
+
+class Movements:
+    """All movement that there is, by key.
+
+    Attributes:
+        saved: returns the key of the movement that a saved posture is; MotionMindError if there is none.
+    """
+
+    def __init__(self, journal: Journal, home: Path | None) -> None:
+        """Open the movements of a project.
+
+        Args:
+            journal: its file.
+            home: the folder of the user's corpora; None for the usual one.
+        """
+        self._journal, self._home = journal, home
+        self._kept: dict[str, tuple[str, int, int]] = {}  # title, first byte and length of its line
+        self._held: OrderedDict[str, Motion] = OrderedDict()
+        self._size = 0
+        self._collections: dict[str, _Corpus] = {}
+        self.saved: Callable[[str], str] = _no_posture
+
+    def take_in(self, line: Line) -> None:
+        """Take in a line of the file that holds a movement; FormatError if it is damaged."""
+        try:
+            found = msgspec.json.decode(line.data, type=MovementLine)
+        except (ValueError, RecursionError) as error:
+            raise FormatError(f"is damaged: {error}", path=self._journal.path, line=line.number + 1) from error
+        self._kept[found.movement] = found.title, line.start, len(line.data)
+
+    def get(self, key: str) -> Motion:
+        """Return the movement of a key; MotionMindError if there is none."""
+        if (known := self._held.get(key)) is not None:
+            self._held.move_to_end(key)
+            return known
+        if key.lstrip(_MIRRORED).startswith(f"{_OWN}/"):  # which may be saved anew
+            motion = self.get(self.saved(key.lstrip(_MIRRORED).partition("/")[2]))
+            return mirrored(motion) if key.startswith(_MIRRORED) else motion
+        if key.startswith(_MIRRORED):
+            motion = mirrored(self.get(key[1:]))
+        elif key in self._kept:
+            motion = self._read(key)
+        else:
+            corpus, clip = self._split(key)
+            motion = corpus.motion(clip)
+        self._hold(key, motion)
+        return motion
+
+    def title(self, key: str) -> str:
+        """Return the words for a movement; MotionMindError if there is none."""
+        if key.startswith(_MIRRORED):
+            return f"{self.title(key[1:])} (mirrored)"
+        if key in self._kept:
+            return self._kept[key][0]
+        if key.startswith((f"{_OWN}/", _KEPT)):
+            return key.partition("/")[2] or key
+        return self._split(key)[1]
+
+    def keep(self, motion: Motion, title: str = "") -> str:
+        """Keep a movement in the project, once, and return its key.
+
+        Args:
+            motion: the movement.
+            title: words for it; its name by default.
+
+        Raises:
+            MotionMindError: it cannot be written.
+        """
+        record = msgspec.json.encode(MotionRecord.of(motion))
+        key = _KEPT + hashlib.sha256(record).hexdigest()[:16]
+        if key not in self._kept:
+            title = displayed(title or motion.name or motion.skeleton.name)
+            self.take_in(self._journal.append(MovementLine(key, title, msgspec.Raw(record))))
+        return key
+
+    def collection(self, corpus: str) -> Collection:
+        """Return a corpus's clips and postures by name; MotionMindError if there is no such corpus."""
+        return self._corpus(corpus).collection
+
+    def forget(self, corpus: str) -> None:
+        """Forget what is known of a corpus, which has changed."""
+        self._collections.pop(corpus, None)
+        for key in [key for key in self._held if key.lstrip(_MIRRORED).startswith(f"{corpus}/")]:
+            self._size -= _bytes(self._held.pop(key))
+
+    def _read(self, key: str) -> Motion:
+        title, start, length = self._kept[key]
+        try:
+            line = msgspec.json.decode(self._journal.read(start, length), type=MovementLine)
+            record = msgspec.json.decode(line.motion, type=MotionRecord)
+        except (ValueError, RecursionError) as error:
+            raise MotionMindError(f"{self._journal.path}: movement {key} is damaged: {error}") from error
+        return record.motion(title)
+
+    def _split(self, key: str) -> tuple[_Corpus, str]:
+        name, slash, clip = key.partition("/")
+        if not slash or name not in store.list_corpora(self._home):
+            raise MotionMindError(f"there is no movement {displayed(key)}")
+        return self._corpus(name), clip
+
+    def _corpus(self, name: str) -> _Corpus:
+        if name not in self._collections:
+            if name not in (known := store.list_corpora(self._home)):
+                raise MotionMindError(f"there is no corpus {displayed(name)}{suggestion(name, known)}")
+            self._collections[name] = _Corpus(name, self._home)
+        return self._collections[name]
+
+    def _hold(self, key: str, motion: Motion) -> None:
+        self._held[key] = motion
+        self._size += _bytes(motion)
+        while self._size > _HELD and len(self._held) > 1:
+            self._size -= _bytes(self._held.popitem(last=False)[1])
+
+
+class _Corpus:
+    """The clips and postures of a corpus, opened when one of them is asked for."""
+
+    def __init__(self, name: str, home: Path | None) -> None:
+        self.collection = open_collection(Source(name, "corpus", name), home)
+        self._name, self._home = name, home
+
+    @cached_property
+    def _corpus(self) -> Corpus:
+        from motionmind.learned import persistence  # numba is slow to import
+
+        return persistence.load(self._name, self._home).corpus
+
+    def motion(self, name: str) -> Motion:
+        """Return a clip as it was recorded, else a posture."""
+        for clip in self._corpus.clips:
+            if clip.label == name:
+                return replace(self._corpus.recording(clip), name=name)
+        return self.collection.find(name, as_clip=True)
+
+
+def version_of(corpus: str, home: Path | None) -> str:
+    """Return a hash of all that a corpus consists of; MotionMindError if there is no such corpus or it is damaged."""
+    folder = store.locate(corpus, home)
+    stored = store.load(folder)
+    digest = hashlib.sha256()
+    manifest = {name: value for name, value in stored.manifest.items() if name != "folder"}
+    digest.update(msgspec.json.encode(manifest))
+    # What is written by hand lies beside its manifest.
+    files = stored.files or [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name[:1] != "."]
+    for path in files:
+        with path.open("rb") as file:
+            digest.update(f"{path.name}\0".encode())
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()[:16]
+
+
+def _bytes(motion: Motion) -> int:
+    return motion.rotations.nbytes + motion.root.nbytes + motion.times.nbytes
+
+
+def _no_posture(name: str) -> str:
+    raise MotionMindError(f"no posture is saved as {displayed(name)}")

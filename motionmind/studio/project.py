@@ -1,0 +1,410 @@
+"""An open project: its facts, its edits, and the state that those of them lead to that are not undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import msgspec
+
+from motionmind.display import displayed
+from motionmind.errors import FormatError, MotionMindError, enumerated
+from motionmind.studio import piece
+from motionmind.studio.edits import Edit, touched, words_of
+from motionmind.studio.journal import Journal
+from motionmind.studio.movements import Movements, version_of
+from motionmind.studio.piece import Finding, Seam, State, key_of
+from motionmind.studio.placement import Marks
+
+_EVERY = 16  # edits after which the state is remembered, so that an undo need not apply all of them again
+
+
+class RefusedError(MotionMindError):
+    """Nothing was done, for as things stand it cannot be."""
+
+
+class _Head(msgspec.Struct, frozen=True):
+    format: str
+    version: int
+    corpora: dict[str, str]
+    title: str = ""
+    corpus: str = ""
+
+
+class _Corpora(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """From here on the project uses these versions of corpora, beside those named before."""
+
+    corpora: dict[str, str]
+
+
+class _Edited(msgspec.Struct, frozen=True):
+    edit: Edit
+    number: int
+    window: str
+
+
+class _Undone(msgspec.Struct, frozen=True):
+    undo: int
+    number: int
+    window: str
+
+
+class _Redone(msgspec.Struct, frozen=True):
+    redo: int
+    number: int
+    window: str
+
+
+@dataclass
+class Change:
+    """An edit of the project.
+
+    Attributes:
+        number: its number; later edits have greater ones.
+        edit: the edit.
+        window: the window in which it was done.
+        undone: whether it is taken back.
+    """
+
+    number: int
+    edit: Edit
+    window: str
+    undone: bool = False
+
+
+class Project:
+    """A project that this process holds.
+
+    Attributes:
+        movements: all movement by key.
+        marks: marks of the movements.
+        state: what the edits lead to.
+        versions: the version of each corpus that it names.
+        words: what there is to say of it since it was opened, such as that a corpus has changed.
+    """
+
+    def __init__(self, journal: Journal, home: Path | None = None) -> None:
+        """Read a project's file; errors as of `open`."""
+        self._journal, self._home = journal, home
+        self.movements = Movements(journal, home)
+        self.marks = Marks(self.movements.get)
+        self.movements.saved = self._saved
+        self.versions: dict[str, str] = {}
+        self.words: list[str] = []
+        self._changes: list[Change] = []
+        self._redoable: dict[str, list[Change]] = {}  # by window, the last to be redone first
+        self._findings: dict[str, Finding] = {}
+        self._subscribers: list[Callable[[], None]] = []
+        self._windows: set[str] = set()  # that were seen since it was opened
+        self._states: list[State] = []  # before the first change, and after each `_EVERY` changes more
+        self.state = State()
+        if journal.dropped:
+            self.words.append("the last edit was not written whole when the studio ended, and is gone")
+        self._read()
+
+    @classmethod
+    def create(cls, path: Path, corpus: str, home: Path | None = None, title: str = "") -> Self:
+        """Make a new project with no edits.
+
+        Args:
+            path: its file, which is not there yet.
+            corpus: the corpus that judges and smooths.
+            home: the folder of the user's corpora; None for the usual one.
+            title: its title; the file's name by default.
+
+        Raises:
+            MotionMindError: there is no such corpus, or the file cannot be written.
+        """
+        versions = {corpus: version_of(corpus, home)}
+        title = displayed(title or path.stem)
+        return cls(Journal.create(path, title=title, corpus=corpus, corpora=versions), home)
+
+    @classmethod
+    def open(cls, path: Path, home: Path | None = None) -> Self:
+        """Open a project.
+
+        Raises:
+            FormatError: it is no project, or damaged.
+            MotionMindError: it is open elsewhere, or a corpus or a movement that it needs is missing.
+        """
+        journal = Journal.open(path)
+        try:
+            return cls(journal, home)
+        except BaseException:
+            journal.close()
+            raise
+
+    def close(self) -> None:
+        """Let others open it."""
+        self._journal.close()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._journal.path
+
+    @property
+    def sequence(self) -> int:
+        """A number that grows with whatever the project comes to hold."""
+        return self._journal.count
+
+    def tell(self, address: str) -> None:
+        """Note the address at which the project is open."""
+        self._journal.tell(address)
+
+    def subscribe(self, callback: Callable[[], None]) -> None:
+        """Have a function called after each edit, undo, redo and finding."""
+        self._subscribers.append(callback)
+
+    # --- findings ---------------------------------------------------------------------------------------------------
+
+    def question(self, seam: Seam) -> str:
+        """Return the question that a seam asks."""
+        return piece.question_of(seam.ends, seam.verdict.ask, self.state.corpus, self.versions)
+
+    def finding(self, seam: Seam) -> Finding | None:
+        """Return what is known of a seam."""
+        return self._findings.get(self.question(seam))
+
+    def keep_finding(self, finding: Finding) -> None:
+        """Keep what was found at a seam; MotionMindError if it cannot be written."""
+        if self._findings.get(finding.finding) != finding:
+            self._journal.append(finding)
+            self._findings[finding.finding] = finding
+            self._changed()
+
+    # --- edits ------------------------------------------------------------------------------------------------------
+
+    def edit(self, window: str, edit: Edit) -> None:
+        """Apply an edit.
+
+        Raises:
+            RefusedError: it cannot be applied as things stand.
+            MotionMindError: it cannot be written.
+        """
+        self.greet(window)
+        try:
+            state = piece.apply(self.state, edit)
+            piece.check(state, edit, self.marks.length)
+        except MotionMindError as error:
+            raise RefusedError(str(error)) from error
+        self._note_versions(state)
+        line = self._journal.append(_Edited(edit, self.sequence, window))
+        self._redoable.pop(window, None)
+        self._add(Change(line.number, edit, window), state)
+        self._changed()
+
+    def undo(self, window: str) -> None:
+        """Take back a window's last edit.
+
+        Raises:
+            RefusedError: there is none, or a later edit of another window rests on it.
+            MotionMindError: it cannot be written.
+        """
+        self.greet(window)
+        change = self._last(window)
+        if change is None:
+            raise RefusedError("this window has nothing to take back")
+        state = self._without_conflict(change, undone=True)
+        self._journal.append(_Undone(change.number, self.sequence, window))
+        self._switch(change, True, state)
+        self._redoable.setdefault(window, []).append(change)
+        self._changed()
+
+    def redo(self, window: str) -> None:
+        """Do again what a window took back last; errors as of `undo`."""
+        self.greet(window)
+        if not (stack := self._redoable.get(window)):
+            raise RefusedError("this window has nothing to do again")
+        change = stack[-1]
+        state = self._without_conflict(change, undone=False)
+        self._journal.append(_Redone(change.number, self.sequence, window))
+        self._switch(change, False, state)
+        stack.pop()
+        self._changed()
+
+    def undoable(self, window: str) -> str | None:
+        """Say what `undo` would take back; None if there is nothing."""
+        change = self._last(window)
+        return words_of(change.edit) if change else None
+
+    def redoable(self, window: str) -> str | None:
+        """Say what `redo` would do again; None if there is nothing."""
+        stack = self._redoable.get(window)
+        return words_of(stack[-1].edit) if stack else None
+
+    def greet(self, window: str) -> None:
+        """Note that a window is there: what it did, it alone takes back."""
+        self._windows.add(window)
+
+    def _last(self, window: str) -> Change | None:
+        """The last change that a window may take back: its own, or one from before the project was opened."""
+        mine = (one for one in reversed(self._changes) if not one.undone)
+        return next((one for one in mine if one.window == window or one.window not in self._windows), None)
+
+    def _without_conflict(self, change: Change, *, undone: bool) -> State:
+        """Return the state with a change undone or redone; RefusedError if a later one rests on what it changes."""
+        place = self._changes.index(change)
+        later = [one for one in self._changes[place + 1 :] if not one.undone]
+        places, words = touched(change.edit), words_of(change.edit)
+        verb = "take back" if undone else "do again"
+        for one in later:
+            if places & touched(one.edit):
+                raise RefusedError(f"cannot {verb} “{words}”: a later edit, “{words_of(one.edit)}”, rests on it")
+        number = place // _EVERY
+        state = self._states[number]
+        for one in self._changes[number * _EVERY :]:
+            if undone if one is change else one.undone:
+                continue
+            try:
+                state = piece.apply(state, one.edit)
+            except MotionMindError as error:
+                why = f"“{words_of(one.edit)}” rests on it" if one is not change else str(error)
+                raise RefusedError(f"cannot {verb} “{words}”: {why}") from error
+        return state
+
+    def _switch(self, change: Change, undone: bool, state: State) -> None:
+        change.undone = undone
+        del self._states[self._changes.index(change) // _EVERY + 1 :]
+        self._remember(state)
+
+    def _add(self, change: Change, state: State) -> None:
+        self._changes.append(change)
+        self._remember(state)
+
+    def _remember(self, state: State) -> None:
+        """Set the state, and remember it or those before it that are to be remembered."""
+        self.state = state
+        while len(self._states) * _EVERY <= len(self._changes):
+            place, reached = len(self._states) * _EVERY, self._states[-1]
+            for one in self._changes[place - _EVERY : place]:
+                reached = reached if one.undone else piece.apply(reached, one.edit)
+            self._states.append(reached)
+
+    def _changed(self) -> None:
+        for callback in self._subscribers:
+            callback()
+
+    # --- the file ---------------------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        """Read all lines, and see whether everything is there that the state needs."""
+        changes: dict[int, Change] = {}
+        written: dict[str, str] = {}
+        start = State()
+        for line in self._journal.lines():
+            try:
+                record = _decoded(line.data)
+            except (ValueError, RecursionError) as error:
+                raise FormatError(f"is damaged: {error}", path=self.path, line=line.number + 1) from error
+            match record:
+                case _Head():
+                    start = State(title=record.title, corpus=record.corpus)
+                    written |= record.corpora
+                case _Corpora():
+                    written |= record.corpora
+                case None:
+                    self.movements.take_in(line)
+                case Finding():
+                    self._findings[record.finding] = record
+                case _Edited():
+                    changes[line.number] = Change(line.number, record.edit, record.window)
+                    self._redoable.pop(record.window, None)
+                case _Undone(undo=number, window=window) | _Redone(redo=number, window=window):
+                    if (change := changes.get(number)) is None:
+                        message = f"is damaged: there is no edit {number}"
+                        raise FormatError(message, path=self.path, line=line.number + 1)
+                    change.undone = isinstance(record, _Undone)
+                    stack = self._redoable.setdefault(window, [])
+                    if change.undone:
+                        stack.append(change)
+                    elif change in stack:
+                        stack.remove(change)
+        self._changes = list(changes.values())
+        self._apply_all(start)
+        self._check_corpora(written)
+
+    def _apply_all(self, state: State) -> None:
+        self._states = [state]
+        for place, one in enumerate(self._changes, start=1):
+            try:
+                state = state if one.undone else piece.apply(state, one.edit)
+            except MotionMindError as error:
+                raise FormatError(f"is damaged: {error}", path=self.path, line=one.number + 1) from error
+            if place % _EVERY == 0:
+                self._states.append(state)
+        self.state = state
+
+    def _check_corpora(self, written: Mapping[str, str]) -> None:
+        """Compare the corpora that there are with those that the project was made with."""
+        missing, changed = [], []
+        used = self._used(self.state)
+        for name in sorted(used | set(written)):
+            try:
+                version = version_of(name, self._home)
+            except MotionMindError:
+                if name in used:
+                    missing.append(displayed(name))
+                continue
+            if version != written.get(name, version):
+                changed.append(name)
+            self.versions[name] = version
+        if missing:
+            what = f"corpus {missing[0]}" if len(missing) == 1 else f"corpora {enumerated(missing)}"
+            raise MotionMindError(f"{self.path}: {what} is missing that it was made with: build it again by that name")
+        for block in self.state.blocks:
+            try:
+                count = self.marks.length(key_of(block))
+            except MotionMindError as error:
+                raise MotionMindError(f"{self.path}: {error}, which the piece needs") from error
+            if block.last >= count:
+                source = displayed(block.source)
+                raise MotionMindError(
+                    f"{self.path}: the piece needs frame {block.last} of {source}, which has {count} frames now"
+                )
+        if changed:
+            names = enumerated([displayed(name) for name in changed])
+            self.words.append(f"{names} has changed since this piece was made: its seams are judged anew")
+            self._journal.append(_Corpora({name: self.versions[name] for name in changed}))
+
+    def _note_versions(self, state: State) -> None:
+        """Write down the versions of corpora that a state uses for the first time."""
+        new = {name: version_of(name, self._home) for name in sorted(self._used(state) - self.versions.keys())}
+        if new:
+            self._journal.append(_Corpora(new))
+            self.versions |= new
+
+    def _used(self, state: State) -> set[str]:
+        """Names of the corpora that a state needs."""
+        return {state.corpus, *_corpora_of(key_of(block) for block in state.blocks)} - {""}
+
+    def _saved(self, name: str) -> str:
+        return self.state.stable(f"{piece.OWN}{name}")
+
+
+def _corpora_of(keys: Iterable[str]) -> set[str]:
+    parts = (key.lstrip("~").partition("/") for key in keys)
+    return {name for name, slash, _ in parts if slash and f"{name}/" != piece.OWN}
+
+
+_KINDS: Mapping[str, Any] = {
+    "format": _Head,
+    "corpora": _Corpora,
+    "finding": Finding,
+    "edit": _Edited,
+    "undo": _Undone,
+    "redo": _Redone,
+}
+
+
+def _decoded(data: bytes) -> Any:
+    """Decode a line; None if it holds a movement, which is read when it is needed. ValueError if it is damaged."""
+    fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
+    if "movement" in fields:
+        return None
+    for name, kind in _KINDS.items():
+        if name in fields:
+            return msgspec.json.decode(data, type=kind)
+    raise ValueError(f"a line of unknown kind, with {enumerated(sorted(fields))}")

@@ -1,0 +1,105 @@
+"""The studio: what its parts share."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionmind.studio.events import Events
+from motionmind.studio.movements import Movements
+from motionmind.studio.project import Project
+from motionmind.studio.thumbnails import Thumbnails
+from motionmind.studio.view import view_of
+from motionmind.studio.workers import Job, Workers
+
+if TYPE_CHECKING:
+    from motionmind.tween.engine import Engine
+
+_ENGINES = 2  # that the server keeps loaded
+
+
+class Studio:
+    """An open project with all that works on it.
+
+    Attributes:
+        project: the project.
+        home: the folder of the user's corpora; None for the usual one.
+        events: what the windows are told.
+        thumbnails: small pictures.
+        workers: the worker processes, once the server runs.
+    """
+
+    workers: Workers
+
+    def __init__(self, project: Project, home: Path | None = None, processes: int | None = None) -> None:
+        """Set up a studio.
+
+        Args:
+            project: the project.
+            home: the folder of the user's corpora; None for the usual one.
+            processes: the number of workers; by default as many as this computer has room for.
+        """
+        self.project, self.home = project, home
+        self.events, self.thumbnails = Events(), Thumbnails()
+        self._processes = processes
+        self._engines: OrderedDict[str, Engine] = OrderedDict()
+        project.subscribe(self._tell_of_project)
+
+    @property
+    def movements(self) -> Movements:
+        """All movement by key."""
+        return self.project.movements
+
+    def start(self) -> None:
+        """Start the workers, in the event loop."""
+        self.workers = Workers(self.home, self._tell_of_job, self.project.state.corpus, self._processes)
+
+    def close(self) -> None:
+        """End the workers, and let others open the project."""
+        self.workers.close()
+        self.project.close()
+
+    def engine(self, name: str) -> Engine:
+        """Return the engine of a corpus in this process, for questions that take no longer than a blink.
+
+        Raises:
+            MotionMindError: there is no such corpus.
+        """
+        from motionmind.tween.engine import Engine
+
+        if name not in self._engines:
+            self._engines[name] = Engine.load(name, self.home)
+            while len(self._engines) > _ENGINES:
+                self._engines.popitem(last=False)
+        self._engines.move_to_end(name)
+        return self._engines[name]
+
+    def forget(self, corpus: str) -> None:
+        """Forget what is known of a corpus that was made anew or deleted."""
+        self._engines.pop(corpus, None)
+        self.movements.forget(corpus)
+
+    def view(self, window: str) -> Mapping[str, Any]:
+        """Return the project as a window sees it: `GET /api/project`."""
+        project = self.project
+        state = project.state
+        return {
+            "sequence": project.sequence,
+            "title": state.title,
+            "file": project.path.name,
+            "corpus": state.corpus,
+            "corpora": project.versions,
+            "words": project.words,
+            "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
+            "piece": view_of(state, project.finding, project.marks, project.movements.title),
+            "undo": project.undoable(window),
+            "redo": project.redoable(window),
+        }
+
+    def _tell_of_project(self) -> None:
+        self.events.send("project", {"sequence": self.project.sequence})
+
+    def _tell_of_job(self, job: Job) -> None:
+        self.events.send("job", job.view(), job.id)

@@ -1,0 +1,90 @@
+"""Small pictures of postures, on transparent paper, so that they stand on light and dark pages alike."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from io import BytesIO
+from math import ceil
+
+import numpy as np
+from PIL import Image
+
+from motionmind._typing import Floats, Pixels
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError
+from motionmind.render.body_shape import shape_of
+from motionmind.render.camera import SMOOTH
+from motionmind.render.depth_buffer import DepthBuffer
+from motionmind.render.figure import colour, draw, given_colours, halved, inserted_colours
+from motionmind.render.solids import posture_solids
+from motionmind.render.view import VIEWS, to_view
+
+SMALLEST, LARGEST = 32, 480  # pixels of a picture's height
+_WIDE = 0.9  # of its height
+_ROOM = 1.32  # of the body's height that a picture shows, for raised arms
+_HELD = 16 * 2**20  # bytes of pictures that are kept in memory
+
+
+class Thumbnails:
+    """Pictures that were drawn, the latest of them kept."""
+
+    def __init__(self) -> None:
+        self._held: OrderedDict[tuple[str, int, int], bytes] = OrderedDict()
+        self._size = 0
+
+    def find(self, key: str, frame: int, height: int) -> bytes | None:
+        """Return the picture of a movement's frame; None if it is yet to be drawn."""
+        if (known := self._held.get((key, frame, height))) is not None:
+            self._held.move_to_end((key, frame, height))
+        return known
+
+    def hold(self, key: str, frame: int, height: int, picture: bytes) -> None:
+        """Keep a picture."""
+        if (key, frame, height) not in self._held:
+            self._held[key, frame, height] = picture
+            self._size += len(picture)
+        while self._size > _HELD:
+            self._size -= len(self._held.popitem(last=False)[1])
+
+
+def thumbnail(motion: Motion, frame: int, height: int) -> bytes:
+    """Draw a frame of a motion as PNG, three quarters from the front.
+
+    Args:
+        motion: the motion, on any skeleton.
+        frame: the frame.
+        height: of the picture, pixels.
+
+    Raises:
+        MotionMindError: there is no such frame, or the height is out of range.
+    """
+    motion.posture(frame)
+    if not SMALLEST <= height <= LARGEST:
+        raise MotionMindError(f"a small picture is from {SMALLEST} to {LARGEST} pixels high, not {height}")
+    body, view = shape_of(motion.skeleton), VIEWS["quarter"]
+    root = motion.root[frame]
+    cones, balls = posture_solids(*body.solids(motion.rotations[frame][None], root[None]), 0)
+    cones, balls = to_view(cones, balls, view, root * [1.0, 0.0, 1.0])
+    low, high = np.concatenate([cones.reach(), balls.reach()], axis=-2)
+    (left, bottom), (right, top) = low.min(axis=0)[:2], high.max(axis=0)[:2]
+    tall = max(_ROOM * body.height, 1.08 * (top - bottom), 1.08 * (right - left) / _WIDE)
+    wide = ceil(_WIDE * height)
+    scale = height / tall
+    # Whoever stands stands at the bottom; whoever leaps is above it.
+    floor = min(bottom, max(0.0, top - 0.96 * tall)) - 0.04 * tall
+    corner = 0.5 * (left + right) - 0.5 * wide / scale, floor + tall
+    buffer = DepthBuffer(*corner, SMOOTH * wide, SMOOTH * height, SMOOTH * scale)
+    draw(buffer, cones, balls)
+    paints = inserted_colours(body) if motion.inserted()[frame] else given_colours(body)
+
+    def on(paper: int) -> Floats:
+        background: Pixels = np.full((SMOOTH * height, SMOOTH * wide, 3), paper, dtype=np.uint8)
+        return halved(colour(buffer, body, background, SMOOTH, paints)).astype(float)
+
+    black, white = on(0), on(255)
+    opacity = 1.0 - (white - black).mean(axis=-1, keepdims=True) / 255.0  # paper shows through where it is not covered
+    inked = black / np.maximum(opacity, 1e-3)
+    picture = np.concatenate([inked, 255.0 * opacity], axis=-1).clip(0.0, 255.0).round().astype(np.uint8)
+    file = BytesIO()
+    Image.fromarray(picture).save(file, "png")
+    return file.getvalue()

@@ -1,0 +1,373 @@
+"""Worker processes: the engine at work apart from the server, so that a job can be watched, and ended at once."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from contextlib import suppress
+from itertools import count
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.tween.engine import Engine
+
+JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
+_ENGINES = 2  # that a worker keeps loaded
+_JOBS = 200  # that are over and can still be asked for
+_FEW = 4  # processors with which a second worker would only slow the first
+_MEMORY = 6 * 2**30  # bytes of it that allow for a second worker
+
+
+class Report(Protocol):
+    """Tells how far a job has come."""
+
+    def __call__(self, done: int, of: int, words: str = "", partial: Any = None) -> None:
+        """Tell it.
+
+        Args:
+            done: the number of steps that are done.
+            of: the number of all steps.
+            words: what is going on.
+            partial: a part of the result, if there is a new one.
+        """
+
+
+class JobCancelledError(MotionMindError):
+    """The job was cancelled before it was done."""
+
+
+class Job:
+    """A function that a worker runs.
+
+    Attributes:
+        id: its name.
+        kind: what it is for.
+        state: how it stands.
+        done, of, words: how far it has come.
+        partial: parts of the result so far, plain values for JSON.
+        shown: the result as plain values for JSON; None as long as there is none to show.
+    """
+
+    def __init__(
+        self,
+        workers: Workers,
+        number: int,
+        kind: str,
+        task: tuple[Callable[..., Any], tuple[Any, ...]],
+        finish: Callable[[Any], Any] | None,
+        collect: Callable[[Any], Any] | None,
+    ) -> None:
+        self.id, self.kind = f"j{number}", kind
+        self.state: JobState = "waiting"
+        self.done, self.of, self.words = 0, 0, ""
+        self.partial: list[Any] = []
+        self.shown: Any = None
+        self._workers, self._task, self._finish, self._collect = workers, task, finish, collect
+        self._result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._result.add_done_callback(_seen)
+
+    async def result(self) -> Any:
+        """Wait for what the function returns.
+
+        Raises:
+            JobCancelledError: it was cancelled.
+            MotionMindError: the function failed with it.
+        """
+        return await asyncio.shield(self._result)
+
+    def cancel(self) -> None:
+        """End it at once; nothing happens if it is over."""
+        self._workers.cancel(self)
+
+    def view(self) -> dict[str, Any]:
+        """Return it as the page sees it."""
+        found = {"id": self.id, "kind": self.kind, "state": self.state, "done": self.done, "of": self.of}
+        found["words"] = self.words
+        if self.partial:
+            found["partial"] = self.partial
+        if self.shown is not None:
+            found["result"] = self.shown
+        return found
+
+    @property
+    def task(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """The function and its arguments."""
+        return self._task
+
+    def take_partial(self, value: Any) -> None:
+        """Take in a part of the result."""
+        self.partial.append(self._collect(value) if self._collect else value)
+
+    def end(self, state: JobState, value: Any = None, words: str = "") -> None:
+        """Take in how it ended; whatever goes wrong with the result makes it fail."""
+        if self._result.done():
+            return
+        if state == "done":
+            try:
+                self.shown = self._finish(value) if self._finish else None
+            except MotionMindError as error:
+                state, words = "failed", str(error)
+        self.state, self.words = state, words or self.words
+        if state == "done":
+            self._result.set_result(value)
+        else:
+            kind = JobCancelledError if state == "cancelled" else MotionMindError
+            self._result.set_exception(kind(words))
+
+
+def _seen(future: asyncio.Future[Any]) -> None:
+    """Mark an error as seen: a job that nobody awaits tells of it by its state."""
+    if not future.cancelled():
+        future.exception()
+
+
+class Workers:
+    """The worker processes, and the jobs that wait for them, the oldest first."""
+
+    def __init__(
+        self, home: Path | None, tell: Callable[[Job], None], warm: str = "", number: int | None = None
+    ) -> None:
+        """Start the workers.
+
+        Args:
+            home: the folder of the user's corpora; None for the usual one.
+            tell: called, in the event loop, whenever a job has changed.
+            warm: a corpus that each worker loads at once.
+            number: of processes; by default as many as this computer has room for.
+        """
+        self._home, self._tell, self._warm = home, tell, warm
+        self._loop = asyncio.get_running_loop()
+        self._numbers = count(1)
+        self._waiting: deque[Job] = deque()
+        self._jobs: OrderedDict[str, Job] = OrderedDict()
+        self._workers = [_Worker(self, home, warm) for _ in range(number or _room())]
+
+    @property
+    def jobs(self) -> list[Job]:
+        """The jobs that wait or run."""
+        return [job for job in self._jobs.values() if job.state in ("waiting", "running")]
+
+    def submit(
+        self,
+        kind: str,
+        function: Callable[..., Any],
+        *arguments: Any,
+        finish: Callable[[Any], Any] | None = None,
+        collect: Callable[[Any], Any] | None = None,
+    ) -> Job:
+        """Have a worker call `function(report, *arguments)` when one is free.
+
+        Args:
+            kind: what it is for, as the page knows it.
+            function: a function at the top of a module; `report` is a `Report`.
+            arguments: what can be pickled.
+            finish: called here with the result, returns what the page is shown of it, plain values for JSON.
+            collect: called here with each partial result, in the same way.
+        """
+        job = Job(self, next(self._numbers), kind, (function, arguments), finish, collect)
+        self._jobs[job.id] = job
+        over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
+        for old in over[: max(0, len(over) - _JOBS)]:
+            del self._jobs[old]
+        self._waiting.append(job)
+        self._tell(job)
+        self.go_on()
+        return job
+
+    def find(self, job: str) -> Job:
+        """Return the job of an id; MotionMindError if it is not known, or no more."""
+        if job not in self._jobs:
+            raise MotionMindError("there is no such job, or no more")
+        return self._jobs[job]
+
+    def cancel(self, job: Job) -> None:
+        """End a job at once."""
+        if job in self._waiting:
+            self._waiting.remove(job)
+        for place, worker in enumerate(self._workers):
+            if worker.job is job:
+                worker.kill()
+                self._workers[place] = _Worker(self, self._home, self._warm)
+        if job.state in ("waiting", "running"):
+            job.end("cancelled", words="cancelled")
+            self._tell(job)
+        self.go_on()
+
+    def close(self) -> None:
+        """End all workers."""
+        for job in self.jobs:
+            job.end("cancelled", words="the studio ends")
+        self._waiting.clear()
+        for worker in self._workers:
+            worker.kill()
+        self._workers.clear()
+
+    def go_on(self) -> None:
+        """Give the workers that are free the jobs that wait."""
+        for worker in self._workers:
+            if worker.job is None and self._waiting:
+                job = self._waiting.popleft()
+                worker.run(job)
+                self._tell(job)
+
+    def hear(self, worker: _Worker, message: tuple[Any, ...] | None) -> None:
+        """Take in what a worker says; None if it has ended."""
+        if worker not in self._workers:  # one that was killed
+            return
+        job = worker.job
+        if message is None:
+            self._workers[self._workers.index(worker)] = _Worker(self, self._home, self._warm)
+            if job:
+                job.end("failed", words="this took more than this computer has, and was ended")
+        elif job is None:
+            return
+        elif message[0] == "report":
+            _, job.done, job.of, words, partial = message
+            job.words = words or job.words
+            if partial is not None:
+                job.take_partial(partial)
+        else:
+            worker.job = None
+            state, value = message
+            job.end(state, value, value if state == "failed" else "")
+        if job:
+            self._tell(job)
+        self.go_on()
+
+    def post(self, worker: _Worker, message: tuple[Any, ...] | None) -> None:
+        """Hand what a worker says to the event loop, from another thread."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self.hear, worker, message)
+
+
+class _Worker:
+    """A worker process, and the thread that listens to it.
+
+    Attributes:
+        job: the job that it does; None if it is free.
+    """
+
+    def __init__(self, workers: Workers, home: Path | None, warm: str) -> None:
+        self.job: Job | None = None
+        self._workers, self._is_killed = workers, False
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
+        self._theirs = theirs
+        # Starting a process takes a tenth of a second, in which the server would not answer.
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def run(self, job: Job) -> None:
+        """Begin a job."""
+        self.job, job.state = job, "running"
+        threading.Thread(target=self._send, args=(job.task,), daemon=True).start()
+
+    def kill(self) -> None:
+        """End the process at once."""
+        self._is_killed = True
+        with suppress(AttributeError):  # it is yet to be started, and killed then
+            self._process.kill()
+
+    def _send(self, task: Any) -> None:
+        with suppress(OSError):  # it has ended, and the listener says so
+            self._connection.send(task)
+
+    def _listen(self) -> None:
+        self._process.start()
+        self._theirs.close()
+        if self._is_killed:
+            self._process.kill()
+        try:
+            while True:
+                self._workers.post(self, self._connection.recv())
+        except (EOFError, OSError):
+            self._workers.post(self, None)
+        with suppress(AssertionError):
+            self._process.join()
+
+
+def _room() -> int:
+    """Return the number of workers that this computer has room for."""
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_AVPHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        memory = 0
+    return 2 if processors >= _FEW and memory >= _MEMORY else 1
+
+
+# --- in the worker ----------------------------------------------------------------------------------------------------
+
+_home: Path | None = None
+_engines: OrderedDict[str, Engine] = OrderedDict()
+
+
+def engine_of(name: str) -> Engine:
+    """Return the engine of a corpus in this worker, loaded when it is asked for first.
+
+    Raises:
+        MotionMindError: there is no such corpus.
+    """
+    from motionmind.tween.engine import Engine
+
+    if name not in _engines:
+        _engines[name] = Engine.load(name, _home)
+        while len(_engines) > _ENGINES:
+            _engines.popitem(last=False)
+    _engines.move_to_end(name)
+    return _engines[name]
+
+
+def forget_engine(name: str) -> None:
+    """Forget a corpus in this worker, so that it is loaded again."""
+    _engines.pop(name, None)
+
+
+def _work(connection: Connection, home: Path | None, warm: str) -> None:
+    """Do jobs until the server ends."""
+    global _home  # noqa: PLW0603 - a worker has one
+    _home = home
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's to answer
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    with suppress(MotionMindError):
+        if warm:
+            engine_of(warm)
+
+    def report(done: int, of: int, words: str = "", partial: Any = None) -> None:
+        connection.send(("report", done, of, words, partial))
+
+    while True:
+        try:
+            function, arguments = connection.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            answer = "done", function(report, *arguments)
+        except MotionMindError as error:
+            answer = "failed", str(error)
+        except MemoryError:
+            answer = "failed", "there is not enough memory for this"
+        except Exception:
+            traceback.print_exc(file=sys.stderr)
+            answer = "failed", "this went wrong; the terminal says how"
+        with suppress(OSError):
+            connection.send(answer)
+
+
+def _end_with(parent: Any) -> None:
+    """End this process with the one that started it."""
+    parent.join()
+    os._exit(0)

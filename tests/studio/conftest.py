@@ -1,0 +1,60 @@
+"""A studio that listens, and requests to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+_IS_HERE = find_spec("starlette") is not None and find_spec("uvicorn") is not None
+collect_ignore_glob = [] if _IS_HERE else ["test_studio_*.py"]  # the extra studio
+
+if TYPE_CHECKING:
+    from studio_server import Served
+
+    from motionmind.studio.project import Project
+
+
+@pytest.fixture
+def make_project(tmp_path: Path) -> Iterator[Callable[..., Project]]:
+    """Make or open a project of the corpus ballet by its file's name, "piece" by default."""
+    from motionmind.studio.project import Project
+
+    opened: list[Project] = []
+
+    def make(name: str = "piece", corpus: str = "ballet") -> Project:
+        path = tmp_path / f"{name}.motionmind"
+        opened.append(Project.open(path) if path.exists() else Project.create(path, corpus))
+        return opened[-1]
+
+    yield make
+    for project in opened:
+        project.close()
+
+
+@pytest.fixture
+def studio_server(tmp_path: Path) -> Iterator[Served]:
+    """A studio with an empty project of the corpus ballet, in this process, at a free port; one worker."""
+    from studio_server import serving
+
+    from motionmind.studio.project import Project
+
+    with serving(Project.create(tmp_path / "piece.motionmind", "ballet")) as served:
+        yield served
+
+
+@pytest.fixture
+def studio_page(studio_server: Served, browser: Any) -> Iterator[Any]:
+    """A page of Playwright, 1440x900, that is let into `studio_server`; an error on its console fails the test."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(studio_server.entry)
+    yield page
+    context.close()
+    assert not errors

@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from studio_server import Served
+
+from motionmind.errors import MotionMindError
+from motionmind.studio.edits import Delete, Insert, Mirror, Move, Trim
+from motionmind.studio.project import Project, RefusedError
+
+Make = Callable[..., Project]
+
+
+def block(number: int) -> Insert:
+    return Insert(f"b{number}", "ballet/adagio", 10 * number, 10 * number + 5)
+
+
+def order(project: Project) -> list[str]:
+    return [one.id for one in project.state.blocks]
+
+
+def test_a_project_opens_as_it_was_closed(make_project: Make) -> None:
+    project = make_project()
+    for number in range(40):
+        project.edit("w1", Insert(f"b{number}", "ballet/adagio", number, number + 3))
+    for _ in range(5):
+        project.undo("w1")
+    project.redo("w1")
+    state, sequence, undo = project.state, project.sequence, project.undoable("w1")
+    project.close()
+    again = make_project()
+    assert (again.state, again.sequence, again.undoable("w1")) == (state, sequence, undo)
+    assert again.redoable("w1") == "insert a stretch"
+
+
+def test_undo_takes_back_this_windows_edit_and_no_other(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    project.edit("w2", block(2))
+    project.undo("w1")
+    assert order(project) == ["b2"]
+    with pytest.raises(RefusedError, match="nothing to take back"):
+        project.undo("w1")
+    project.redo("w1")
+    assert order(project) == ["b1", "b2"]
+
+
+def test_undo_is_refused_where_a_later_edit_rests_on_it(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    project.edit("w2", Mirror("b1"))
+    before = project.state
+    with pytest.raises(RefusedError, match="mirror a stretch”, rests on it"):
+        project.undo("w1")
+    assert project.state == before
+    project.undo("w2")
+    project.undo("w1")
+    assert order(project) == []
+    with pytest.raises(RefusedError):
+        project.redo("w2")  # what it mirrors is gone
+    project.redo("w1")
+    project.redo("w2")
+    assert project.state == before
+
+
+def test_a_new_edit_ends_what_could_be_done_again_in_its_window_alone(make_project: Make) -> None:
+    project = make_project()
+    for window, number in (("w1", 1), ("w2", 2)):
+        project.edit(window, block(number))
+        project.undo(window)
+    project.edit("w1", block(3))
+    assert project.redoable("w1") is None
+    assert project.redoable("w2") == "insert a stretch"
+
+
+def test_after_reopening_a_new_window_takes_back_what_closed_ones_did(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    project.close()
+    again = make_project()
+    again.undo("w9")
+    assert order(again) == []
+
+
+def test_what_cannot_be_applied_changes_nothing(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    state, data = project.state, project.path.read_bytes()
+    for edit in (Delete("b9"), Move("b1", "b9"), Trim("b1", 0, 10_000), Insert("b2", "ballet/nothing", 0, 0)):
+        with pytest.raises(RefusedError):
+            project.edit("w1", edit)
+    assert project.state == state
+    assert project.path.read_bytes() == data
+
+
+def test_one_process_holds_a_project(make_project: Make) -> None:
+    project = make_project()
+    project.tell("http://127.0.0.1:1234")
+    with pytest.raises(MotionMindError, match=r"is open at http://127\.0\.0\.1:1234"):
+        Project.open(project.path)
+
+
+def test_a_torn_last_line_is_dropped_with_a_word(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    whole = project.path.read_bytes()
+    project.edit("w1", block(2))
+    torn = project.path.read_bytes()
+    project.close()
+    for length in range(len(whole) + 1, len(torn) - 1):
+        project.path.write_bytes(torn[:length])
+        again = Project.open(project.path)
+        assert order(again) == ["b1"]
+        assert again.words == ["the last edit was not written whole when the studio ended, and is gone"]
+        assert again.path.read_bytes() == whole
+        again.close()
+    project.path.write_bytes(torn[:-1])  # all but its end: nothing is lost
+    again = Project.open(project.path)
+    assert order(again) == ["b1", "b2"]
+    again.edit("w1", block(3))
+    again.close()
+    assert order(make_project()) == ["b1", "b2", "b3"]
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "is no project of the studio"),
+        (b"HIERARCHY\nROOT hips\n", "is no project of the studio"),
+        (b'{"format": "motionmind studio", "version": 2}\n', "version 1 can be read"),
+        (b"\x00" * 5000, "is no project of the studio"),
+        (b"[" * 100_000, "is no project of the studio"),
+    ],
+)
+def test_what_is_no_project_is_refused_in_a_line(tmp_path: Path, data: bytes, words: str) -> None:
+    path = tmp_path / "x.motionmind"
+    path.write_bytes(data)
+    with pytest.raises(MotionMindError, match=words) as error:
+        Project.open(path)
+    assert "\n" not in str(error.value)
+    assert path.read_bytes() == data
+
+
+def test_a_damaged_line_is_named(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    project.edit("w1", block(2))
+    project.close()
+    lines = project.path.read_bytes().splitlines(keepends=True)
+    project.path.write_bytes(lines[0] + b'{"edit": {"edit": "explode"}, "number": 1, "window": "w1"}\n' + lines[2])
+    with pytest.raises(MotionMindError, match=r"2: is damaged|line 2"):
+        Project.open(project.path)
+
+
+def test_a_kept_movement_is_kept_once_and_exactly(make_project: Make) -> None:
+    project = make_project()
+    motion = project.movements.get("~ballet/adagio")
+    key = project.movements.keep(motion, "another way")
+    size = project.path.stat().st_size
+    assert project.movements.keep(motion) == key
+    assert project.path.stat().st_size == size
+    project.close()
+    found = make_project().movements.get(key)
+    assert found.skeleton == motion.skeleton
+    for name in ("rotations", "root", "times"):
+        assert (getattr(found, name) == getattr(motion, name)).all()
+
+
+def test_the_project_over_http(studio_server: Served) -> None:
+    assert studio_server.send("GET", "/health").value == {"ready": True}
+    state = studio_server.insert("b1", "ballet/adagio", 0, 9)
+    assert [one["id"] for one in state["piece"]["blocks"]] == ["b1"]
+    assert state["undo"] == "insert a stretch"
+    state = studio_server.post("/api/undo", {"window": "w1"})
+    assert state["piece"]["blocks"] == []
+    refused = studio_server.send("POST", "/api/undo", {"window": "w1"})
+    assert (refused.status, refused.value["error"]) == (409, "this window has nothing to take back")
+    assert studio_server.post("/api/redo", {"window": "w1"})["piece"]["blocks"] != []
+
+
+def test_two_windows_see_each_others_edits(studio_server: Served) -> None:
+    other = studio_server.another("w2")
+    with other.listening() as events:
+        first = next(events)
+        assert first == ("project", {"sequence": other.project()["sequence"]})
+        sequence = studio_server.insert("b1", "ballet/adagio", 0, 9)["sequence"]
+        assert next(events) == ("project", {"sequence": sequence})
+    assert [one["id"] for one in other.project()["piece"]["blocks"]] == ["b1"]
+    assert other.project()["undo"] is None
+
+
+def test_movements_and_pictures(studio_server: Served) -> None:
+    data = studio_server.get("/api/movements/ballet/arabesque")
+    assert len(data["skeleton"]["names"]) == 23
+    picture = studio_server.send("GET", "/api/thumbnails/ballet/adagio/3.png?height=64")
+    assert (picture.status, picture.headers["content-type"]) == (200, "image/png")
+    assert picture.body.startswith(b"\x89PNG")
+    assert studio_server.send("GET", "/api/movements/ballet/nothing").status == 404
+    assert studio_server.send("GET", "/api/thumbnails/ballet/adagio/9999.png").status == 400
