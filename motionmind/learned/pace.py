@@ -6,14 +6,19 @@ of the way are brought to one unit first, the seconds that they take at the corp
 
     s = turning of the mean joint + hypot(travel, half the body's turn)
 
-for a body turns as it travels. The logarithm of a movement's duration is normal about
+for a body turns as it travels. And the same way is gone in less time in the midst of quick movement than from rest to
+rest. Between movements a body comes to a lull, but seldom stands still; the *lull* of a moment is the speed of the mean
+joint in the still moments before and after it, over its usual speed. The logarithm of a movement's duration is normal
+about
 
-    level + slope log(BEGINS + s),
+    level + slope log(BEGINS + s) + pull log(STILL + lull),
 
-so a longer way never takes less. It is learned from all pairs of still moments of a clip that are 0.3 to 5 s apart:
-between those somebody went from one posture to another and had arrived. Least squares, with a prior worth AS_MANY
-windows, for a corpus of one clip may have three of them, or none: LEVEL, SLOPE and SPREAD are those of the recorded
-corpora together (experiments/duration).
+the lulls of both ends in the geometric mean. A longer way never takes less, and is gone the faster: durations grow by
+the square root at most, for what windows show beyond that holds for no others. It is learned from all pairs of still
+moments of a clip that are 0.3 to 5 s apart: between those somebody went from one posture to another and had arrived.
+Least squares, with a prior worth AS_MANY windows, for a corpus of one clip may have three of them, or none: LEVEL,
+SLOPE, PULL and SPREAD are those of the recorded corpora together (experiments/duration). Of a posture on its own nobody
+knows the lull: it is that of the corpus's postures most like it.
 
 The fastest speeds are 99th percentiles of the corpus's frames at 30 a second, joint by joint. What hardly moves in the
 corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, and neither the body's
@@ -37,14 +42,19 @@ from motionmind.learned.sampled import BLOCK, Sampled
 SHORTEST, LONGEST = 0.3, 5.0  # seconds between the still moments of a window
 SMOOTHED = 0.5  # seconds over which speeds are averaged to find still moments
 BEGINS = 0.3  # seconds at usual speeds that no way is shorter than, in effect: to begin and to end takes time
-LEVEL, SLOPE, SPREAD = 0.4, 0.4, 0.6  # logarithms of seconds; of cmu-05, indian, cmu-16 and cmu-135 together
-SLOPES = 0.15, 1.0  # the least and the greatest slope: a longer way takes longer, and never more than in proportion
+STILL = 0.05  # usual speeds that no lull is slower than, in effect: no recording is without noise
+# Logarithms of seconds; of cmu-05, indian, cmu-16 and cmu-135 together.
+LEVEL, SLOPE, PULL, SPREAD = 0.0, 0.5, -0.35, 0.6
+SLOPES = 0.15, 0.5  # the least and the greatest slope: a longer way takes longer, and is gone the faster
+PULLS = -0.5, 0.0  # of the pull, in the same way: who is in quick movement takes no longer
+ALIKE = 5  # of the corpus's postures, whose lulls say that of a posture
 AS_MANY = 20.0  # windows that the prior is worth
 RARE = 99.0  # percentile of the frames' speeds that counts as fastest
 FPS = 30.0
 SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
 OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
 EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turning, rad/s, and of travel, heights/s
+_NO_WINDOWS = (np.zeros(0),) * 3
 
 
 class Way(NamedTuple):
@@ -98,24 +108,39 @@ class Pace:
         fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel [J + 2].
         greatest: greatest speeds of the same in any frame [J + 2].
         slowest: the speed of the mean joint over a second, rad/s, that only a hundredth of all seconds is below [1].
-        law: level, slope and spread of the logarithm of durations [3].
+        lulls: of the corpus's N postures, usual speeds of the mean joint [N].
+        law: level, slope, pull and spread of the logarithm of durations [4].
     """
 
     usual: Floats
     fastest: Floats
     greatest: Floats
     slowest: Floats
+    lulls: Floats
     law: Floats
 
     @property
     def spread(self) -> float:
         """Standard deviation of the logarithm of a movement's duration, given its way."""
-        return float(self.law[2])
+        return float(self.law[3])
 
-    def expected(self, way: Way) -> Floats:
-        """Return the median duration of movements of such ways [...], seconds."""
-        level, slope, _ = self.law
-        return np.asarray(np.exp(level + slope * _effort(way, self.usual)))
+    def expected(self, way: Way, lulls: tuple[Floats, Floats]) -> Floats:
+        """Return the median duration of movements of such ways [...], seconds, between such lulls [...]."""
+        level, slope, pull, _ = self.law
+        return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*lulls)))
+
+    def lulls_of(self, postures: Floats, shown: Floats) -> Floats:
+        """Return the lulls of postures [n]: means of those of the corpus's postures that are most like each.
+
+        Args:
+            postures: orientations of their joints [n, J, 4], as `motionmind.corpus.corpus.Corpus.to_chains` gives them.
+            shown: those of the corpus's postures, in the same way [N, J, 4].
+        """
+        # The sum of squared cosines of half the angles; ties are resolved by number, on any machine.
+        order = (
+            np.argsort(-np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1), kind="stable") for one in postures
+        )
+        return np.array([np.exp(np.log(STILL + self.lulls[near[:ALIKE]]).mean()) - STILL for near in order])
 
 
 def learn_pace(corpus: Corpus) -> Pace:
@@ -138,10 +163,14 @@ def learn_pace(corpus: Corpus) -> Pace:
         greatest = np.maximum(speeds.max(axis=0), fastest)
         seconds = [over_seconds(FPS * step[:, :joints].mean(axis=1), FPS) for step in steps]
         slowest = np.percentile(np.concatenate(seconds), [100.0 - RARE])
-    windows = [_windows(clip, step[:, :joints].mean(axis=1)) for clip, step in zip(clips, steps, strict=True)]
-    efforts = np.concatenate([np.zeros(0), *(_effort(way, usual) for way, _ in windows)])
-    logs = np.concatenate([np.zeros(0), *(np.log(seconds) for _, seconds in windows)])
-    return Pace(usual, fastest, greatest, slowest, _fit(efforts, logs))
+    lulls, windows = np.ones(len(corpus)), [_NO_WINDOWS]
+    for clip, step in zip(clips, steps, strict=True):
+        means = step[:, :joints].mean(axis=1)
+        found = _lulls(means, usual[0])
+        windows.append(_windows(clip, *found, usual))
+        here = slice(clip.clip.start, clip.clip.stop)
+        lulls[here] = np.interp(corpus.times[here], clip.times[found[0]], found[1])
+    return Pace(usual, fastest, greatest, slowest, lulls, _fit(*map(np.concatenate, zip(*windows, strict=True))))
 
 
 def over_seconds(speeds: Floats, fps: float) -> Floats:
@@ -155,16 +184,29 @@ def _effort(way: Way, usual: Floats) -> Floats:
     return np.asarray(np.log(BEGINS + joints + np.hypot(travel, 0.5 * turn)))
 
 
-def _windows(clip: Sampled, steps: Floats) -> tuple[Way, Floats]:
-    """Return the ways and durations between a clip's still moments, of each two that are as far apart as a window.
+def _quickness(first: Floats, last: Floats) -> Floats:
+    """Return the mean logarithm of the lulls [...] of the ends of ways [...]."""
+    return np.asarray(0.5 * (np.log(STILL + first) + np.log(STILL + last)))
+
+
+def _windows(clip: Sampled, still: Ints, lulls: Floats, usual: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the efforts, quickness and logarithms of the seconds [n] between a clip's still moments, of each two that
+    are as far apart as a window.
+
+    What was reconstructed in a recording nobody danced: no window leads over it.
 
     Args:
         clip: at FPS frames a second.
-        steps: angle that the mean joint turns by from each frame to the next [T - 1].
+        still: its still moments, frames in order [S].
+        lulls: of these [S], in usual speeds.
+        usual: see `Pace`.
     """
-    still = find_still(steps)
     rotations, root = clip.take(still)
     stops = np.searchsorted(still, still + LONGEST * FPS, side="right")
+    for repair in clip.clip.repairs:
+        if not repair.exact:
+            first, last = np.searchsorted(clip.times[still], repair.seconds)
+            stops[:last] = np.minimum(stops[:last], np.maximum(first, np.arange(last)))
     pairs = [
         (i, k)
         for i, stop in enumerate(stops)
@@ -172,12 +214,27 @@ def _windows(clip: Sampled, steps: Floats) -> tuple[Way, Floats]:
         if SHORTEST <= (still[k] - still[i]) / FPS <= LONGEST
     ]
     begins, ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    parts = [slice(start, start + BLOCK) for start in range(0, max(len(pairs), 1), BLOCK)]
-    found = [
-        ways(clip.skeleton, (rotations[begins[part]], rotations[ends[part]]), (root[begins[part]], root[ends[part]]))
-        for part in parts
-    ]
-    return Way(*map(np.concatenate, zip(*found, strict=True))), (still[ends] - still[begins]) / FPS
+    efforts = [np.zeros(0)]
+    for start in range(0, len(pairs), BLOCK):
+        part = slice(start, start + BLOCK)
+        places = ((of[begins[part]], of[ends[part]]) for of in (rotations, root))
+        efforts.append(_effort(ways(clip.skeleton, *places), usual))
+    seconds = (still[ends] - still[begins]) / FPS
+    return np.concatenate(efforts), _quickness(lulls[begins], lulls[ends]), np.log(seconds)
+
+
+def _lulls(steps: Floats, usual: float) -> tuple[Ints, Floats]:
+    """Return a clip's still moments, frames in order [S], and their lulls [S]; the first frame, with the clip's mean
+    speed, where there are none.
+
+    Args:
+        steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
+        usual: its usual speed, rad/s.
+    """
+    still = find_still(steps)
+    if not len(still):
+        return np.zeros(1, dtype=np.int64), FPS * steps.mean(keepdims=True) / usual
+    return still, FPS * _smooth(steps)[still] / usual
 
 
 def find_still(steps: Floats) -> Ints:
@@ -186,21 +243,36 @@ def find_still(steps: Floats) -> Ints:
     Args:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
     """
-    window = np.hanning(round(SMOOTHED * FPS) + 2)[1:-1]
-    if len(steps) < len(window):
-        return np.zeros(0, dtype=np.int64)
-    speed = np.convolve(np.pad(steps, len(window) // 2, mode="edge"), window / window.sum(), "valid")
+    speed = _smooth(steps)
     falls, rises = speed[1:-1] < speed[:-2], speed[1:-1] <= speed[2:]
     return np.flatnonzero(falls & rises) + 1
 
 
-def _fit(efforts: Floats, logs: Floats) -> Floats:
-    """Return level, slope and spread [3] of the logarithms of durations [n], given those of the ways' seconds [n]."""
-    mean = efforts.mean() if len(efforts) else 0.0
-    middle = (logs.sum() + AS_MANY * (LEVEL + SLOPE * mean)) / (len(logs) + AS_MANY)  # of the logs at the mean effort
-    off = efforts - mean
-    # As if AS_MANY windows lay along the prior's line, a standard deviation of the logs of 1 apart.
-    slope = float(np.clip((off @ logs + AS_MANY * SLOPE) / (off @ off + AS_MANY), *SLOPES))
-    left = logs - middle - slope * off
+def _smooth(steps: Floats) -> Floats:
+    """Return the means of steps [T - 1] over SMOOTHED seconds about each frame; none of a clip that is shorter."""
+    window = np.hanning(round(SMOOTHED * FPS) + 2)[1:-1]
+    if len(steps) < len(window):
+        return np.zeros(0)
+    return np.convolve(np.pad(steps, len(window) // 2, mode="edge"), window / window.sum(), "valid")
+
+
+def _fit(efforts: Floats, quickness: Floats, logs: Floats) -> Floats:
+    """Return level, slope, pull and spread [4] of the logarithms of durations [n].
+
+    Args:
+        efforts: logarithms of the ways' seconds at usual speeds [n].
+        quickness: mean logarithms of the lulls of their ends [n].
+        logs: logarithms of the durations [n].
+    """
+    given = np.stack([efforts, quickness], axis=1)
+    mean = given.mean(axis=0) if len(given) else np.zeros(2)
+    prior = np.array([SLOPE, PULL])
+    middle = (logs.sum() + AS_MANY * (LEVEL + prior @ mean)) / (len(logs) + AS_MANY)  # of the logs at the mean
+    off = given - mean
+    # As if AS_MANY windows lay along the prior's plane, a standard deviation of the logs of 1 apart either way.
+    products, sums = off.T @ off + AS_MANY * np.eye(2), off.T @ logs + AS_MANY * prior
+    pull = float(np.clip(np.linalg.solve(products, sums)[1], *PULLS))
+    slope = float(np.clip((sums[0] - products[0, 1] * pull) / products[0, 0], *SLOPES))
+    left = logs - middle - off @ [slope, pull]
     spread = np.sqrt((left @ left + AS_MANY * SPREAD**2) / (len(logs) + AS_MANY))
-    return np.array([middle - slope * mean, slope, spread])
+    return np.array([middle - slope * mean[0] - pull * mean[1], slope, pull, spread])

@@ -28,7 +28,7 @@ class Sampled:
 
     def __init__(self, corpus: Corpus, clip: Clip, rate: float, *, smooth: bool = False) -> None:
         self.skeleton = corpus.skeleton
-        self._corpus, self._clip = corpus, clip
+        self._corpus, self.clip = corpus, clip
         self._recorded = recorded = corpus.recorded_times(clip)
         steps = np.floor((recorded[-1] - recorded[0]) * rate + 1e-3)
         self.times = recorded[0] + np.arange(steps + 1) / rate
@@ -45,7 +45,7 @@ class Sampled:
             rotations = rotation_spline(keys.times, keys.rotations, times)
             return Motion(keys.skeleton, rotations, natural_spline(keys.times, keys.root, times), times, keys.name)
         first, last = np.searchsorted(self._recorded, times[[0, -1]], side="right")
-        return self._corpus.recording(self._clip, max(int(first) - 1, 0), int(last) + 1).at(times)
+        return self._corpus.recording(self.clip, max(int(first) - 1, 0), int(last) + 1).at(times)
 
     def blocks(self, size: int, overlap: int = 0) -> Iterator[Motion]:
         """Yield all frames, `size` at a time, each block with so many of the frames before it."""
@@ -65,4 +65,4 @@ class Sampled:
 
     @cached_property
     def _keys(self) -> Motion:
-        return self._corpus.recording(self._clip)
+        return self._corpus.recording(self.clip)

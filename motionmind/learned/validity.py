@@ -79,7 +79,8 @@ FORMS = {
     "pace.fastest": _Form("f8", "J+2", _SMALL),
     "pace.greatest": _Form("f8", "J+2", _SMALL),
     "pace.slowest": _Form("f8", "1", 0.0),
-    "pace.law": _Form("f8", "3", -100.0, 100.0),
+    "pace.lulls": _Form("f8", "N", 0.0),
+    "pace.law": _Form("f8", "4", -100.0, 100.0),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
 }

@@ -30,6 +30,7 @@ from motionmind.realise.expectation import expect
 from motionmind.realise.minimal import NO_WAY
 from motionmind.realise.stops import stop_at
 from motionmind.realise.timeline import usual
+from motionmind.tween.pacing import usual_times
 
 CREEPING = 0.25  # share of the time in which walks may creep
 SELDOM = 1.6449  # standard deviations: dancers seldom, one time in twenty, take so long for so far a way
@@ -97,7 +98,7 @@ def find_detour(
     seconds, way = usual(learned.grammar.transitions), way_between(*ends)
     if way.parts.max() < NO_WAY:  # who is to end as they began holds still
         return None
-    own = float(learned.pace.expected(way))
+    (own,) = (time.median for time in usual_times(learned, ends))
     if np.log(duration / own) <= SELDOM * learned.pace.spread:
         return None
     stops = [stop_at(learned.corpus, *end) for end in zip(ends, velocities, strict=True)]

@@ -56,13 +56,22 @@ class UsualTime:
 def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[UsualTime, ...]:
     """Return the corpus's usual time from each of the postures to the next."""
     parts = _parts(learned)
+    lulls = lulls_of(learned, np.stack([posture.rotations for posture in stops]))
     out = []
-    for a, b in pairwise(stops):
+    for (a, first), (b, last) in pairwise(zip(stops, lulls, strict=True)):
         way = way_between(a, b)
         needs = PEAK * way.parts / learned.pace.fastest
         slowest = int(needs.argmax())
-        out.append(UsualTime(float(learned.pace.expected(way)), float(needs[slowest]), parts[slowest]))
+        median = float(learned.pace.expected(way, (first, last)))
+        out.append(UsualTime(median, float(needs[slowest]), parts[slowest]))
     return tuple(out)
+
+
+def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
+    """Return the lulls of postures of rotations [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
+    corpus, joints = learned.corpus, len(learned.corpus.skeleton)
+    shown = learned.carriage.orientations[: len(corpus), :joints]
+    return learned.pace.lulls_of(corpus.to_chains(rotations)[:, :joints], shown)
 
 
 class FasterPart(msgspec.Struct, frozen=True):

@@ -11,9 +11,25 @@ from bodies import insect
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import JointRepair
 from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import EVERYDAY, FPS, SLOPES, Pace, Way, _fit, find_still, learn_pace, way_between, way_of
+from motionmind.learned.pace import (
+    EVERYDAY,
+    FPS,
+    LEVEL,
+    PULL,
+    PULLS,
+    SLOPE,
+    SLOPES,
+    Pace,
+    Way,
+    _fit,
+    find_still,
+    learn_pace,
+    way_between,
+    way_of,
+)
 
 ARM = 7
 
@@ -50,6 +66,11 @@ def way(skeleton: Skeleton, turn: float = 0.0, travel: float = 0.0, facing: floa
     return way_between(still, Posture(skeleton, rotations, root))
 
 
+def expected(pace: Pace, way: Way, lull: float = 0.2) -> float:
+    """The median duration of movement between two such lulls."""
+    return float(pace.expected(way, (np.array(lull), np.array(lull))))
+
+
 def test_a_way_is_what_a_body_does_between_two_postures() -> None:
     skeleton = human23()
     there = way(skeleton, turn=0.7, travel=2.0 * skeleton.height, facing=-0.4)
@@ -69,13 +90,21 @@ def test_who_is_slower_in_the_same_is_expected_to_take_longer(factor: float) -> 
     clips = [reaches(human23(), [times * length for length in seconds], angles, 0.3) for times in (1.0, factor)]
     usual, other = (learned(clip) for clip in clips)
     there = way(human23(), turn=1.0, travel=0.3)
-    assert (float(other.expected(there)) > float(usual.expected(there))) == (factor > 1.0)
+    assert (expected(other, there) > expected(usual, there)) == (factor > 1.0)
     assert other.fastest[ARM] == pytest.approx(usual.fastest[ARM] / factor, rel=0.15)
 
 
-def test_of_many_windows_on_a_line_the_law_is_that_line() -> None:
-    efforts = np.linspace(0.5, 3.0, 20_000)
-    np.testing.assert_allclose(_fit(efforts, 0.7 + 0.5 * efforts)[:2], [0.7, 0.5], atol=0.01)
+def test_of_many_windows_on_a_plane_the_law_is_that_plane() -> None:
+    efforts, quickness = np.random.default_rng(0).uniform([0.5, -2.0], [3.0, 0.5], size=(20_000, 2)).T
+    law = _fit(efforts, quickness, 0.7 + 0.4 * efforts - 0.2 * quickness)
+    np.testing.assert_allclose(law[:3], [0.7, 0.4, -0.2], atol=0.01)
+
+
+def test_windows_that_say_nothing_leave_the_prior() -> None:
+    law = _fit(*np.zeros((3, 0)))
+    np.testing.assert_allclose(law[:3], [LEVEL, SLOPE, PULL])
+    slope, pull = _fit(np.linspace(0.5, 3.0, 99), np.linspace(-2.0, 0.5, 99), np.linspace(9.0, 0.0, 99))[1:3]
+    assert (slope, pull) == (SLOPES[0], PULLS[0])  # whatever the windows say, a longer way takes longer
 
 
 def test_a_longer_way_takes_longer() -> None:
@@ -85,9 +114,77 @@ def test_a_longer_way_takes_longer() -> None:
         pace = learned(reaches(human23(), seconds, angles, rng.uniform(0.0, 1.0)))
         assert SLOPES[0] <= pace.law[1] <= SLOPES[1], seed
         for kind, most in (("turn", 3.0), ("travel", 5.0), ("facing", 3.0)):
-            expected = [float(pace.expected(way(human23(), **{kind: far}))) for far in np.linspace(0.0, most, 20)]
-            assert np.all(np.diff(expected) > 0.0), (seed, kind)
-            assert expected[-1] < 60.0
+            taken = [expected(pace, way(human23(), **{kind: far})) for far in np.linspace(0.0, most, 20)]
+            assert np.all(np.diff(taken) > 0.0), (seed, kind)
+            assert taken[-1] < 60.0
+
+
+def rests_and_runs() -> Motion:
+    """Movement from rest to rest whose way is long, then movement there and back that never stops."""
+    rests = reaches(human23(), [1.5] * 12, [1.5] * 12)
+    times = np.arange(600) / FPS
+    rotations = np.tile(rests.rotations[-1], (len(times), 1, 1))
+    turned = 6.0 * times + 0.8 * np.cos(6.0 * times)  # as many lulls, at a fifth of the mean speed or more
+    for joint in range(1, len(rests.skeleton)):
+        rotations[:, joint] = rot.from_axis_angle(np.array([0.0, 1.0, 0.0]), 0.2 * turned)
+    root = np.tile(rests.root[-1], (len(times), 1))
+    clock = np.concatenate([rests.times, rests.times[-1] + 1 / FPS + times])
+    return replace(
+        rests,
+        rotations=np.concatenate([rests.rotations, rotations]),
+        root=np.concatenate([rests.root, root]),
+        times=clock,
+    )
+
+
+def test_the_lulls_are_the_speeds_of_the_still_moments_around() -> None:
+    clip = rests_and_runs()
+    corpus = gather("lulls", [clip], rate=10.0)
+    lulls, speeds = learn_pace(corpus).lulls, FPS * way_of(clip).joints.mean(axis=1)
+    resting = corpus.times < 15.0
+    running = corpus.times > 20.0
+    assert lulls[resting].max() < 0.2 * lulls[running].min()
+    assert lulls[resting].max() < 0.5  # also in the middle of a movement, where the body is fast
+    assert lulls[running].min() < speeds[600:].mean() / speeds.mean()
+
+
+def test_it_takes_no_longer_in_the_midst_of_quick_movement() -> None:
+    pace, there = learned(reaches(human23(), [0.8, 1.2] * 9, [0.7, 1.4] * 9)), way(human23(), turn=1.0)
+    taken = [expected(pace, there, lull) for lull in np.linspace(0.0, 3.0, 9)]
+    assert np.all(np.diff(taken) < 0.0)
+    one, other = (
+        pace.expected(there, lulls) for lulls in ((np.array(0.1), np.array(1.0)), (np.array(1.0), np.array(0.1)))
+    )
+    assert one == other
+
+
+def test_a_posture_has_the_lull_of_those_that_are_like_it() -> None:
+    corpus = gather("lulls", [rests_and_runs()], rate=10.0)
+    pace, shown = learn_pace(corpus), corpus.to_chains(corpus.rotations)[:, : len(corpus.skeleton)]
+    numbers = np.array([40, 90, len(corpus) - 50])
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(3, len(corpus.skeleton), 1))
+    found = pace.lulls_of(signs * shown[numbers], shown)  # q and -q are one orientation
+    for lull, number in zip(found, numbers, strict=True):
+        alike = np.argsort(np.sum(rot.angle(shown, shown[number]) ** 2, axis=1), kind="stable")[:5]
+        assert pace.lulls[alike].min() - 1e-9 <= lull <= pace.lulls[alike].max() + 1e-9
+    assert found[2] > 3.0 * found[0]
+    few = replace(pace, lulls=pace.lulls[:2])
+    assert np.isfinite(few.lulls_of(shown[:1], shown[:2])).all()
+
+
+def test_nothing_is_learned_of_durations_from_what_was_reconstructed() -> None:
+    corpus = gather("mended", [reaches(human23(), [0.8, 1.2] * 9, [0.7, 1.4] * 9)], rate=10.0)
+    (clip,) = corpus.clips
+
+    def law(*spans: tuple[float, float], exact: bool = False) -> list[float]:
+        repairs = tuple(JointRepair("left_knee", 0, 0, span, exact) for span in spans)
+        return learn_pace(replace(corpus, clips=(replace(clip, repairs=repairs),))).law[:3].tolist()
+
+    last = float(corpus.times[-1])
+    assert law((0.0, last)) == pytest.approx([LEVEL, SLOPE, PULL])
+    assert law((0.0, last), exact=True) == law()
+    assert law(*((second, second) for second in np.arange(0.0, last, 0.2))) == pytest.approx([LEVEL, SLOPE, PULL])
+    assert law((8.9, 9.1)) not in (law(), law((0.0, last)))
 
 
 def test_the_fastest_speeds_are_those_of_the_rarest_frames() -> None:
@@ -109,7 +206,7 @@ def test_a_corpus_of_a_few_postures_has_the_prior(frames: int) -> None:
     still = reaches(human23(), [1.0], [0.5]).slice(0, frames)
     pace = learn_pace(gather("few", [still], rate=None))
     assert np.isfinite(pace.law).all()
-    assert 0.5 < float(pace.expected(way(human23(), turn=1.0, travel=1.0))) < 5.0
+    assert 0.5 < expected(pace, way(human23(), turn=1.0, travel=1.0)) < 5.0
 
 
 def test_size_does_not_matter() -> None:
@@ -125,4 +222,4 @@ def test_insects_have_a_pace_too() -> None:
     body = insect()
     pace = learned(reaches(body, [0.5, 0.4] * 10, [0.8, 0.8] * 10, 0.01))
     assert len(pace.fastest) == len(body) + 2
-    assert float(pace.expected(way(body, turn=0.8))) < float(pace.expected(way(body, turn=0.8, travel=0.1)))
+    assert expected(pace, way(body, turn=0.8)) < expected(pace, way(body, turn=0.8, travel=0.1))
