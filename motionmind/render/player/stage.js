@@ -45,32 +45,15 @@ export class Stage {
    */
   constructor(canvas, motion, body, colours, onChange) {
     this.canvas = canvas;
-    this.motion = motion;
-    this.body = body;
-    this.rotations = new Float64Array(motion.joints.length * 4);
-    this.root = new Float64Array(3);
     this.software = drawnInSoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software && window.devicePixelRatio < SHARPEST });
     this.renderer.autoClear = false;
     this.papers = paperUniforms();
     this.dark = false;
-    this.#measure();
-
-    this.figure = new Figures(body, 1, FINE, colours, this.papers);
-    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours, this.papers);
-    this.marks = new Marks(body, colours.bridged, this.figure.uniforms);
-    this.ghosts.uniforms.middle = this.figure.uniforms.middle;
-    this.ghostsShown = "";
-    this.layers = [new Scene(), new Scene(), new Scene()];
-    if (this.grounded) this.layers[0].add(floor(this.middle, this.reach, body.size, this.papers), this.figure.shadows);
-    this.layers[1].add(this.ghosts.group);
-    this.layers[2].add(this.figure.group, this.marks.group);
-
-    this.camera = new PerspectiveCamera(FIELD, 1, 0.01 * this.reach, 100 * this.reach);
+    this.camera = new PerspectiveCamera(FIELD, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.5 * Math.PI; // not under the floor
-    this.controls.minDistance = 0.2 * this.reach;
-    this.controls.maxDistance = 30 * this.reach;
+    this.take(motion, body, colours);
     this.dragged = false;
     this.controls.addEventListener("start", () => {
       this.view = undefined;
@@ -86,6 +69,24 @@ export class Stage {
       this.#resize();
       onChange();
     }).observe(canvas.parentElement);
+  }
+
+  /** Show another movement, from where the camera is: `look` brings all of it into the picture. Arguments as at first. */
+  take(motion, body, colours) {
+    const same = this.body === body && this.colours === colours;
+    Object.assign(this, { motion, body, colours, ghostsShown: "" });
+    if (!same) this.#embody();
+    this.#measure();
+    this.floor?.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
+    this.layers[0].clear();
+    if (this.grounded) {
+      this.floor = floor(this.middle, this.reach, body.size, this.papers);
+      this.layers[0].add(this.floor, this.figure.shadows);
+    }
+    Object.assign(this.camera, { near: 0.01 * this.reach, far: 100 * this.reach });
+    this.camera.updateProjectionMatrix();
+    this.controls.minDistance = 0.2 * this.reach;
+    this.controls.maxDistance = 30 * this.reach;
   }
 
   /** Whether the paper is dark. */
@@ -166,6 +167,24 @@ export class Stage {
     }
   }
 
+  /** Make what draws the body, its ghosts and its bridges. */
+  #embody() {
+    const { body, colours, motion } = this;
+    for (const layer of this.layers ?? []) {
+      layer.traverse((thing) => [thing.geometry, thing.material].forEach((part) => part?.dispose()));
+    }
+    this.rotations = new Float64Array(motion.joints.length * 4);
+    this.root = new Float64Array(3);
+    this.figure = new Figures(body, 1, FINE, colours, this.papers);
+    this.ghosts = new Figures(body, 2 + 2 * ONION.length, COARSE, colours, this.papers);
+    this.marks = new Marks(body, colours.bridged, this.figure.uniforms);
+    this.ghosts.uniforms.middle = this.figure.uniforms.middle;
+    this.figure.pixel = this.ghosts.pixel = this.pixel ?? 0;
+    this.layers = [new Scene(), new Scene(), new Scene()];
+    this.layers[1].add(this.ghosts.group);
+    this.layers[2].add(this.figure.group, this.marks.group);
+  }
+
   #showGhosts(time, ends, onion) {
     const { times } = this.motion;
     const ghosts = [];
@@ -241,9 +260,8 @@ export class Stage {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    const pixel = (2 * Math.tan((FIELD * Math.PI) / 360)) / height;
-    this.figure.pixel = pixel;
-    this.ghosts.pixel = pixel;
+    this.pixel = (2 * Math.tan((FIELD * Math.PI) / 360)) / height;
+    this.figure.pixel = this.ghosts.pixel = this.pixel;
     if (this.view) this.look(this.view);
   }
 }
