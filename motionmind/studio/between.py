@@ -1,0 +1,218 @@
+"""From A to B: the gallery of postures, alternatives between two of them, and taking one into the piece."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from motionmind.body.motion import Motion
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError
+from motionmind.render.page import player_data
+from motionmind.studio.alternatives import COUNT, Account, account, find, usual_likelihoods
+from motionmind.studio.api import Window, body_of, error, json
+from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Several, Single, Wish
+from motionmind.studio.piece import End, Finding, Found, State, key_of, question_of
+from motionmind.studio.project import RefusedError
+from motionmind.studio.sides import options_of, sides_of
+from motionmind.studio.workers import engine_of
+
+if TYPE_CHECKING:
+    from motionmind.studio.sides import Sides
+    from motionmind.studio.studio import Studio
+    from motionmind.studio.workers import Report
+
+_KEPT = 8  # searches whose movements are held, the latest
+_WORDS = "go from A to B"
+
+
+class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A posture: a frame of a movement."""
+
+    key: Key
+    frame: Frame = 0
+
+
+class Between(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request for movement between two postures; `options` are a wish as of a seam."""
+
+    a: Place
+    b: Place
+    options: Ask = Ask()
+
+
+class Acceptance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to take one of a job's alternatives, counted from 1, into the piece."""
+
+    job: Annotated[str, msgspec.Meta(max_length=40)]
+    alternative: Annotated[int, msgspec.Meta(ge=1, le=COUNT)]
+    window: Window
+
+
+def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any]) -> None:
+    """Find alternatives in a worker, and tell each as it is found: a motion and its `Account`.
+
+    Args:
+        report: tells it.
+        corpus: name of the corpus.
+        sides: from where, and to where.
+        options: of the engine.
+    """
+    engine = engine_of(corpus)
+    own = usual_likelihoods(engine)
+    found = find(engine, sides.a, sides.b, before=sides.before, after=sides.after, **options)
+    for number, tween in enumerate(found, start=1):
+        report(number, COUNT, "looking for others", (tween.motion, account(tween, engine.corpus, own)))
+
+
+class _Search:
+    """A search, and what it has found so far.
+
+    Attributes:
+        asked: what was asked, with keys that stay.
+        question: what a seam between the two postures asks.
+        found: the movements and what there is to say of them.
+    """
+
+    def __init__(self, asked: Between, question: str) -> None:
+        self.asked, self.question = asked, question
+        self.found: list[tuple[Motion, Account]] = []
+
+    def take(self, found: tuple[Motion, Account]) -> dict[str, Any]:
+        """Take in one that was found, and return it as the page sees it."""
+        self.found.append(found)
+        motion, said = found
+        return {"number": len(self.found), "seconds": _seconds(motion)} | msgspec.to_builtins(said)
+
+
+class _Desk:
+    """The requests that are answered, and the searches that may still be accepted."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._searches: OrderedDict[str, _Search] = OrderedDict()
+
+    async def gallery(self, _: Request) -> Response:
+        """List the postures and clips of the project's corpora, and saved postures."""
+        project = self._studio.project
+        names = dict.fromkeys([project.state.corpus, *project.versions])
+        own = [{"key": f"own/{name}", "title": name} for name in project.state.postures]
+        return json({"corpora": [self._listed(name) for name in names if name], "own": own})
+
+    def _listed(self, name: str) -> dict[str, Any]:
+        """List a corpus."""
+        collection = self._studio.movements.collection(name)
+        clips = []
+        for clip, about in collection.clips.items():
+            motion = self._studio.movements.get(f"{name}/{clip}")
+            seen = {"key": f"{name}/{clip}", "title": displayed(clip), "about": displayed(about, 200)}
+            clips.append(seen | {"frames": len(motion), "seconds": _seconds(motion)})
+        postures = [{"key": f"{name}/{posture}", "title": displayed(posture)} for posture in collection.postures]
+        return {"name": displayed(name), "postures": postures, "clips": clips}
+
+    async def ask(self, request: Request) -> Response:
+        """Begin to search."""
+        asked = await body_of(request, Between)
+        project, movements = self._studio.project, self._studio.movements
+        a, b = (Place(project.state.stable(place.key), place.frame) for place in (asked.a, asked.b))
+        ends = End(a.key, a.frame, moves=False), End(b.key, b.frame, moves=False)
+        for place in (a, b):
+            movements.get(place.key).posture(place.frame)  # or says that there is none
+        sides = sides_of(ends, movements.get)
+        options = options_of(asked.options, sides.a.skeleton, movements.get)
+        corpus = project.state.corpus
+        question = question_of(ends, asked.options, corpus, project.versions)
+        seeking = _Search(Between(a, b, asked.options), question)
+        job = self._studio.workers.submit("between", search, corpus, sides, options, collect=seeking.take)
+        self._searches[job.id] = seeking
+        while len(self._searches) > _KEPT:
+            self._searches.popitem(last=False)
+        return json({"job": job.id})
+
+    async def movement(self, request: Request) -> Response:
+        """Return one of the movements that a search has found, as the player reads it."""
+        found = self._found(request.path_params["job"]).found
+        number = request.path_params["number"]
+        if not 1 <= number <= len(found):
+            raise MotionMindError(f"there are {len(found)} alternatives, no number {number}")
+        return json(player_data(found[number - 1][0], 0))
+
+    async def accept(self, request: Request) -> Response:
+        """Take an alternative into the piece."""
+        asked = await body_of(request, Acceptance)
+        seeking, project = self._found(asked.job), self._studio.project
+        if asked.alternative > len(seeking.found):
+            raise MotionMindError(f"there are {len(seeking.found)} alternatives, no number {asked.alternative}")
+        edit = accepted(project.state, seeking.asked, asked.alternative)
+        insertions = tuple(
+            Found(self._studio.movements.keep(motion, said.words), _seconds(motion), words_of(said))
+            for motion, said in seeking.found
+        )
+        words = "from one posture to the other"
+        project.keep_finding(Finding(seeking.question, abrupt=True, words=words, insertions=insertions))
+        try:
+            project.edit(asked.window, edit)
+        except RefusedError as refusal:
+            return error(str(refusal), 409)
+        return json(self._studio.view(asked.window))
+
+    def _found(self, job: str) -> _Search:
+        if job not in self._searches:
+            raise MotionMindError("these alternatives are gone: look for them again")
+        return self._searches[job]
+
+
+def accepted(state: State, asked: Between, alternative: int) -> Edit:
+    """Return the edit that takes an alternative into a piece: A unless the piece ends in it, B, and the choice.
+
+    Args:
+        state: the piece.
+        asked: both postures and the wish.
+        alternative: number of the alternative, from 1.
+    """
+    last = state.blocks[-1] if state.blocks else None
+    edits: list[Single] = []
+    if last and (key_of(last), last.first, last.last) == (asked.a.key, asked.a.frame, asked.a.frame):
+        left = last.id
+    else:
+        left = _new(state)
+        edits.append(Insert(left, asked.a.key, asked.a.frame, asked.a.frame))
+    right = _new(state, left)
+    edits.append(Insert(right, asked.b.key, asked.b.frame, asked.b.frame))
+    if asked.options != Ask():
+        edits.append(Wish(left, right, asked.options.seconds, asked.options.passing, asked.options.pins))
+    edits.append(Choose(left, right, alternative))
+    return Several(tuple(edits), _WORDS)
+
+
+def words_of(said: Account) -> str:
+    """Return an account in a line."""
+    return "; ".join(part for part in (said.words, said.usual) if part)
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return the routes of this part."""
+    desk = _Desk(studio)
+    return [
+        Route("/api/gallery", desk.gallery),
+        Route("/api/between", desk.ask, methods=["POST"]),
+        Route("/api/between/accept", desk.accept, methods=["POST"]),
+        Route("/api/between/{job}/{number:int}", desk.movement),
+    ]
+
+
+def _new(state: State, *taken: str) -> str:
+    """Return an id that no block has or had."""
+    number = len(state.used) + 1
+    while f"b{number}" in state.used or f"b{number}" in taken:
+        number += 1
+    return f"b{number}"
+
+
+def _seconds(motion: Motion) -> float:
+    return float(motion.times[-1] - motion.times[0])

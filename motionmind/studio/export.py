@@ -1,0 +1,97 @@
+"""Take it away: the piece as a file for other programs, as a page that plays by itself, and the project."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from motionmind.body.motion import Motion
+from motionmind.errors import MotionMindError, suggestion
+from motionmind.formats import write_motion
+from motionmind.render.page import page
+from motionmind.studio.placement import performance
+from motionmind.studio.view import layout_of
+
+if TYPE_CHECKING:
+    from motionmind.studio.studio import Studio
+
+_UNSAFE = re.compile(r'[\\/:*?"<>|\x00-\x1f\x7f]+')  # in names of files, on some system
+_LONGEST = 100  # characters of a name
+_TYPES = {
+    "html": "text/html; charset=utf-8",
+    "glb": "model/gltf-binary",
+    "bvh": "text/plain; charset=utf-8",
+    "json": "application/json",
+    "motionmind": "application/jsonl",
+}
+
+
+def composed(studio: Studio) -> Motion:
+    """Return the piece as one movement, with what the engine inserted marked.
+
+    Raises:
+        MotionMindError: there is nothing in it, or a movement is missing.
+    """
+    project = studio.project
+    if not project.state.blocks:
+        raise MotionMindError("the piece is empty: there is nothing to take away yet")
+    layout = layout_of(project.state, project.finding, project.marks)
+    return replace(performance(list(layout.parts), studio.movements.get), name=project.state.title or "piece")
+
+
+def file_name(title: str, suffix: str) -> str:
+    """Return a name that every system takes for a file.
+
+    >>> from motionmind.studio.export import file_name
+    >>> file_name("Swan: act 2/3", "bvh")
+    'Swan- act 2-3.bvh'
+    """
+    plain = _UNSAFE.sub("-", title).strip(". ")[:_LONGEST].rstrip(". ")
+    return f"{plain or 'piece'}.{suffix}"
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return the routes of this part."""
+    makers: dict[str, Callable[[Motion], bytes]] = {
+        "html": lambda motion: page(motion).encode(),
+        "glb": lambda motion: _written(motion, ".glb"),
+        "bvh": lambda motion: _written(motion, ".bvh"),
+        "json": lambda motion: _written(motion, ".json"),
+    }
+
+    async def export(request: Request) -> Response:
+        form = request.path_params["format"]
+        title = studio.project.state.title
+        if form == "project":
+            return _saved(studio.project.path.read_bytes(), file_name(title, "motionmind"))
+        if form not in makers:
+            raise MotionMindError(f"the piece cannot be taken away as {form!r:.20}{suggestion(form, list(makers))}")
+        data = await run_in_threadpool(makers[form], composed(studio))
+        return _saved(data, file_name(title, form))
+
+    return [Route("/api/export/{format}", export)]
+
+
+def _written(motion: Motion, suffix: str) -> bytes:
+    """Return a motion as a file of a format."""
+    with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
+        path = Path(folder) / f"piece{suffix}"
+        write_motion(path, motion)
+        return path.read_bytes()
+
+
+def _saved(data: bytes, name: str) -> Response:
+    """Return a file that a browser saves under a name."""
+    disposition = f"attachment; filename*=UTF-8''{quote(name, safe='')}"
+    media = _TYPES[name.rpartition(".")[2]]
+    return Response(data, media_type=media, headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})

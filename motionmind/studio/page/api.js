@@ -1,0 +1,75 @@
+/** Requests to the studio's server. What fails throws an Error whose message is one line for people. */
+
+const AWAY = "The studio does not answer: has it ended?";
+
+/** The request could not be made, for nobody answers. */
+export class AwayError extends Error {}
+
+export class Api extends EventTarget {
+  constructor() {
+    super();
+    /** This window's name: what it did, it alone takes back; a reload keeps it. */
+    this.window = sessionStorage.getItem("motionmind-window") ?? `w${crypto.randomUUID().slice(0, 12)}`;
+    sessionStorage.setItem("motionmind-window", this.window);
+    /** @type {(state: any) => void} called with what every edit answers */
+    this.taken = () => {};
+  }
+
+  /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
+  async enter() {
+    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? location.hash.slice(1);
+    if (!token) return;
+    history.replaceState(null, "", location.pathname + location.search);
+    await this.post("/api/enter", { token });
+  }
+
+  /** @param {string} path @returns {Promise<any>} */
+  get(path) {
+    return this.#ask(path, { method: "GET" });
+  }
+
+  /** @param {string} path @param {object} body @returns {Promise<any>} */
+  post(path, body = {}) {
+    return this.#ask(path, { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
+  }
+
+  /** @param {string} path @returns {Promise<any>} */
+  delete(path) {
+    return this.#ask(path, { method: "DELETE" });
+  }
+
+  /** Send a file as it is. @param {string} path @param {Blob} file @param {string} name @returns {Promise<any>} */
+  upload(path, file, name) {
+    return this.#ask(path, { method: "POST", body: file, headers: { "X-Name": encodeURIComponent(name) } });
+  }
+
+  /** Edit the project: the new state, which the store has taken over. @param {object} edit */
+  async edit(edit) {
+    return this.#took(await this.post("/api/edits", { window: this.window, edit }));
+  }
+
+  async undo() {
+    return this.#took(await this.post("/api/undo", { window: this.window }));
+  }
+
+  async redo() {
+    return this.#took(await this.post("/api/redo", { window: this.window }));
+  }
+
+  /** @param {any} state */
+  #took(state) {
+    this.taken(state);
+    return state;
+  }
+
+  /** @param {string} path @param {RequestInit} request */
+  async #ask(path, request) {
+    const headers = { "X-MotionMind": "studio", ...request.headers };
+    const answer = await fetch(path, { ...request, headers, credentials: "same-origin" }).catch(() => {
+      throw new AwayError(AWAY);
+    });
+    const found = await answer.json().catch(() => ({}));
+    if (!answer.ok) throw new Error(found.error ?? `The studio answered with ${answer.status}.`);
+    return found;
+  }
+}

@@ -1,0 +1,199 @@
+/** Alternatives side by side, in step: what each shows, how sure and how usual it is, and where each joint was seen. */
+
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { useChange, useKeys } from "../shell/hooks.js";
+import { icon } from "../shell/icons.js";
+import { deskOf } from "./desk.js";
+import { Joints, seenWords, jointName } from "./joints.js";
+import { Quartet, STILL } from "./quartet.js";
+
+const COUNT = 4;
+const GROUP = "Alternatives";
+const NEARER = 0.95;
+
+/** @param {{studio: any}} props */
+export function Centre({ studio }) {
+  const desk = deskOf(studio);
+  const shown = useChange(desk, () => desk.shown);
+  useEffect(() => {
+    studio.viewer.covered = shown;
+    if (!shown) studio.viewer.stale();
+    return () => (studio.viewer.covered = false);
+  }, [shown]);
+  return shown && html`<${Alternatives} studio=${studio} />`;
+}
+
+/** @param {{studio: any}} props */
+function Alternatives({ studio }) {
+  const desk = deskOf(studio);
+  const { theme } = studio.viewer;
+  const found = useChange(desk, () => desk.found);
+  const state = useChange(desk, () => desk.state);
+  const words = useChange(desk, () => desk.words);
+  const chosen = useChange(desk, () => desk.chosen);
+  const dark = useChange(theme, () => theme.dark);
+  const [quartet, setQuartet] = useState(/** @type {Quartet | null} */ (null));
+  useEffect(() => {
+    const made = new Quartet(theme.dark);
+    setQuartet(made);
+    return () => made.end();
+  }, []);
+  useEffect(() => quartet?.colour(dark), [quartet, dark]);
+  useEffect(() => {
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    quartet?.take(found.map(({ motion }) => motion), still);
+  }, [quartet, found]);
+  const accept = () => desk.accept();
+  useKeys(studio, [
+    { keys: [" "], does: "play or pause all of them", group: GROUP, act: () => quartet?.player.toggle() },
+    ...Array.from({ length: COUNT }, (_, i) => ({
+      keys: [String(i + 1)],
+      does: `choose alternative ${i + 1}`,
+      group: GROUP,
+      act: () => desk.choose(i),
+    })),
+    { keys: ["Enter"], does: "accept the one that is chosen", group: GROUP, act: accept },
+    { keys: ["Escape"], does: "back to the viewer", group: GROUP, act: () => desk.show(false) },
+  ]);
+  const searching = state === "searching";
+  return html`<section class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
+    <header class="row">
+      <h2 class="grow">${heading(state, found.length)}</h2>
+      <p class="hint" role="status">${words}</p>
+      ${searching && html`<button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
+      <button class="button quiet icon" aria-label="Back to the viewer" title="Back to the viewer (Esc)" onClick=${() => desk.show(false)}>
+        ${icon("close")}
+      </button>
+    </header>
+    ${state === "failed" && html`<p class="empty">No movement joins these two postures. Try another posture, or another length.</p>`}
+    <div class="four" role="radiogroup" aria-label="Alternatives" hidden=${state === "failed"}>
+      ${Array.from({ length: state === "found" ? found.length : COUNT }, (_, i) =>
+        found[i]
+          ? html`<${Alternative} key=${i} desk=${desk} quartet=${quartet} index=${i} chosen=${chosen === i} account=${found[i].account} motion=${found[i].motion} />`
+          : html`<div class="alternative card waiting" key=${i}>
+              <div class="window">${searching && html`<span class="hint">looking…</span>`}</div>
+            </div>`,
+      )}
+    </div>
+    <footer class="row">
+      ${quartet && html`<${Play} quartet=${quartet} />`}
+      <button class="button primary" data-testid="accept" disabled=${!found[chosen]} title="Put it onto the line of time (Enter)" onClick=${accept}>
+        ${icon("check")} Accept ${found.length > 1 ? chosen + 1 : ""}
+      </button>
+    </footer>
+  </section>`;
+}
+
+/** @param {string} state @param {number} count */
+function heading(state, count) {
+  if (state === "failed") return "Nothing found";
+  if (state === "searching") return "From A to B…";
+  return count === 1 ? "From A to B: one way" : `From A to B: ${count} ways`;
+}
+
+/** @param {any} props */
+function Alternative({ desk, quartet, index, chosen, account, motion }) {
+  const canvas = useRef(/** @type {any} */ (null));
+  const [joint, setJoint] = useState(/** @type {number | null} */ (null));
+  const time = useChange(quartet?.player ?? desk, () => (joint === null || !quartet ? 0 : Math.floor(quartet.player.time * 10) / 10));
+  useEffect(() => {
+    quartet?.onto(index, canvas.current);
+    if (index === 0 && quartet) canvas.current.after(quartet.room);
+  }, [quartet]);
+  useEffect(() => quartet?.mark(index, joint), [quartet, joint]);
+  const from = useRef(/** @type {{x: number, y: number, moved: boolean} | null} */ (null));
+  const move = (/** @type {PointerEvent} */ event) => {
+    if (!from.current) {
+      if (event.pointerType === "mouse") setJoint(quartet?.jointAt(index, event.offsetX, event.offsetY) ?? null);
+      return;
+    }
+    const { x, y } = from.current;
+    if (!from.current.moved && Math.hypot(event.clientX - x, event.clientY - y) < STILL) return;
+    const { clientWidth, clientHeight } = canvas.current;
+    quartet?.turn((event.clientX - x) / clientWidth, (event.clientY - y) / clientHeight);
+    from.current = { x: event.clientX, y: event.clientY, moved: true };
+  };
+  const key = (/** @type {KeyboardEvent} */ event) => {
+    const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    const count = motion.joints.length;
+    if (by && !event.shiftKey) setJoint(((joint ?? (by > 0 ? -1 : count)) + by + count) % count);
+    else if (event.key === "ArrowRight" || event.key === "ArrowLeft") {
+      const next = (index + (event.key === "ArrowRight" ? 1 : -1) + desk.found.length) % desk.found.length;
+      desk.choose(next);
+      document.getElementById(`alternative-${next}`)?.focus();
+    } else if (event.key === " ") return;
+    else if (event.key === "Enter") {
+      if (!chosen) desk.choose(index);
+      else desk.accept();
+    } else return;
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const name = joint === null ? "" : jointName(motion.joints[joint]);
+  return html`<div class="alternative card ${chosen ? "chosen" : ""}">
+    <div
+      id="alternative-${index}"
+      class="window"
+      data-testid="alternative-${index + 1}"
+      role="radio"
+      aria-checked=${String(chosen)}
+      aria-label="Alternative ${index + 1}: ${account.words}. Up and down go from joint to joint."
+      tabindex=${chosen ? 0 : -1}
+      onClick=${() => !from.current?.moved && desk.choose(index)}
+      onKeyDown=${key}
+      onBlur=${() => setJoint(null)}
+    >
+      <canvas
+        ref=${canvas}
+        onPointerDown=${(/** @type {PointerEvent} */ event) => (from.current = { x: event.clientX, y: event.clientY, moved: false })}
+        onPointerMove=${move}
+        onPointerUp=${() => setTimeout(() => (from.current = null))}
+        onPointerLeave=${() => {
+          from.current = null;
+          setJoint(null);
+        }}
+        onWheel=${(/** @type {WheelEvent} */ event) => {
+          event.preventDefault();
+          quartet?.near(event.deltaY < 0 ? NEARER : 1 / NEARER);
+        }}
+      ></canvas>
+      <span class="number" aria-hidden="true">${chosen ? icon("check") : ""}${index + 1}</span>
+      <p class="seen" role="status">${joint !== null && html`<strong>${name}</strong> ${seenWords(account.joints[name], time)}`}</p>
+    </div>
+    <div class="words">
+      <p>${account.words}</p>
+      <p class="hint">${account.usual}</p>
+      <p class="hint">${account.sure}</p>
+      ${account.beyond.map((/** @type {string} */ line) => html`<p class="said warning">${icon("warning")}<span>${line}</span></p>`)}
+      <${Joints} account=${account} point=${(/** @type {string | null} */ over) => setJoint(over === null ? null : motion.joints.findIndex((/** @type {string} */ one) => jointName(one) === over))} />
+    </div>
+  </div>`;
+}
+
+/** @param {{quartet: Quartet}} props */
+function Play({ quartet }) {
+  const { player } = quartet;
+  const playing = useChange(player, () => player.playing);
+  const line = useRef(/** @type {any} */ (null));
+  useEffect(() => {
+    const update = () => (line.current.value = String(player.time / Math.max(player.motion.end, 1e-9)));
+    player.addEventListener("change", update);
+    return () => player.removeEventListener("change", update);
+  }, [quartet]);
+  return html`<button class="button icon" data-testid="play-alternatives" aria-label=${playing ? "Pause all" : "Play all"} title="Play, pause (space)" onClick=${() => player.toggle()}>
+      ${icon(playing ? "pause" : "play")}
+    </button>
+    <input
+      ref=${line}
+      class="grow"
+      type="range"
+      min="0"
+      max="1"
+      step="any"
+      aria-label="Time of all alternatives"
+      onInput=${(/** @type {any} */ event) => {
+        player.pause();
+        player.seek(Number(event.target.value) * player.motion.end);
+      }}
+    />`;
+}

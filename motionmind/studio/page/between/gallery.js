@@ -1,0 +1,179 @@
+/** The gallery: postures that have names, clips whose every frame is one, and one's own. */
+
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { useChange } from "../shell/hooks.js";
+import { icon } from "../shell/icons.js";
+import { movement, thumbnail } from "../movements.js";
+import { deskOf, DRAGGED, same } from "./desk.js";
+
+const FEW = 24; // clips that are listed before somebody asks for all
+
+/** @param {{studio: any}} props */
+export function Gallery({ studio }) {
+  const { store, api, act } = studio;
+  const corpora = useChange(store, () => JSON.stringify(store.state?.corpora ?? null));
+  const own = useChange(store, () => JSON.stringify(store.state?.postures ?? null));
+  const [gallery, setGallery] = useState(/** @type {any} */ (null));
+  const [sought, seek] = useState("");
+  useEffect(() => {
+    if (corpora === "null") return; // nobody has let this browser in yet
+    act(() => api.get("/api/gallery")).then((/** @type {any} */ found) => {
+      if (!found) return;
+      setGallery(found);
+      greet(studio, found);
+    });
+  }, [corpora, own]);
+  const fits = (/** @type {{title: string}} */ { title }) => title.toLowerCase().includes(sought.trim().toLowerCase());
+  return html`<section class="gallery" data-testid="gallery" aria-label="Gallery">
+    <label class="search">
+      ${icon("search")}<span class="aside">Search postures and clips</span>
+      <input class="field" type="search" placeholder="Search postures and clips" onInput=${(/** @type {any} */ event) => seek(event.target.value)} />
+    </label>
+    ${!gallery && html`<p class="hint" role="status">Looking through the corpus…</p>`}
+    ${gallery?.own.filter(fits).length > 0 && html`<h3>Your own</h3>
+      <${Postures} studio=${studio} postures=${gallery.own.filter(fits)} />`}
+    ${gallery?.corpora.map(
+      (/** @type {any} */ corpus) => html`
+        ${corpus.postures.filter(fits).length > 0 && html`<h3>Postures of ${corpus.name}</h3>
+          <${Postures} studio=${studio} postures=${corpus.postures.filter(fits)} />`}
+        ${corpus.clips.filter(fits).length > 0 && html`<h3>Any moment of ${corpus.name}</h3>
+          <${Clips} studio=${studio} clips=${corpus.clips.filter(fits)} />`}
+      `,
+    )}
+    ${gallery && sought && nothing(gallery, fits) && html`<p class="empty">Nothing is called “${sought}”.</p>`}
+  </section>`;
+}
+
+/** Let somebody stand on an empty stage. @param {any} studio @param {any} gallery */
+async function greet(studio, gallery) {
+  const first = [gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ one) => [one.postures, one.clips])].flat()[0];
+  if (!first || studio.viewer.motion || studio.store.state.piece.blocks.length > 0) return;
+  const motion = await movement(studio.api, first.key);
+  if (!studio.viewer.motion) studio.viewer.show(motion, { title: first.title });
+}
+
+/** @param {any} gallery @param {(one: any) => boolean} fits */
+function nothing(gallery, fits) {
+  return ![gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ corpus) => [corpus.postures, corpus.clips])].flat().some(fits);
+}
+
+/** @param {{studio: any, postures: {key: string, title: string}[]}} props */
+function Postures({ studio, postures }) {
+  const desk = deskOf(studio);
+  const choice = useChange(desk, () => desk.choice);
+  const ends = useChange(desk, () => desk.ends);
+  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
+  return html`<ul class="thumbs">
+    ${postures.map(({ key, title }) => {
+      const place = { key, frame: 0, title };
+      const marks = [...(ends.a && same(ends.a, place) ? ["A"] : []), ...(ends.b && same(ends.b, place) ? ["B"] : [])];
+      return html`<li key=${key}>
+        <button
+          class="thumb"
+          data-testid="posture-${title}"
+          aria-pressed=${String(Boolean(choice && same(choice, place)))}
+          draggable="true"
+          onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place))}
+          onClick=${() => pick(studio, place)}
+        >
+          <img src=${thumbnail(key, 0, dark)} alt="" loading="lazy" draggable="false" />
+          <span class="cut">${title}</span>
+          ${marks.map((mark) => html`<span class="mark">${mark}<span class="aside"> is this posture</span></span>`)}
+        </button>
+      </li>`;
+    })}
+  </ul>`;
+}
+
+/** Pick a posture, and look at it. @param {any} studio @param {any} place */
+async function pick(studio, place) {
+  const desk = deskOf(studio);
+  desk.pick(place);
+  if (desk.shown) return;
+  const motion = await studio.act(() => movement(studio.api, place.key));
+  if (motion && desk.choice === place) studio.viewer.show(motion, { time: motion.times[place.frame], title: place.title });
+}
+
+/** @param {{studio: any, clips: any[]}} props */
+function Clips({ studio, clips }) {
+  const [open, setOpen] = useState("");
+  const [all, setAll] = useState(false);
+  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
+  return html`<ul class="clips">
+      ${(all ? clips : clips.slice(0, FEW)).map(
+        (clip) => html`<li key=${clip.key} class=${clip.key === open ? "card" : ""}>
+          <button
+            class="clip"
+            data-testid="clip-${clip.title}"
+            aria-expanded=${String(clip.key === open)}
+            title=${clip.about}
+            onClick=${() => setOpen(clip.key === open ? "" : clip.key)}
+          >
+            <img src=${thumbnail(clip.key, clip.frames >> 1, dark, 64)} alt="" loading="lazy" />
+            <span class="grow"><span class="cut">${clip.title}</span><span class="hint cut">${clip.about}</span></span>
+            <span class="hint numbers">${clip.seconds.toFixed(0)} s</span>
+          </button>
+          ${clip.key === open && html`<${Frames} studio=${studio} clip=${clip} />`}
+        </li>`,
+      )}
+    </ul>
+    ${
+      !all &&
+      clips.length > FEW &&
+      html`<button class="button" onClick=${() => setAll(true)}>All ${clips.length} clips</button>`
+    }`;
+}
+
+/** A clip's moments: the viewer shows the one that is scrubbed to. @param {{studio: any, clip: any}} props */
+function Frames({ studio, clip }) {
+  const desk = deskOf(studio);
+  const { viewer } = studio;
+  const [frame, setFrame] = useState(0);
+  const motion = useRef(/** @type {any} */ (null));
+  const place = (/** @type {number} */ at) => ({ key: clip.key, frame: at, title: `${clip.title} ${at}` });
+  useEffect(() => {
+    let here = true;
+    studio.act(() => movement(studio.api, clip.key)).then((/** @type {any} */ found) => {
+      if (!here || !found) return;
+      motion.current = found;
+      desk.show(false);
+      viewer.show(found, { time: found.start, title: clip.title, play: true });
+    });
+    const follow = () => viewer.motion === motion.current && setFrame(viewer.player.frame);
+    viewer.player.addEventListener("change", follow);
+    return () => {
+      here = false;
+      viewer.player.removeEventListener("change", follow);
+    };
+  }, []);
+  const seek = (/** @type {any} */ event) => {
+    const at = Number(event.target.value);
+    setFrame(at);
+    if (!motion.current) return;
+    if (viewer.motion !== motion.current) viewer.show(motion.current, { title: clip.title });
+    viewer.player.pause();
+    viewer.player.seek(motion.current.times[at]);
+  };
+  const set = (/** @type {"a" | "b"} */ end) => {
+    viewer.player.pause();
+    desk.choice = place(frame);
+    desk.set(end, place(frame));
+  };
+  return html`<div class="frames">
+    <input
+      type="range"
+      min="0"
+      max=${clip.frames - 1}
+      value=${frame}
+      aria-label="Moment of ${clip.title}"
+      aria-valuetext="frame ${frame} of ${clip.frames - 1}"
+      data-testid="frames"
+      onInput=${seek}
+    />
+    <div class="row">
+      <span class="hint numbers grow">frame ${frame} of ${clip.frames - 1}</span>
+      <button class="button" onClick=${() => set("a")}>As A</button>
+      <button class="button" onClick=${() => set("b")}>As B</button>
+    </div>
+  </div>`;
+}

@@ -1,0 +1,49 @@
+/** Where each joint of an alternative was seen, in words. */
+
+import { html } from "../vendor/htm-preact-standalone.js";
+
+const HOW = /** @type {Record<string, string>} */ ({
+  waits: "waits",
+  new: "moves as in no clip",
+  between: "moves between what was seen",
+});
+
+/** A joint's name in words. @param {string} name */
+export function jointName(name) {
+  return name.replaceAll("_", " ");
+}
+
+/**
+ * What a joint does at a moment.
+ * @param {import("./desk.js").Stretch[] | undefined} stretches
+ * @param {number} time seconds
+ */
+export function seenWords(stretches, time) {
+  const stretch = stretches?.findLast(({ begins }) => begins <= time + 1e-6);
+  return stretch ? words(stretch) : "";
+}
+
+/** @param {import("./desk.js").Stretch} stretch */
+function words(stretch) {
+  return stretch.how === "seen" ? `seen in ${stretch.where}` : HOW[stretch.how];
+}
+
+/** Each joint's way from beginning to end. @param {{account: import("./desk.js").Account, point: (joint: string | null) => void}} props */
+export function Joints({ account, point }) {
+  return html`<details class="joints">
+    <summary>Joint by joint</summary>
+    <dl>
+      ${Object.entries(account.joints).map(
+        ([joint, stretches]) => html`<div tabindex="0" onMouseEnter=${() => point(joint)} onMouseLeave=${() => point(null)} onFocus=${() => point(joint)} onBlur=${() => point(null)}>
+          <dt>${joint}</dt>
+          <dd>
+            ${stretches.map(
+              (stretch) =>
+                html`<span class="how-${stretch.how}">${stretch.begins.toFixed(1)}–${stretch.ends.toFixed(1)} s: ${words(stretch)}</span>`,
+            )}
+          </dd>
+        </div>`,
+      )}
+    </dl>
+  </details>`;
+}

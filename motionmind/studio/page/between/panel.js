@@ -1,0 +1,102 @@
+/** Flow 1, from A to B: both postures, and the gallery that they are taken from. */
+
+import { html } from "../vendor/htm-preact-standalone.js";
+import { useChange, useKeys } from "../shell/hooks.js";
+import { icon } from "../shell/icons.js";
+import { thumbnail } from "../movements.js";
+import { deskOf, dropped } from "./desk.js";
+import { Gallery } from "./gallery.js";
+
+export { Centre } from "./alternatives.js";
+
+const LENGTHS = [0.5, 1, 1.5, 2, 3, 4, 6, 8];
+const GROUP = "A to B";
+
+/** @param {{studio: any}} props */
+export function Panel({ studio }) {
+  const desk = deskOf(studio);
+  const ends = useChange(desk, () => desk.ends);
+  const seconds = useChange(desk, () => desk.seconds);
+  const state = useChange(desk, () => desk.state);
+  const shown = useChange(desk, () => desk.shown);
+  useKeys(studio, [
+    { keys: ["a"], does: "set A: the posture picked, or what the viewer shows", group: GROUP, act: () => take(studio, "a") },
+    { keys: ["b"], does: "set B", group: GROUP, act: () => take(studio, "b") },
+  ]);
+  return html`<div class="between">
+    <div class="ends">
+      <${End} studio=${studio} name="a" place=${ends.a} />
+      <button
+        class="button quiet icon"
+        aria-label="Exchange A and B"
+        title="Exchange A and B"
+        disabled=${!ends.a && !ends.b}
+        onClick=${() => desk.swap()}
+      >
+        ${icon("swap")}
+      </button>
+      <${End} studio=${studio} name="b" place=${ends.b} />
+    </div>
+    <label class="row hint">
+      How long
+      <select
+        data-testid="how-long"
+        value=${seconds}
+        onChange=${(/** @type {any} */ event) => desk.take(Number(event.target.value))}
+      >
+        <option value="0">as it likes</option>
+        ${LENGTHS.map((length) => html`<option value=${length}>${length} s</option>`)}
+      </select>
+      ${
+        !shown &&
+        state === "found" &&
+        html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
+      }
+    </label>
+    <${Gallery} studio=${studio} />
+  </div>`;
+}
+
+/** One of both ends: its picture, and what sets it. @param {{studio: any, name: "a" | "b", place: any}} props */
+function End({ studio, name, place }) {
+  const desk = deskOf(studio);
+  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
+  const letter = name.toUpperCase();
+  const drop = (/** @type {DragEvent} */ event) => {
+    event.preventDefault();
+    const found = dropped(event);
+    if (found) desk.set(name, { ...found, title: found.title ?? found.key });
+  };
+  return html`<div class="end ${place ? "card" : "empty"}" onDragOver=${(/** @type {Event} */ event) => event.preventDefault()} onDrop=${drop}>
+    ${
+      place
+        ? html`<img src=${thumbnail(place.key, place.frame, dark, 128)} alt="" />
+            <button class="button quiet icon clear" aria-label="Clear ${letter}" onClick=${() => desk.set(name, null)}>
+              ${icon("close")}
+            </button>
+            <span class="letter" aria-hidden="true">${letter}</span>
+            <span class="cut name">${place.title}</span>`
+        : html`<span class="letter" aria-hidden="true">${letter}</span>
+            <p>${name === "a" ? "Where it starts: pick a posture below" : "Where it leads"}</p>`
+    }
+    <button
+      class="button"
+      data-testid="set-${name}"
+      title="Set ${letter}: the posture picked, or what the viewer shows (${letter})"
+      onClick=${() => take(studio, name)}
+    >
+      Set ${letter}
+    </button>
+  </div>`;
+}
+
+/** Set an end to what was picked, or to the moment that the viewer shows. @param {any} studio @param {"a" | "b"} name */
+function take(studio, name) {
+  const desk = deskOf(studio);
+  const { viewer } = studio;
+  const moment = viewer.moment;
+  const picked = desk.choice && (!moment || moment.key === desk.choice.key) ? { ...desk.choice, frame: moment?.frame ?? desk.choice.frame } : desk.choice;
+  const place = picked ?? (moment && { ...moment, title: viewer.title || "this moment" });
+  if (place) desk.set(name, place);
+  else studio.say("Pick a posture in the gallery first, or let the viewer show one.");
+}

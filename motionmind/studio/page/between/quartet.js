@@ -1,0 +1,175 @@
+/** Up to four movements in step, drawn by one renderer: a browser has few, and they are seen from one camera. */
+
+import { MOMENT } from "motionmind/motion";
+import { Player } from "motionmind/player";
+import { Stage } from "motionmind/stage";
+import { Vector3 } from "three";
+
+const TURN = Math.PI; // by a drag over the whole of a picture
+export const STILL = 3; // CSS pixels that a click may move
+const NEAR = 36; // CSS pixels from a joint at which it is pointed at
+const GHOSTS = { ends: true, onion: 0 };
+
+/** Movements after one another, as far as a stage needs to know to find where all of them lead. */
+class All {
+  /** @param {any[]} motions */
+  constructor(motions) {
+    this.motions = motions;
+    this.joints = motions[0].joints;
+    this.starts = [0];
+    for (const motion of motions) this.starts.push(this.starts[this.starts.length - 1] + motion.length);
+    this.length = this.starts[motions.length];
+    this.times = Array.from({ length: this.length }, (_, i) => i);
+    this.farthest = motions.flatMap((motion, i) => motion.farthest.map((/** @type {number} */ at) => at + this.starts[i]));
+  }
+
+  /** @param {number} time @param {Float64Array} rotations @param {Float64Array} root */
+  sample(time, rotations, root) {
+    const i = this.starts.findLastIndex((start) => start <= time);
+    this.motions[i].sample(this.motions[i].times[time - this.starts[i]], rotations, root);
+  }
+}
+
+/** Fires "change" when time has gone on or stopped. */
+export class Quartet {
+  /** @param {boolean} dark */
+  constructor(dark) {
+    this.dark = dark;
+    /** Where the canvas of the renderer is, unseen; put into one of the pictures it is as large as each. */
+    this.room = Object.assign(document.createElement("div"), { className: "room" });
+    /** @type {any} */
+    this.stage = undefined;
+    /** @type {any[]} */
+    this.motions = [];
+    /** @type {CanvasRenderingContext2D[]} */
+    this.pens = [];
+    /** @type {(number | null)[]} the joint of each that is marked */
+    this.marked = [];
+    /** @type {any} */
+    this.player = new Player(/** @type {any} */ ({ length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }));
+    this.player.addEventListener("change", () => (this.fresh = false));
+    this.fresh = false;
+    this.last = performance.now();
+    this.ended = false;
+    requestAnimationFrame((now) => this.#draw(now));
+  }
+
+  /** Play these movements. @param {any[]} motions @param {boolean} still whether they wait to be played */
+  take(motions, still) {
+    const first = this.motions.length === 0;
+    this.motions = motions;
+    if (motions.length === 0) return;
+    const all = new All(motions);
+    const [{ body, colours }] = motions;
+    if (this.stage) this.stage.take(all, body, colours);
+    else {
+      const canvas = document.createElement("canvas");
+      this.room.append(canvas);
+      this.stage = new Stage(canvas, /** @type {any} */ (all), body, colours, () => (this.fresh = false));
+      this.stage.dark = this.dark;
+    }
+    this.stage.look(this.stage.view ?? "quarter");
+    this.player.motion = motions.reduce((one, other) => (other.end > one.end ? other : one));
+    if (first) this.player.seek(0);
+    if (first && !still) this.player.play();
+    this.fresh = false;
+  }
+
+  /** @param {boolean} dark */
+  colour(dark) {
+    this.dark = dark;
+    if (this.stage) this.stage.dark = dark;
+    this.fresh = false;
+  }
+
+  /** Draw onto a canvas, and let it turn all of them. @param {number} index @param {HTMLCanvasElement} canvas */
+  onto(index, canvas) {
+    this.pens[index] = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { alpha: false }));
+    this.fresh = false;
+  }
+
+  /** Turn all pictures. @param {number} across share of a picture's width @param {number} along share of its height */
+  turn(across, along) {
+    const { controls } = this.stage;
+    this.stage.view = undefined;
+    controls.rotateLeft(TURN * across);
+    controls.rotateUp(TURN * along);
+  }
+
+  /** Come nearer, or go farther. @param {number} factor */
+  near(factor) {
+    this.stage.view = undefined;
+    this.stage.controls.dollyIn(factor);
+  }
+
+  /**
+   * The joint of a movement that is shown near a place in its picture; null if none is.
+   * @param {number} index
+   * @param {number} x CSS pixels from the left
+   * @param {number} y CSS pixels from the top
+   * @returns {number | null}
+   */
+  jointAt(index, x, y) {
+    const { stage } = this;
+    const motion = this.motions[index];
+    if (!motion || !stage) return null;
+    const { clientWidth: width, clientHeight: height } = this.room;
+    motion.sample(this.#timeOf(motion), stage.rotations, stage.root);
+    stage.body.pose(stage.rotations, stage.root);
+    const place = new Vector3();
+    let best = null;
+    let least = NEAR;
+    for (let joint = 0; joint < motion.joints.length; joint++) {
+      place.fromArray(stage.body.joints, joint * 3).project(stage.camera);
+      const distance = Math.hypot((0.5 + 0.5 * place.x) * width - x, (0.5 - 0.5 * place.y) * height - y);
+      if (distance < least) [best, least] = [joint, distance];
+    }
+    return best;
+  }
+
+  /** Mark a joint of one of them, or none. @param {number} index @param {number | null} joint */
+  mark(index, joint) {
+    this.marked[index] = joint;
+    this.fresh = false;
+  }
+
+  end() {
+    this.ended = true;
+    this.stage?.renderer.dispose();
+    this.stage?.renderer.forceContextLoss();
+  }
+
+  /** @param {any} motion */
+  #timeOf(motion) {
+    return Math.min(this.player.time, motion.end - MOMENT / 10);
+  }
+
+  /** @param {number} now */
+  #draw(now) {
+    if (this.ended) return;
+    this.player.advance(Math.min((now - this.last) / 1000, 0.25));
+    this.last = now;
+    if (!this.fresh && this.stage && this.room.clientWidth > 0) {
+      this.fresh = true;
+      this.motions.forEach((motion, i) => this.#picture(motion, i));
+    }
+    requestAnimationFrame((next) => this.#draw(next));
+  }
+
+  /** @param {any} motion @param {number} index */
+  #picture(motion, index) {
+    const { stage } = this;
+    const pen = this.pens[index];
+    if (!pen) return;
+    Object.assign(stage, { motion, ghostsShown: "" });
+    stage.show(this.#timeOf(motion), GHOSTS);
+    const joint = this.marked[index];
+    if (joint !== null && joint !== undefined) stage.marks.show([joint]);
+    stage.render(this.player.playing);
+    const { width, height } = stage.canvas;
+    if (pen.canvas.width !== width || pen.canvas.height !== height) Object.assign(pen.canvas, { width, height });
+    pen.drawImage(stage.canvas, 0, 0);
+  }
+}
+
+

@@ -1,0 +1,115 @@
+/** Flow 6, take it away: a film, a file for other programs, the project, or a page that plays by itself. */
+
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { film, obstacle } from "motionmind/film";
+import { useChange } from "../shell/hooks.js";
+
+const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in names of files, on some system
+
+const FILES = [
+  { format: "html", testid: "export-html", name: "A page", words: "One file that plays in any browser, without the studio: to send to somebody." },
+  { format: "glb", testid: "export-glb", name: "GLB", words: "The body and its movement for Blender, and for the web." },
+  { format: "bvh", testid: "export-bvh", name: "BVH", words: "Movement for Blender, MotionBuilder and other programs that animate." },
+  { format: "json", testid: "export-json", name: "Motion", words: "All that MotionMind knows of the movement, to go on with in Python or a terminal." },
+];
+
+/** @param {{studio: any}} props */
+export function Panel({ studio }) {
+  const { store } = studio;
+  const empty = useChange(store, () => !store.state?.piece?.blocks.length);
+  const file = useChange(store, () => store.state?.file ?? "");
+  return html`<div class="stack" data-testid="export">
+    <h2>Take it away</h2>
+    ${
+      empty
+        ? html`<p class="empty">The piece is empty. Go from A to B, or drag a clip onto the line of time; then take it away from here.</p>`
+        : html`${FILES.map(
+            ({ format, testid, name, words }) => html`<${Way} key=${format} name=${name} words=${words}>
+              <${Save} studio=${studio} format=${format} testid=${testid} />
+            <//>`,
+          )}
+          <${Film} studio=${studio} />`
+    }
+    <${Way} name="The project" words="The piece with every edit, to open again with motionmind studio FILE. It is always saved: ${file}">
+      <${Save} studio=${studio} format="project" testid="export-project" />
+    <//>
+  </div>`;
+}
+
+/** @param {any} props */
+function Way({ name, words, children }) {
+  return html`<section class="card way">
+    <div>
+      <h3>${name}</h3>
+      <p class="hint">${words}</p>
+    </div>
+    ${children}
+  </section>`;
+}
+
+/** A button that fetches a file and saves it under the name that the server gives it. @param {any} props */
+function Save({ studio, format, testid }) {
+  const [busy, setBusy] = useState(false);
+  const save = async () => {
+    setBusy(true);
+    await studio.act(async () => {
+      const answer = await fetch(`/api/export/${format}`, { credentials: "same-origin" });
+      if (!answer.ok) throw new Error((await answer.json().catch(() => null))?.error ?? "The studio did not answer.");
+      offer(await answer.blob(), nameOf(answer) ?? `piece.${format}`);
+    });
+    setBusy(false);
+  };
+  return html`<button class="button" data-testid=${testid} disabled=${busy} onClick=${save}>${busy ? "Making…" : "Save"}</button>`;
+}
+
+/** @param {Response} answer */
+function nameOf(answer) {
+  const encoded = /filename\*=UTF-8''([^;]+)/.exec(answer.headers.get("Content-Disposition") ?? "")?.[1];
+  return encoded && decodeURIComponent(encoded);
+}
+
+/** @param {Blob} blob @param {string} name */
+function offer(blob, name) {
+  const link = document.createElement("a");
+  Object.assign(link, { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+/** @param {{studio: any}} props */
+function Film({ studio }) {
+  const { viewer, store } = studio;
+  const [share, setShare] = useState(/** @type {number | null} */ (null));
+  const stopper = useRef(/** @type {AbortController | null} */ (null));
+  useEffect(() => () => stopper.current?.abort(), []);
+  const start = async () => {
+    const wrong = obstacle();
+    if (wrong) return studio.say(wrong, { kind: "error" });
+    if (!viewer.isHome) viewer.back();
+    const { motion, stage, player, ghosts } = viewer;
+    const before = player.time;
+    player.pause();
+    stopper.current = new AbortController();
+    viewer.busy = stage.filming = true;
+    setShare(0);
+    try {
+      const seen = (/** @type {number} */ time) => setShare((time - motion.start) / (motion.end - motion.start));
+      const title = (store.state.title || "piece").replace(UNSAFE, "-").replace(/^[. ]+|[. ]+$/g, "") || "piece";
+      offer(await film(stage, motion, ghosts, seen, stopper.current.signal), `${title}.webm`);
+    } catch (error) {
+      const stopped = stopper.current.signal.aborted;
+      if (!stopped) studio.say(`No film was made: ${error instanceof Error ? error.message : error}`, { kind: "error" });
+    }
+    viewer.busy = stage.filming = false;
+    player.seek(before);
+    setShare(null);
+  };
+  return html`<${Way} name="Film" words="The piece as the viewer shows it now, from where the camera is (WebM).">
+    ${
+      share === null
+        ? html`<button class="button" data-testid="export-film" onClick=${start}>Film</button>`
+        : html`<progress value=${share} aria-label="Film"></progress>
+            <button class="button" onClick=${() => stopper.current?.abort()}>Stop</button>`
+    }
+  <//>`;
+}

@@ -1,0 +1,110 @@
+/** The page put together: what every panel gets as `studio`, and where each panel stands. */
+
+import { html, render } from "./vendor/htm-preact-standalone.js";
+import { Api } from "./api.js";
+import * as between from "./between/panel.js";
+import * as take from "./export/panel.js";
+import { Bar } from "./shell/bar.js";
+import { useChange } from "./shell/hooks.js";
+import { icon } from "./shell/icons.js";
+import { Keys } from "./shell/keys.js";
+import { View } from "./shell/stage.js";
+import { Shown, Toasts } from "./shell/toasts.js";
+import { Store } from "./store.js";
+import { Viewer } from "./viewer.js";
+
+/** The panels by name, in their order on the rail: what each is called, and its views. */
+const PANELS = [
+  { name: "between", words: "A to B", about: "From one posture to another", views: between },
+  { name: "take", words: "Take away", about: "Film, Blender, a page: take the piece away", views: take },
+];
+
+class Open extends EventTarget {
+  panel = PANELS[0].name;
+
+  /** @param {string} name */
+  set(name) {
+    this.panel = name;
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** @param {{studio: any, open: Open}} props */
+function Studio({ studio, open }) {
+  const name = useChange(open, () => open.panel);
+  const { views, about } = PANELS.find((panel) => panel.name === name) ?? PANELS[0];
+  const Centre = "Centre" in views ? views.Centre : null;
+  return html`<${Bar} studio=${studio} />
+    <${Rail} name=${name} open=${open} />
+    <section id="panel" class="panel" role="tabpanel" aria-label=${about} data-testid=${`panel-${name}`}>
+      <${views.Panel} key=${name} studio=${studio} />
+    </section>
+    <main class="view" aria-label="Viewer">
+      <${View} studio=${studio} />
+      ${Centre && html`<${Centre} key=${name} studio=${studio} />`}
+    </main>
+    <${Shown} toasts=${studio.toasts} />`;
+}
+
+/** The five panels, one stop of the Tab key; arrows lead on. @param {{name: string, open: Open}} props */
+function Rail({ name, open }) {
+  const move = (/** @type {KeyboardEvent} */ event) => {
+    const by = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    const at = PANELS.findIndex((panel) => panel.name === name);
+    const next = PANELS[(at + by + PANELS.length) % PANELS.length].name;
+    open.set(next);
+    document.getElementById(`open-${next}`)?.focus();
+  };
+  return html`<nav class="rail" role="tablist" aria-label="Panels" aria-orientation="vertical" onKeyDown=${move}>
+    ${PANELS.map(
+      (panel) =>
+        html`<button
+          id=${`open-${panel.name}`}
+          data-testid=${`open-${panel.name}`}
+          role="tab"
+          aria-selected=${String(panel.name === name)}
+          aria-controls="panel"
+          tabindex=${panel.name === name ? 0 : -1}
+          title=${panel.about}
+          onClick=${() => open.set(panel.name)}
+        >
+          ${icon(panel.name)}${panel.words}
+        </button>`,
+    )}
+  </nav>`;
+}
+
+async function start() {
+  const open = new Open();
+  const toasts = new Toasts();
+  const keys = new Keys();
+  const api = new Api();
+  const store = new Store(api);
+  const viewer = new Viewer();
+  const studio = {
+    api,
+    store,
+    viewer,
+    toasts,
+    keys,
+    window: api.window,
+    open: (/** @type {string} */ panel) => open.set(panel),
+    say: toasts.say.bind(toasts),
+    /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */
+    act: async (doing) => {
+      try {
+        return await doing();
+      } catch (error) {
+        toasts.say(error instanceof Error ? error.message : String(error), { kind: "error" });
+        return undefined;
+      }
+    },
+  };
+  Object.assign(window, { studio }); // for tests, and for whoever is curious
+  render(html`<${Studio} studio=${studio} open=${open} />`, /** @type {Element} */ (document.getElementById("studio")));
+  await studio.act(() => store.start());
+}
+
+start();

@@ -1,0 +1,52 @@
+/** Movement by its key, as the player shows it; what was fetched once is kept as long as there is room. */
+
+import { Body } from "motionmind/body";
+import { Motion } from "motionmind/motion";
+
+const MOST = 48; // movements that are kept, the latest used
+/** @type {Map<string, Promise<any>>} */
+const kept = new Map();
+/** @type {Map<string, {body: Body, colours: object}>} */
+const bodies = new Map(); // bodies are many movements', and what draws them takes a while to make
+
+/**
+ * Fetch a movement: a Motion of the player, with its `key`, its `body` and its `colours`.
+ * @param {{get: (path: string) => Promise<any>}} api
+ * @param {string} key
+ * @returns {Promise<any>}
+ */
+export function movement(api, key) {
+  const known = kept.get(key);
+  kept.delete(key);
+  const found = known ?? api.get(`/api/movements/${path(key)}`).then((/** @type {object} */ data) => playable(data, key));
+  if (!known) found.catch(() => kept.delete(key));
+  kept.set(key, found);
+  if (kept.size > MOST) kept.delete(kept.keys().next().value ?? "");
+  return found;
+}
+
+/** Forget a movement that may have become another, such as a posture that was saved again. */
+export function forget(/** @type {string} */ key) {
+  kept.delete(key);
+}
+
+/**
+ * Make what the server tells of a movement one that plays.
+ * @param {any} data
+ * @param {string} key
+ */
+export function playable(data, key = "") {
+  const about = JSON.stringify([data.skeleton, data.body]);
+  if (!bodies.has(about)) bodies.set(about, { body: new Body(data.skeleton, data.body), colours: data.colours });
+  return Object.assign(new Motion(data), { key }, bodies.get(about));
+}
+
+/** Where a picture of a frame is; a picture is as high as said, for paper as dark as said. */
+export function thumbnail(/** @type {string} */ key, /** @type {number} */ frame, /** @type {boolean} */ dark, height = 96) {
+  return `/api/thumbnails/${path(key)}/${frame}.png?dark=${Number(dark)}&height=${height}`;
+}
+
+/** @param {string} key */
+function path(key) {
+  return key.split("/").map(encodeURIComponent).join("/");
+}

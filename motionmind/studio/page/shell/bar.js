@@ -1,0 +1,109 @@
+/** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
+
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { useChange, useKeys } from "./hooks.js";
+import { icon } from "./icons.js";
+import { shownKeys } from "./keys.js";
+
+/** @param {{studio: any}} props */
+export function Bar({ studio }) {
+  const { store, viewer } = studio;
+  const state = useChange(store, () => store.state);
+  const connected = useChange(store, () => store.connected !== false);
+  const dark = useChange(viewer.theme, () => viewer.theme.dark);
+  const [sheet, setSheet] = useState(false);
+  const undo = () => studio.act(() => studio.api.undo());
+  const redo = () => studio.act(() => studio.api.redo());
+  useKeys(studio, [
+    { keys: ["Ctrl+z"], does: "undo", act: undo },
+    { keys: ["Ctrl+Shift+Z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
+    { keys: ["d"], does: "dark paper, or light", act: () => viewer.theme.toggle() },
+    { keys: ["?", "Shift+?"], shown: ["?"], does: "these keys", act: () => setSheet(true) },
+  ]);
+  return html`<header class="bar">
+    <div class="brand">${icon("brand")}<span>MotionMind</span></div>
+    <${Title} studio=${studio} title=${state?.title ?? ""} />
+    ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
+    <span class="space"></span>
+    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved</span>`}
+    ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
+    <button
+      class="button quiet icon"
+      data-testid="dark"
+      aria-label="Dark paper"
+      aria-pressed=${String(dark)}
+      title="Dark paper, or light (D)"
+      onClick=${() => viewer.theme.toggle()}
+    >
+      ${icon("dark")}
+    </button>
+    <button class="button quiet icon" aria-label="Keys" aria-haspopup="dialog" title="Keys (?)" onClick=${() => setSheet(true)}>
+      ${icon("keys")}
+    </button>
+    ${sheet && html`<${Sheet} studio=${studio} close=${() => setSheet(false)} />`}
+  </header>`;
+}
+
+/** @param {string} name @param {string} label @param {string | null | undefined} what @param {() => void} act */
+function button(name, label, what, act) {
+  const title = what ? `${label}: ${what}` : `Nothing to ${name}`;
+  return html`<button
+    class="button quiet icon"
+    data-testid=${name}
+    aria-label=${what ? `${label}: ${what}` : label}
+    title=${title}
+    disabled=${!what}
+    onClick=${act}
+  >
+    ${icon(name)}
+  </button>`;
+}
+
+/** @param {{studio: any, title: string}} props */
+function Title({ studio, title }) {
+  const [written, write] = useState(title);
+  useEffect(() => {
+    write(title);
+    document.title = title ? `${title} · MotionMind studio` : "MotionMind studio";
+  }, [title]);
+  const save = () => {
+    if (written.trim() && written.trim() !== title) studio.act(() => studio.api.edit({ edit: "title", title: written.trim() }));
+    else write(title);
+  };
+  return html`<input
+    class="field title"
+    data-testid="title"
+    aria-label="Title of the piece"
+    title="Title of the piece"
+    placeholder="Untitled"
+    maxlength="200"
+    value=${written}
+    onInput=${(/** @type {any} */ event) => write(event.target.value)}
+    onBlur=${save}
+    onKeyDown=${(/** @type {any} */ event) => {
+      if (event.key === "Escape") write(title);
+      if (event.key === "Enter" || event.key === "Escape") setTimeout(() => event.target.blur());
+    }}
+  />`;
+}
+
+/** The sheet of keys. @param {{studio: any, close: () => void}} props */
+function Sheet({ studio, close }) {
+  const dialog = useRef(/** @type {any} */ (null));
+  useEffect(() => dialog.current.showModal(), []);
+  return html`<dialog ref=${dialog} class="sheet" data-testid="keys" aria-label="Keys" onClose=${close}>
+    <form method="dialog" class="row">
+      <h2 class="grow">Keys</h2>
+      <button class="button">Close</button>
+    </form>
+    ${[...studio.keys.groups].map(
+      ([group, rows]) => html`<h3>${group}</h3>
+        <dl>
+          ${rows.map(
+            (/** @type {any} */ row) => html`<dt>${shownKeys(row).map((key, i) => html`${i > 0 && " "}<kbd>${key}</kbd>`)}</dt>
+              <dd>${row.does}</dd>`,
+          )}
+        </dl>`,
+    )}
+  </dialog>`;
+}

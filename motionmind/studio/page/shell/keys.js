@@ -1,0 +1,91 @@
+/** Keys of the whole page: one table, by which they act and which the sheet shows. */
+
+import { orbit } from "motionmind/keys";
+
+/**
+ * @typedef {object} Row
+ * @property {string[]} [keys] what `event.key` is, in lower case where it is one letter; with "Ctrl+" and "Shift+" before
+ * @property {string[]} [shown] how they are shown; as `keys` where left out
+ * @property {string} does what they do
+ * @property {string} [group] the heading that they stand under
+ * @property {(event: KeyboardEvent) => unknown} [act] does it; false leaves the key to others
+ */
+
+const SHOWN = /** @type {Record<string, string>} */ ({ " ": "Space", ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓" });
+// What holds the keys that it needs for itself.
+const WRITING = "input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]";
+const PRESSING = "button, summary, a[href], [role=button], [role=tab], [role=option], input";
+
+export class Keys extends EventTarget {
+  constructor() {
+    super();
+    /** @type {Row[]} */
+    this.rows = [];
+    /** @type {() => any} what turns the camera, or undefined */
+    this.controls = () => undefined;
+    document.addEventListener("keydown", (event) => this.#press(event));
+  }
+
+  /**
+   * Add rows; the returned function takes them away again.
+   * @param {Row[]} rows
+   */
+  add(rows) {
+    this.rows = [...this.rows, ...rows];
+    this.dispatchEvent(new Event("change"));
+    return () => {
+      this.rows = this.rows.filter((row) => !rows.includes(row));
+      this.dispatchEvent(new Event("change"));
+    };
+  }
+
+  /** The rows by their headings. */
+  get groups() {
+    /** @type {Map<string, Row[]>} */
+    const groups = new Map();
+    for (const row of this.rows) {
+      const group = row.group ?? "Everywhere";
+      groups.set(group, [...(groups.get(group) ?? []), row]);
+    }
+    return groups;
+  }
+
+  /** @param {KeyboardEvent} event */
+  #press(event) {
+    if (event.defaultPrevented || !(event.target instanceof Element) || event.target.closest("dialog[open]")) return;
+    const name = named(event);
+    if (event.target.closest(WRITING) && !(name.startsWith("Ctrl+") && event.target.matches("select"))) return;
+    if ((name === " " || name === "Enter") && event.target.closest(PRESSING)) return;
+    if (name.startsWith("Arrow") && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
+    const controls = this.controls();
+    if (controls && orbit(event, controls)) return;
+    // What came last is on top.
+    for (const row of [...this.rows].reverse()) {
+      if (row.act && row.keys?.includes(name) && row.act(event) !== false) {
+        event.preventDefault();
+        return;
+      }
+    }
+  }
+}
+
+/** @param {KeyboardEvent} event */
+function named(event) {
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const shift = event.shiftKey && (event.key.length > 1 || event.ctrlKey || event.metaKey || key !== event.key) ? "Shift+" : "";
+  return (event.ctrlKey || event.metaKey ? "Ctrl+" : "") + (event.altKey ? "Alt+" : "") + shift + key;
+}
+
+/**
+ * How a row's keys are shown.
+ * @param {Row} row
+ */
+export function shownKeys(row) {
+  return row.shown ?? (row.keys ?? []).map((key) => key.split("+").map((part) => SHOWN[part] ?? capital(part)).join("+"));
+}
+
+/** @param {string} key */
+function capital(key) {
+  return key.length === 1 ? key.toUpperCase() : key;
+}
+

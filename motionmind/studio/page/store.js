@@ -1,0 +1,91 @@
+/** What the page knows: the project as it stands, what is selected, and the jobs that run. It knows no views. */
+
+import { useChange } from "./shell/hooks.js";
+
+const AGAIN = [500, 1000, 2000, 4000]; // milliseconds until a lost connection is tried again
+const OVER = new Set(["done", "failed", "cancelled"]);
+const REMEMBERED = 50; // jobs that are over
+
+/** Fires "change" whenever something has changed, and "job" with what a job has come to. */
+export class Store extends EventTarget {
+  /** @param {import("./api.js").Api} api */
+  constructor(api) {
+    super();
+    this.api = api;
+    /** @type {any} what GET /api/project gives; null before it is there */
+    this.state = null;
+    /** @type {{block?: string, seam?: [string, string]} | null} */
+    this.selection = null;
+    this.time = 0; // seconds of the piece
+    /** @type {Map<string, any>} */
+    this.jobs = new Map();
+    this.connected = true;
+    this.tries = 0;
+    api.taken = (state) => this.take(state);
+  }
+
+  /** Let this browser in, fetch the project, and listen. */
+  async start() {
+    await this.api.enter();
+    this.#listen();
+    await this.load();
+  }
+
+  /** Fetch the project as it stands. */
+  async load() {
+    this.take(await this.api.get(`/api/project?window=${this.api.window}`));
+  }
+
+  /** Take over a state, unless it is older than the one that is there. @param {any} state */
+  take(state) {
+    if (this.state && state.sequence < this.state.sequence) return;
+    this.set({ state });
+  }
+
+  /** Set some of the fields. @param {object} fields */
+  set(fields) {
+    Object.assign(this, fields);
+    this.dispatchEvent(new Event("change"));
+  }
+
+  #listen() {
+    const source = new EventSource(`/api/events?window=${this.api.window}`);
+    source.addEventListener("open", () => {
+      this.tries = 0;
+      if (!this.connected) this.load().catch(() => {});
+      if (!this.connected) this.set({ connected: true });
+    });
+    source.addEventListener("project", (event) => {
+      const { sequence } = JSON.parse(event.data);
+      if (this.state && sequence > this.state.sequence) this.load().catch(() => {});
+    });
+    source.addEventListener("job", (event) => this.#hear(JSON.parse(event.data)));
+    source.addEventListener("error", () => {
+      source.close();
+      this.set({ connected: false });
+      setTimeout(() => this.#listen(), AGAIN[Math.min(this.tries++, AGAIN.length - 1)]);
+    });
+  }
+
+  /** @param {any} job */
+  #hear(job) {
+    this.jobs = new Map(this.jobs).set(job.id, job);
+    for (const [id, { state }] of this.jobs) {
+      if (this.jobs.size <= REMEMBERED) break;
+      if (OVER.has(state)) this.jobs.delete(id);
+    }
+    this.dispatchEvent(Object.assign(new Event("job"), { job }));
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/**
+ * What `pick` takes from the store; the view is made again when that changes.
+ * @template T
+ * @param {{store: Store}} studio
+ * @param {(store: Store) => T} pick returns something that is the same as long as nothing has changed
+ * @returns {T}
+ */
+export function useStore({ store }, pick) {
+  return useChange(store, () => pick(store));
+}

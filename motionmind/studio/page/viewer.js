@@ -1,0 +1,191 @@
+/** The viewer: a movement, or two beside each other, from where the camera is. It knows no edits. */
+
+import { Player } from "motionmind/player";
+import { Stage } from "motionmind/stage";
+import { Theme } from "motionmind/theme";
+
+const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
+const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // as long as there is nothing to show
+
+/** A stage on a canvas of its own in `half`. @param {HTMLElement} half @param {any} motion @param {() => void} changed */
+function stageIn(half, motion, changed) {
+  const canvas = document.createElement("canvas");
+  canvas.tabIndex = 0;
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", "The body in 3D: drag to turn, scroll to come nearer");
+  half.append(canvas);
+  return new Stage(canvas, motion, motion.body, motion.colours, changed);
+}
+
+/** Fires "show" when another movement is shown, and "change" when something beside the time has changed. */
+export class Viewer extends EventTarget {
+  constructor() {
+    super();
+    this.theme = new Theme();
+    this.player = new Player(/** @type {any} */ (STILL));
+    this.element = made("stage");
+    this.halves = [made("half"), made("half")];
+    this.overlay = made("overlay");
+    this.element.append(this.halves[0], this.overlay);
+    this.title = "";
+    this.ghosts = { ends: true, onion: 0 };
+    this.isHome = true;
+    this.busy = false; // whether a film is made with the stage
+    this.covered = false; // whether something else is shown over it
+    /** @type {any} */
+    this.motion = undefined;
+    /** @type {any} */
+    this.beside = undefined;
+    /** @type {any} */
+    this.piece = undefined;
+    /** @type {any} */
+    this.stage = undefined;
+    /** @type {any} */
+    this.other = undefined;
+    this.fresh = false;
+    this.player.addEventListener("change", () => this.stale());
+    this.theme.addEventListener("change", () => this.#colour());
+    this.last = performance.now();
+    requestAnimationFrame((now) => this.#draw(now));
+  }
+
+  /**
+   * Show the piece, now or when whoever looks at something else comes back.
+   * @param {any} motion
+   * @param {{time?: number}} how
+   */
+  home(motion, { time } = {}) {
+    this.piece = motion;
+    if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: !this.motion });
+  }
+
+  /** Show the piece again. */
+  back() {
+    if (this.piece) this.#take(this.piece, { title: "", home: true, look: true });
+  }
+
+  /**
+   * Show a movement that is not the piece.
+   * @param {any} motion a Motion, or what has its interface, with `body` and `colours`
+   * @param {{time?: number, beside?: any, title?: string, play?: boolean, look?: boolean}} how
+   */
+  show(motion, { time, beside, title = "", play = false, look = true } = {}) {
+    this.#take(motion, { time, beside, title, look, home: false });
+    if (play && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
+  }
+
+  /** Have another picture drawn. */
+  stale() {
+    this.fresh = false;
+  }
+
+  /** Look from "front", "side", "top" or "quarter". @param {string} from */
+  look(from) {
+    this.stage?.look(from);
+    this.other?.look(from);
+    this.stale();
+  }
+
+  /** Where what is shown now comes from: a movement's key and frame; null where that is not known. */
+  get moment() {
+    const { motion, player } = this;
+    if (!motion) return null;
+    if (motion.placeAt) return motion.placeAt(player.time);
+    return motion.key ? { key: motion.key, frame: player.frame } : null;
+  }
+
+  /** @param {any} motion @param {{time?: number, beside?: any, title: string, look: boolean, home: boolean}} how */
+  #take(motion, { time, beside, title, look, home }) {
+    Object.assign(this, { motion, beside, title, isHome: home });
+    try {
+      this.#stages(look);
+    } catch (error) {
+      this.#fail(error);
+    }
+    this.player.motion = longer(motion, beside);
+    this.player.seek(time ?? this.player.time);
+    this.stale();
+    this.dispatchEvent(new Event("show"));
+  }
+
+  /** @param {boolean} look */
+  #stages(look) {
+    const { motion, beside } = this;
+    this.element.classList.toggle("two", Boolean(beside));
+    if (beside && !this.halves[1].isConnected) this.halves[0].after(this.halves[1]);
+    this.halves[1].hidden = !beside;
+    if (!this.stage) this.stage = this.#stage(this.halves[0], motion);
+    else this.stage.take(motion, motion.body, motion.colours);
+    if (beside && !this.other) this.other = this.#stage(this.halves[1], beside);
+    else if (beside) this.other.take(beside, beside.body, beside.colours);
+    if (look) this.look(this.stage.view ?? "quarter");
+  }
+
+  /** @param {HTMLElement} half @param {any} motion */
+  #stage(half, motion) {
+    /** @type {any} */
+    let stage; // which tells of changes before it is there
+    const changed = () => {
+      this.#follow(stage);
+      this.stale();
+    };
+    stage = stageIn(half, motion, changed);
+    stage.dark = this.theme.dark;
+    return stage;
+  }
+
+  /** Let both cameras be one. @param {any} stage the one that was turned */
+  #follow(stage) {
+    const other = stage === this.stage ? this.other : this.stage;
+    if (!this.beside || !other || !stage?.dragged) return;
+    other.view = undefined;
+    other.camera.position.copy(stage.camera.position);
+    other.controls.target.copy(stage.controls.target);
+    other.controls.update();
+  }
+
+  /** @param {unknown} error */
+  #fail(error) {
+    if (this.element.querySelector(".message")) return;
+    console.warn(error);
+    const message = made("message empty");
+    message.setAttribute("role", "alert");
+    message.textContent =
+      "This browser shows no 3D pictures (WebGL 2 is not available). Turn on hardware acceleration in its settings, or " +
+      "open the studio in another browser.";
+    this.element.append(message);
+  }
+
+  #colour() {
+    for (const stage of [this.stage, this.other]) if (stage) stage.dark = this.theme.dark;
+    this.stale();
+  }
+
+  /** @param {number} now */
+  #draw(now) {
+    this.player.advance(Math.min((now - this.last) / 1000, LONGEST));
+    this.last = now;
+    if (!this.fresh && this.stage && !this.busy && !this.covered) {
+      this.fresh = true;
+      this.stage.show(this.player.time, this.ghosts);
+      this.stage.render(this.player.playing);
+      if (this.beside) {
+        this.other.show(this.player.time, this.ghosts);
+        this.other.render(this.player.playing);
+      }
+      this.dispatchEvent(new Event("draw"));
+    }
+    requestAnimationFrame((next) => this.#draw(next));
+  }
+}
+
+/** @param {string} name */
+function made(name) {
+  return Object.assign(document.createElement("div"), { className: name });
+}
+
+/** @param {any} one @param {any} other */
+function longer(one, other) {
+  return other && other.end - other.start > one.end - one.start ? other : one;
+}
+
