@@ -87,7 +87,8 @@ class _Search:
         """Take in one that was found, and return it as the page sees it."""
         self.found.append(found)
         motion, said = found
-        return {"number": len(self.found), "seconds": _seconds(motion)} | msgspec.to_builtins(said)
+        shown: dict[str, Any] = msgspec.to_builtins(said)
+        return shown | {"number": len(self.found), "seconds": _seconds(motion)}
 
 
 class _Desk:
