@@ -5,7 +5,7 @@ import { html } from "../vendor/htm-preact-standalone.js";
 const HOW = /** @type {Record<string, string>} */ ({
   waits: "waits",
   new: "moves as in no clip",
-  between: "moves between what was seen",
+  between: "goes smoothly between what was seen",
 });
 
 /** A joint's name in words. @param {string} name */
