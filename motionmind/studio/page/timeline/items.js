@@ -22,7 +22,7 @@ export function selected(piece, selection) {
     return block && { block };
   }
   if (selection?.seam) {
-    const { left, right } = selection.seam;
+    const [left, right] = selection.seam;
     const seam = piece.seams.find((one) => one.left === left && one.right === right);
     return seam && { seam };
   }
@@ -31,13 +31,13 @@ export function selected(piece, selection) {
 
 /** The selection that names an item. @param {Item} item */
 export function selectionOf({ block, seam }) {
-  return block ? { block: block.id } : { seam: { left: seam.left, right: seam.right } };
+  return block ? { block: block.id } : { seam: [seam.left, seam.right] };
 }
 
 /** A text that names a selection; the same for the same. */
 export function nameOf(selection) {
   if (selection?.block) return `block ${selection.block}`;
-  return selection?.seam ? `seam ${selection.seam.left} ${selection.seam.right}` : "";
+  return selection?.seam ? `seam ${selection.seam.join(" ")}` : "";
 }
 
 /** Whether a seam is worth a stop: what goes on as recorded is not. @param {Seam} seam */

@@ -20,6 +20,7 @@ export const KEYS = [
   ["Backspace", "", "", "", (does) => does.remove()],
   ["l", "", "L", "lock or unlock the insertion", (does) => does.lock()],
   ["w", "", "W", "what the insertion is to be: length, postures, hands and feet", (does) => does.show({ sheet: true })],
+  ["Escape", "", "", "", (does) => does.show({ sheet: false })],
   ["+", "", "+ −", "zoom", (does) => does.zoomIn()],
   ["=", "", "", "", (does) => does.zoomIn()],
   ["-", "", "", "", (does) => does.zoomOut()],

@@ -1,7 +1,7 @@
 /** The line of time below the viewer: the piece's stretches, what lies at its seams, and what is wished there. */
 
 import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
-import { movement } from "../movements.js";
+import { movement, thumbnail } from "../movements.js";
 import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
 import { Composed, Movements } from "./composed.js";
@@ -14,6 +14,9 @@ import { WishSheet } from "./wishes.js";
 
 const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
 const TEMPO = "motionmind-tempo"; // where this browser keeps it
+const HEIGHT = 48; // pixels of a thumbnail
+/** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
+const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
 const LIMBS = /(wrist|hand|ankle|foot)$/;
 
 export function Panel({ studio }) {
@@ -36,7 +39,8 @@ export function Panel({ studio }) {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
   useEffect(() => setStopped(false), [piece.blocks]);
-  const thumbnail = useThumbnails(studio);
+  useEffect(() => studio.keys.add(ROWS), [studio]);
+  const picture = useThumbnails(studio);
   const seam = selected(piece, selection)?.seam;
   const joints = (does.movements.at(piece.parts[0]?.key)?.joints ?? []).filter((name) => LIMBS.test(name));
   return html`<section
@@ -44,7 +48,7 @@ export function Panel({ studio }) {
     data-testid="timeline"
     aria-label="Time line"
     onKeyDown=${(event) => {
-      if (!event.defaultPrevented && !event.target.closest("input, select, textarea, [role=slider]")) act(event, KEYS, does);
+      if (!event.defaultPrevented && !kept(event)) act(event, KEYS, does);
     }}
   >
     <${Toolbar}
@@ -63,7 +67,7 @@ export function Panel({ studio }) {
       }}
       sheet=${sight.sheet}
     />
-    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} tempo=${tempo} thumbnail=${thumbnail} />
+    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} tempo=${tempo} thumbnail=${picture} />
     ${sight.sheet &&
     seam &&
     html`<${WishSheet}
@@ -72,13 +76,18 @@ export function Panel({ studio }) {
       studio=${studio}
       seam=${seam}
       joints=${joints}
-      thumbnail=${thumbnail}
+      thumbnail=${picture}
       onClose=${() => {
         show({ sheet: false });
         does.focused = true;
       }}
     />`}
   </section>`;
+}
+
+/** Whether a key is for what has the focus. */
+function kept({ key, target }) {
+  return target.closest("input, select, [role=slider], [role=dialog]") || (key === "Enter" && target.closest("button"));
 }
 
 /** What is in sight with a change; the same object if nothing is different. */
@@ -119,8 +128,7 @@ function useThumbnails(studio) {
     return () => theme?.removeEventListener("change", change);
   }, [studio]);
   return useMemo(
-    () => (key, frame) =>
-      `/api/thumbnails/${key.split("/").map(encodeURIComponent).join("/")}/${frame}.png?height=48&dark=${Number(dark)}`,
+    () => (key, frame) => thumbnail(key, frame, dark, HEIGHT),
     [dark],
   );
 }

@@ -91,7 +91,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
           <option value="">a posture…</option>
           ${postures.map(({ key, name }) => html`<option key=${key} value=${key}>${name}</option>`)}
         </select>
-        <button class="button" data-testid="wish-posture-add" disabled=${!posture || locked} onClick=${addPosture}>Pass</button>
+        <button class="button" data-testid="wish-posture-add" disabled=${locked} onClick=${addPosture}>Pass</button>
       </div>
     </div>
     <div class="stack">
@@ -133,7 +133,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         >
           ${Object.entries(HOLDS).map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}
         </select>
-        <button class="button" data-testid="wish-pin-add" disabled=${!joint || locked} onClick=${addPin}>Pin</button>
+        <button class="button" data-testid="wish-pin-add" disabled=${locked} onClick=${addPin}>Pin</button>
       </div>
     </div>
   </section>`;
