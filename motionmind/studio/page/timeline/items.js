@@ -120,8 +120,9 @@ export function trim(block, side, frame) {
 
 /** Cut a block at a time; null if the time is not within it. @param {Block} block */
 export function split(block, time, times, id) {
-  const at = frameAt(block, time, times);
-  return at > block.first && at <= block.last ? { edit: "split", block: block.id, at, id } : null;
+  const within = time > block.at && time < block.at + block.seconds;
+  const at = Math.min(Math.max(frameAt(block, time, times), block.first + 1), block.last);
+  return within ? { edit: "split", block: block.id, at, id } : null;
 }
 
 /** Ask for something else at a seam. @param {Seam} seam @param {Partial<Ask>} change */
