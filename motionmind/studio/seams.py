@@ -1,6 +1,6 @@
 """The seams of a piece, judged and smoothed in the background: after each edit, the newest seams first.
 
-What is found is a fact and is kept under its question, so nothing is asked twice, whatever is taken back and done again.
+What is found is a fact, kept under its question: nothing is asked twice, whatever is taken back and done again.
 """
 
 from __future__ import annotations
