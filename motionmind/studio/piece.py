@@ -1,14 +1,14 @@
 """The state of a project that its edits lead to: blocks in their order, and what is wished and decided at the seams.
 
 Everything here is pure: `apply` leads from one state to the next and changes nothing, so the state is that of the edits
-that are not undone, applied in their order. Whether movements exist and are long enough is another question (`check`),
-asked once, when an edit comes in.
+that are not undone, applied in their order. Whether movements exist and are long enough is asked once, when an edit
+comes in (`motionmind.studio.checks`).
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from itertools import pairwise
@@ -372,37 +372,6 @@ def _saved(state: State, name: str, posture: str | None) -> State:
     elif postures.pop(name, None) is None:
         raise MotionMindError(f"no posture is saved as {displayed(name)}")
     return replace(state, postures=postures)
-
-
-def check(state: State, edit: Edit, frames: Callable[[str], int]) -> None:
-    """Check that the movements which an edit names exist and are long enough.
-
-    Args:
-        state: the state that the edit leads to.
-        edit: the edit.
-        frames: returns the number of frames of the movement of a key; MotionMindError if there is none.
-
-    Raises:
-        MotionMindError: one does not.
-    """
-    for one in each(edit):
-        match one:
-            case Insert(id=name) | Trim(block=name) if name in state.used:
-                blocks = [block for block in state.blocks if block.id == name]
-            case Arrange(blocks=blocks):
-                pass
-            case Wish(passing=passing):
-                blocks = [Block("passing", state.stable(at.posture), at.frame, at.frame) for at in passing]
-            case SavePosture(posture=str(posture)):
-                blocks = [Block("posture", posture, 0, 0)]
-            case _:
-                continue
-        for block in blocks:
-            count = frames(key_of(block))
-            if block.last >= count:
-                raise MotionMindError(
-                    f"{displayed(block.source)} has frames 0 to {count - 1}, no frame {block.last}: end sooner"
-                )
 
 
 def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[str, str]) -> str:

@@ -12,6 +12,7 @@ import msgspec
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
 from motionmind.studio import piece
+from motionmind.studio.checks import check_movements
 from motionmind.studio.edits import Edit, touched, words_of
 from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
@@ -187,7 +188,7 @@ class Project:
         self.greet(window)
         try:
             state = piece.apply(self.state, edit)
-            piece.check(state, edit, self.marks.length)
+            check_movements(state, edit, self.marks.length)
         except MotionMindError as error:
             raise RefusedError(str(error)) from error
         self._note_versions(state)

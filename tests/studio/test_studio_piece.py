@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from motionmind.errors import MotionMindError
 from motionmind.studio import edits as e
-from motionmind.studio.piece import State, Verdict, apply, apply_all, check, question_of
+from motionmind.studio.checks import check_movements
+from motionmind.studio.piece import State, Verdict, apply, apply_all, question_of
 
 IDS = [f"b{number}" for number in range(8)]
 FRAMES = st.integers(0, 12)
@@ -187,10 +188,10 @@ def test_an_edit_names_movement_that_is_there_and_long_enough():
         e.Several((e.Mirror("b1"), e.Insert("n", "karate/kata", 0, 10))),
     ]
     for edit in good:
-        check(apply(BEGIN, edit), edit, frames)
+        check_movements(apply(BEGIN, edit), edit, frames)
     for edit in bad:
         with pytest.raises(MotionMindError, match=r"has frames 0 to 9|no movement"):
-            check(apply(BEGIN, edit), edit, frames)
+            check_movements(apply(BEGIN, edit), edit, frames)
 
 
 def test_a_locked_insertion_changes_only_when_it_is_unlocked():

@@ -105,7 +105,7 @@ function unpacked(words) {
 }
 
 /** Put the rotation a `share` of the way from `from[a..]` to `from[b..]`, the short way round, into `out[at..]`. */
-function slerp(out, at, from, a, b, share) {
+export function slerp(out, at, from, a, b, share) {
   const cosine = from[a] * from[b] + from[a + 1] * from[b + 1] + from[a + 2] * from[b + 2] + from[a + 3] * from[b + 3];
   const angle = Math.acos(Math.min(Math.abs(cosine), 1));
   // Of a small angle a straight line is as good, and is divided by no sine.

@@ -1,0 +1,154 @@
+/** Stretches on their track, and the marks of seams on theirs: what is in sight of them. */
+
+import { html } from "../vendor/htm-preact-standalone.js";
+import { trimmed } from "./gestures.js";
+import { inSight, nameOf, selectionOf, shown } from "./items.js";
+import { clock } from "./scale.js";
+
+const LEAST = 28; // pixels of a held posture, which takes no time
+const ROOM = 300; // pixels beside what is in sight that are there already
+
+/** A word and a sign for each state of a seam; its pattern is in timeline.css. */
+const STATES = {
+  smooth: ["~", "goes over smoothly"],
+  abrupt: ["!", "abrupt, being smoothed"],
+  waiting: ["…", "not looked at yet"],
+  inserted: ["", "insertion"],
+  discarded: ["×", "insertion left out"],
+  "none found": ["?", "abrupt, and nothing found"],
+};
+
+/** The stretches. @param {{does: any, piece: any, sight: any, draft: any, selection: any, thumbnail: any}} props */
+export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
+  const { blocks } = piece;
+  const [first, stop] = seen(blocks, sight);
+  const chosen = nameOf(selection);
+  const stops = chosen.startsWith("block") ? chosen : `block ${blocks[first]?.id}`;
+  return html`<div class="track stretches" role="listbox" aria-label="Stretches" aria-orientation="horizontal">
+    ${blocks.slice(first, stop).map((block, i) => {
+      const name = `block ${block.id}`;
+      const mine = draft?.id === block.id ? draft : null;
+      const change = mine?.kind === "trim" ? trimmed(block, mine, does.times(block)) : null;
+      const held = block.first === block.last;
+      const width = held ? LEAST : (change?.seconds ?? block.seconds) * sight.scale;
+      const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? LEAST / 2 : 0);
+      const classes = ["stretch", held && "held", block.mirrored && "mirrored", mine?.kind === "move" && "moving"];
+      return html`<div
+        key=${block.id}
+        class=${classes.filter(Boolean).join(" ")}
+        role="option"
+        data-testid=${`block-${block.id}`}
+        data-block=${block.id}
+        aria-selected=${chosen === name}
+        aria-posinset=${first + i + 1}
+        aria-setsize=${blocks.length}
+        aria-label=${labelOf(block)}
+        title=${labelOf(block)}
+        tabindex=${stops === name ? 0 : -1}
+        style=${{
+          left: `${left}px`,
+          width: `${Math.max(width, 6)}px`,
+          transform: mine?.kind === "move" ? `translateX(${mine.by}px)` : "",
+        }}
+      >
+        ${width > 18 && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
+        ${width > 70 && html`<span class="name cut">${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
+        ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
+      </div>`;
+    })}
+    ${draft?.kind === "move" &&
+    html`<div class="landing" aria-hidden="true" style=${{ left: `${landing(piece, draft) * sight.scale}px` }}></div>`}
+  </div>`;
+}
+
+/** The seams: insertions as long as they last, and a mark where there is none. */
+export function Seams({ does, piece, sight, draft, selection }) {
+  const [first, stop] = seen(piece.seams, sight);
+  const chosen = nameOf(selection);
+  const there = piece.seams.slice(first, stop).filter(shown);
+  const stops = chosen.startsWith("seam") ? chosen : there[0] && nameOf(selectionOf({ seam: there[0] }));
+  return html`<div class="track seams" role="listbox" aria-label="Seams and insertions" aria-orientation="horizontal">
+    ${there.map((seam) => {
+      const name = nameOf(selectionOf({ seam }));
+      const mine = draft?.kind === "last" && draft.left === seam.left && draft.right === seam.right ? draft : null;
+      const [sign, word] = STATES[seam.state];
+      const inserted = seam.state === "inserted";
+      const width = inserted ? (mine?.seconds ?? seam.seconds) * sight.scale : LEAST;
+      const left = inserted ? seam.at * sight.scale : (seam.at + seam.seconds / 2) * sight.scale - LEAST / 2;
+      const locked = seam.decision === "locked";
+      return html`<div
+        key=${name}
+        class=${`seam ${seam.state.replace(" ", "-")}${locked ? " locked" : ""}`}
+        role="option"
+        data-testid=${`insertion-${seam.number}`}
+        data-state=${seam.state}
+        data-left=${seam.left}
+        data-right=${seam.right}
+        aria-selected=${chosen === name}
+        aria-posinset=${seam.number}
+        aria-setsize=${piece.seams.length}
+        aria-label=${sayOf(seam, word)}
+        title=${sayOf(seam, word)}
+        tabindex=${stops === name ? 0 : -1}
+        style=${{ left: `${left}px`, width: `${Math.max(width, 8)}px` }}
+      >
+        ${locked && width > 40 && html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M4 7h8v6H4zM6 7V5a2 2 0 0 1 4 0v2" /></svg>`}
+        ${inserted
+          ? width > 64 && html`<span class="numbers">${seam.chosen}/${seam.alternatives.length}</span>`
+          : html`<b aria-hidden="true">${sign}</b>`}
+        ${inserted && !locked && html`<i class="edge last" data-edge="last"></i>`}
+      </div>`;
+    })}
+  </div>`;
+}
+
+/** What is wished of insertions: postures to pass, hands and feet that stay. */
+export function Wishes({ piece, sight, thumbnail }) {
+  const [first, stop] = seen(piece.seams, sight);
+  const wished = piece.seams.slice(first, stop).filter(({ ask }) => ask.passing.length + ask.pins.length > 0);
+  return html`<div class="track wishes" aria-hidden="true">
+    ${wished.map((seam) => {
+      const { passing, pins } = seam.ask;
+      const middle = seam.at + seam.seconds / 2;
+      return html`<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${middle * sight.scale}px` }}>
+        ${passing.map(({ posture, frame }) => html`<img alt="" class="passing" src=${thumbnail(posture, frame)} />`)}
+        ${pins.map(({ joint }) => html`<span class="pin" title=${plain(joint)}>
+          <svg viewBox="0 0 16 16"><path d="M8 9v5M5 2h6l-1 4 2 3H4l2-3z" /></svg>${plain(joint)}
+        </span>`)}
+      </div>`;
+    })}
+  </div>`;
+}
+
+/** The numbers of those items that are in sight, or nearly. */
+function seen(items, { scale, left, width }) {
+  return inSight(items, (left - ROOM) / scale, (left + width + ROOM) / scale);
+}
+
+/** When a stretch that is dragged will begin, about. */
+function landing({ blocks, seconds }, { id, place }) {
+  const rest = blocks.filter((block) => block.id !== id);
+  if (place < rest.length) return rest[place].at;
+  return seconds;
+}
+
+function labelOf({ title, mirrored, at, seconds, first, last }) {
+  const long = first === last ? "a posture" : `${clock(seconds)} seconds`;
+  return `${title}, ${long}${mirrored ? ", mirrored" : ""}, from ${clock(at)}`;
+}
+
+function sayOf(seam, word) {
+  const chosen = seam.alternatives[seam.chosen - 1];
+  const said = [`Seam ${seam.number}: ${word}`];
+  if (seam.state === "inserted") {
+    said.push(`${seam.chosen} of ${seam.alternatives.length}, ${clock(seam.seconds)} seconds`);
+    if (seam.decision === "locked") said.push("locked");
+    said.push(chosen.words);
+  } else if (seam.words) said.push(seam.words);
+  return said.join(", ");
+}
+
+/** A joint's name in words. */
+export function plain(joint) {
+  return joint.replaceAll("_", " ");
+}

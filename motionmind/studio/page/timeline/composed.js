@@ -1,0 +1,201 @@
+/** A piece as a motion: made of parts that the server placed, of movements that are loaded when they are first needed. */
+
+import { MOMENT, slerp } from "motionmind/motion";
+
+/**
+ * @typedef {{key: string, first: number, last: number, at: number, seconds: number, place: [number, number],
+ *   turn: number, inserted: boolean}} Part
+ */
+
+/** Movements by key, at hand once they have come. */
+export class Movements {
+  /** @param {(key: string) => Promise<any>} fetch a movement: the player's Motion, with its `body` and `colours` */
+  constructor(fetch) {
+    this.fetch = fetch;
+    /** @type {Map<string, any>} */
+    this.here = new Map();
+  }
+
+  /** The movement, if it has come. @param {string} key */
+  at(key) {
+    return this.here.get(key);
+  }
+
+  /** @param {string} key */
+  async load(key) {
+    const known = this.here.get(key);
+    if (known) return known;
+    const motion = await this.fetch(key);
+    this.here.set(key, motion);
+    return motion;
+  }
+
+  /** Forget all but the movements that some parts show. @param {Iterable<string>} keys */
+  keep(keys) {
+    const wanted = new Set(keys);
+    for (const key of this.here.keys()) if (!wanted.has(key)) this.here.delete(key);
+  }
+}
+
+/** Has the interface of the player's Motion. Where a movement has not come yet, the body stays as it was. */
+export class Composed {
+  /**
+   * @param {Part[]} parts in order, at least one; the movement of the first has come
+   * @param {Movements} movements
+   * @param {string} name
+   */
+  constructor(parts, movements, name) {
+    this.parts = parts;
+    this.movements = movements;
+    this.name = name;
+    this.first = 0;
+    ({ joints: this.joints, body: this.body, colours: this.colours } = movements.at(parts[0].key));
+    this.#count();
+    const size = this.joints.length * 4;
+    this.beside = [0, 1].map(() => ({ rotations: new Float64Array(size), root: new Float64Array(3) }));
+  }
+
+  get length() {
+    return this.times.length;
+  }
+
+  get start() {
+    return 0;
+  }
+
+  get end() {
+    return this.times[this.length - 1];
+  }
+
+  /** Load the movements of all parts; those that are played first come first. */
+  async load() {
+    const keys = [...new Set(this.parts.map(({ key }) => key))];
+    for (let i = 0; i < keys.length; i += 8) {
+      await Promise.allSettled(keys.slice(i, i + 8).map((key) => this.movements.load(key)));
+    }
+    this.#count();
+  }
+
+  /** Number the frames, and place the insertions' marks; frames that have not come are taken as even. */
+  #count() {
+    const times = [];
+    this.starts = this.parts.map(({ at }) => at);
+    this.insertions = [];
+    for (const part of this.parts) {
+      const motion = this.movements.at(part.key);
+      const clock = part.at - (motion?.times[part.first] ?? 0);
+      const steps = Math.max(part.last - part.first, 1);
+      for (let frame = part.first; frame <= part.last; frame++) {
+        times.push(motion ? motion.times[frame] + clock : part.at + (part.seconds * (frame - part.first)) / steps);
+      }
+      if (!part.inserted) continue;
+      const marks = motion?.insertions.length ? motion.insertions : [{ times: [0, part.seconds], bridged: [] }];
+      const own = motion?.insertions.length ? clock : part.at;
+      for (const mark of marks) this.insertions.push({ ...mark, times: mark.times.map((time) => time + own) });
+    }
+    this.times = Float64Array.from(times);
+    this.farthest = [];
+  }
+
+  /** The last part that begins no later than `time`; the first if none does. @param {number} time */
+  partAt(time) {
+    return lastBefore(this.starts, time);
+  }
+
+  /** The last frame that is not after `time`; the first if all are. @param {number} time */
+  frameAt(time) {
+    return lastBefore(this.times, time);
+  }
+
+  /** Put the posture at `time` into `rotations` [J * 4] and `root` [3]. */
+  sample(time, rotations, root) {
+    const index = this.partAt(time);
+    const part = this.parts[index];
+    const next = this.parts[index + 1];
+    const over = time - part.at - part.seconds;
+    if (over <= MOMENT || !next || !this.movements.at(next.key)) {
+      this.#sampleWithin(part, time, rotations, root);
+      return;
+    }
+    // Between two parts nothing is inserted: straight from one posture to the other.
+    const [from, to] = this.beside;
+    this.#sampleWithin(part, part.at + part.seconds, from.rotations, from.root);
+    this.#sampleWithin(next, next.at, to.rotations, to.root);
+    const share = Math.min(over / (next.at - part.at - part.seconds), 1);
+    for (let i = 0; i < 3; i++) root[i] = from.root[i] * (1 - share) + to.root[i] * share;
+    for (let i = 0; i < rotations.length; i += 4) slerp(rotations, i, from.rotations, i, to.rotations, i, share);
+  }
+
+  #sampleWithin(part, time, rotations, root) {
+    const motion = this.movements.at(part.key);
+    if (!motion) return;
+    const begin = motion.times[part.first];
+    const own = Math.min(begin + Math.max(time - part.at, 0), motion.times[part.last]);
+    motion.sample(own, rotations, root);
+    place(part, rotations, root);
+  }
+
+  /** The movement and the frame that are nearest to `time`. */
+  placeAt(time) {
+    const { key, first, last, at } = this.parts[this.partAt(time)];
+    const times = this.movements.at(key)?.times;
+    if (!times) return null;
+    const wanted = times[first] + time - at;
+    const frame = lastBefore(times, wanted);
+    const nearer = frame < last && times[frame + 1] - wanted < wanted - times[frame] ? frame + 1 : frame;
+    return { key, frame: Math.min(nearer, last) };
+  }
+
+  /** The insertion from whose A to whose B `time` is, or undefined. */
+  insertionAt(time) {
+    const index = lastBefore(this.insertions, time, ({ times }) => times[0]);
+    const mark = this.insertions[index];
+    return mark && mark.times[0] - MOMENT <= time && time <= mark.times.at(-1) + MOMENT ? mark : undefined;
+  }
+
+  /** When those of an insertion's A and B are that the piece holds. */
+  ends({ times }) {
+    return [times[0], times.at(-1)];
+  }
+
+  /** Whether the engine made the posture at `time`. */
+  insertedAt(time) {
+    const times = this.insertionAt(time)?.times;
+    return Boolean(times) && times[0] + MOMENT < time && time < times.at(-1) - MOMENT;
+  }
+
+  /** The joints that are, at `time`, amid a move that no corpus attests. */
+  bridgedAt(time) {
+    const mark = this.insertedAt(time) && this.insertionAt(time);
+    if (!mark) return [];
+    const { times, bridged } = mark;
+    const now = bridged.filter(({ move }) => times[move] - MOMENT < time && time < times[move + 1] + MOMENT);
+    return [...new Set(now.map(({ joint }) => joint))];
+  }
+}
+
+/** Turn a posture about the vertical and move it over the floor, as its part says. */
+function place({ turn, place: [dx, dz] }, rotations, root) {
+  const [sine, cosine] = [Math.sin(turn), Math.cos(turn)];
+  const [x, z] = [root[0], root[2]];
+  root[0] = x * cosine + z * sine + dx;
+  root[2] = z * cosine - x * sine + dz;
+  const [sy, cy] = [Math.sin(turn / 2), Math.cos(turn / 2)];
+  const [qx, qy, qz, qw] = rotations;
+  rotations[0] = cy * qx + sy * qz;
+  rotations[1] = cy * qy + sy * qw;
+  rotations[2] = cy * qz - sy * qx;
+  rotations[3] = cy * qw - sy * qy;
+}
+
+/** The index of the last of ordered `values` that is no more than `time`; 0 if none is. */
+export function lastBefore(values, time, of = (value) => value) {
+  let low = 0;
+  let high = values.length;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (of(values[middle]) <= time + MOMENT) low = middle;
+    else high = middle;
+  }
+  return low;
+}

@@ -1,0 +1,155 @@
+/** What lies on the line: stretches and seams in the order in which they come, and the edits that gestures mean. */
+
+import { lastBefore } from "./composed.js";
+
+/**
+ * @typedef {{posture: string, frame: number}} Passing
+ * @typedef {{joint: string, hold: "start"|"end"|"throughout"}} Pin
+ * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[]}} Ask
+ * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, key: string, title: string,
+ *   frames: number, at: number, seconds: number}} Block
+ * @typedef {{left: string, right: string, number: number, state: string, words: string, chosen: number,
+ *   alternatives: {key: string, seconds: number, words: string}[], decision: string, ask: Ask, at: number,
+ *   seconds: number}} Seam
+ * @typedef {{block?: Block, seam?: Seam}} Item
+ * @typedef {{blocks: Block[], seams: Seam[], parts: object[], seconds: number}} Piece
+ */
+
+/** The item that a selection names, or undefined. @param {Piece} piece */
+export function selected(piece, selection) {
+  if (selection?.block) {
+    const block = piece.blocks.find(({ id }) => id === selection.block);
+    return block && { block };
+  }
+  if (selection?.seam) {
+    const [left, right] = selection.seam;
+    const seam = piece.seams.find((one) => one.left === left && one.right === right);
+    return seam && { seam };
+  }
+  return undefined;
+}
+
+/** The selection that names an item. @param {Item} item */
+export function selectionOf({ block, seam }) {
+  return block ? { block: block.id } : { seam: [seam.left, seam.right] };
+}
+
+/** A text that names a selection; the same for the same. */
+export function nameOf(selection) {
+  if (selection?.block) return `block ${selection.block}`;
+  return selection?.seam ? `seam ${selection.seam.join(" ")}` : "";
+}
+
+/** Whether a seam is worth a stop: what goes on as recorded is not. @param {Seam} seam */
+export function shown(seam) {
+  return seam.words !== "goes on as recorded";
+}
+
+/** The item `by` places on from the selected one. @param {Piece} piece */
+export function neighbour(piece, selection, by) {
+  const items = [];
+  piece.blocks.forEach((block, i) => {
+    items.push({ block });
+    const seam = piece.seams[i];
+    if (seam && shown(seam)) items.push({ seam });
+  });
+  const name = nameOf(selection);
+  const at = items.findIndex((item) => nameOf(selectionOf(item)) === name);
+  if (at < 0) return by > 0 ? items[0] : items.at(-1);
+  return items[Math.min(Math.max(at + by, 0), items.length - 1)];
+}
+
+/** Those of ordered items that touch the time from `from` to `to`: [index of the first, index after the last]. */
+export function inSight(items, from, to) {
+  if (items.length === 0) return [0, 0];
+  const start = (item) => item.at;
+  let first = lastBefore(items, from, start);
+  // An item begins no later than the one before it ends, but a held posture is drawn wider than it is.
+  while (first > 0 && items[first].at + items[first].seconds >= from) first--;
+  return [first, Math.min(lastBefore(items, to, start) + 1, items.length)];
+}
+
+let made = 0;
+
+/** An id that no block has. @param {string} window this window's name */
+export function newId(window) {
+  made += 1;
+  return `${window}.${Date.now().toString(36)}.${made}`.slice(-40);
+}
+
+/** Put a copy of a block after it. @param {Piece} piece @param {Block} block */
+export function duplicate(piece, block, id) {
+  const { source, first, last, mirrored } = block;
+  const after = piece.blocks[piece.blocks.findIndex((one) => one.id === block.id) + 1];
+  return { edit: "insert", id, source, first, last, mirrored, before: after?.id ?? null };
+}
+
+/** Move a block so that it comes to the place `to` of the others; null if it stands there. @param {Piece} piece */
+export function move(piece, block, to) {
+  const rest = piece.blocks.filter((one) => one.id !== block.id);
+  const at = piece.blocks.findIndex((one) => one.id === block.id);
+  const place = Math.min(Math.max(to, 0), rest.length);
+  if (place === at) return null;
+  return { edit: "move", block: block.id, before: rest[place]?.id ?? null };
+}
+
+/** The place among the others where a block that is dropped at `time` comes. @param {Piece} piece */
+export function placeAt(piece, time, without) {
+  return piece.blocks.filter(({ id, at, seconds }) => id !== without && at + seconds / 2 < time).length;
+}
+
+/** The frame of a block that shows at `time`. @param {Block} block @param {Float64Array|undefined} times its movement's */
+export function frameAt(block, time, times) {
+  if (times) {
+    const own = lastBefore(times, times[block.first] + time - block.at);
+    const later = Math.min(own + 1, times.length - 1);
+    const wanted = times[block.first] + time - block.at;
+    return Math.abs(times[later] - wanted) < Math.abs(times[own] - wanted) ? later : own;
+  }
+  const rate = (block.last - block.first) / Math.max(block.seconds, 1e-6);
+  return Math.min(Math.max(Math.round(block.first + (time - block.at) * rate), 0), block.frames - 1);
+}
+
+/** Let a block begin or end with another frame; null if it does. @param {Block} block */
+export function trim(block, side, frame) {
+  const { id, first, last, frames } = block;
+  const to = side === "first" ? Math.min(Math.max(frame, 0), last) : Math.min(Math.max(frame, first), frames - 1);
+  if (to === block[side]) return null;
+  return { edit: "trim", block: id, first, last, [side]: to };
+}
+
+/** Cut a block at a time; null if the time is not within it. @param {Block} block */
+export function split(block, time, times, id) {
+  const within = time > block.at && time < block.at + block.seconds;
+  const at = Math.min(Math.max(frameAt(block, time, times), block.first + 1), block.last);
+  return within ? { edit: "split", block: block.id, at, id } : null;
+}
+
+/** Ask for something else at a seam. @param {Seam} seam @param {Partial<Ask>} change */
+export function wish({ left, right, ask }, change) {
+  return { edit: "ask", left, right, ...ask, ...change };
+}
+
+/** Let a seam's insertion pass through a posture too, at a share of its way. @param {Seam} seam */
+export function pass(seam, posture, share = 1) {
+  const passing = [...seam.ask.passing];
+  passing.splice(Math.round(share * passing.length), 0, posture);
+  return wish(seam, { passing });
+}
+
+/** Show the alternative `by` places on; null if there is no other. @param {Seam} seam */
+export function flip({ left, right, chosen, alternatives }, by) {
+  const count = alternatives.length;
+  if (count < 2) return null;
+  return { edit: "choose", left, right, alternative: ((((chosen - 1 + by) % count) + count) % count) + 1 };
+}
+
+/** Discard a seam's insertion, or restore it. @param {Seam} seam */
+export function discard({ left, right, decision }) {
+  return { edit: "decide", left, right, decision: decision === "discarded" ? "open" : "discarded" };
+}
+
+/** Lock a seam's insertion, or unlock it. @param {Seam} seam */
+export function lock({ left, right, decision }) {
+  return { edit: "decide", left, right, decision: decision === "locked" ? "open" : "locked" };
+}

@@ -1,0 +1,46 @@
+/** The keys of the line of time; the `?` sheet lists the same table. */
+
+/** Each row: the key as `event.key`, with what is held; how it is shown; what it does; the action. */
+export const KEYS = [
+  ["ArrowLeft", "", "←", "the stretch or insertion before", (does) => does.go(-1)],
+  ["ArrowRight", "", "→", "the next stretch or insertion", (does) => does.go(1)],
+  ["ArrowLeft", "alt", "Alt ←", "move the stretch earlier", (does) => does.moveBy(-1)],
+  ["ArrowRight", "alt", "Alt →", "move the stretch later", (does) => does.moveBy(1)],
+  ["ArrowLeft", "shift", "Shift ←", "end a frame sooner; a shorter insertion", (does) => does.trimBy("last", -1)],
+  ["ArrowRight", "shift", "Shift →", "end a frame later; a longer insertion", (does) => does.trimBy("last", 1)],
+  ["ArrowLeft", "alt shift", "Alt Shift ←", "begin a frame sooner", (does) => does.trimBy("first", -1)],
+  ["ArrowRight", "alt shift", "Alt Shift →", "begin a frame later", (does) => does.trimBy("first", 1)],
+  ["ArrowUp", "", "↑", "the insertion's previous alternative", (does) => does.flip(-1)],
+  ["ArrowDown", "", "↓", "the insertion's next alternative", (does) => does.flip(1)],
+  ["Enter", "", "Enter", "go to where it begins", (does) => does.seek((does.item?.block ?? does.item?.seam)?.at ?? 0)],
+  ["s", "", "S", "split the stretch at the playhead", (does) => does.split()],
+  ["d", "", "D", "duplicate the stretch", (does) => does.duplicate()],
+  ["m", "", "M", "mirror the stretch", (does) => does.mirror()],
+  ["Delete", "", "Delete", "delete the stretch; discard or restore the insertion", (does) => does.remove()],
+  ["Backspace", "", "", "", (does) => does.remove()],
+  ["l", "", "L", "lock or unlock the insertion", (does) => does.lock()],
+  ["w", "", "W", "what the insertion is to be: length, postures, hands and feet", (does) => does.show({ sheet: true })],
+  ["Escape", "", "", "", (does) => does.show({ sheet: false })],
+  ["+", "", "+ −", "zoom", (does) => does.zoomIn()],
+  ["=", "", "", "", (does) => does.zoomIn()],
+  ["-", "", "", "", (does) => does.zoomOut()],
+  ["0", "", "0", "the whole piece", (does) => does.fit()],
+];
+
+/** Do what a key is for; tells whether it was for anything. */
+export function act(event, table, does) {
+  const held = [
+    event.altKey && "alt",
+    (event.ctrlKey || event.metaKey) && "ctrl",
+    event.shiftKey && event.key.length > 1 && "shift",
+  ]
+    .filter(Boolean)
+    .join(" ");
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const row = table.find(([name, with_]) => name === key && with_ === held);
+  if (!row) return false;
+  event.preventDefault();
+  event.stopPropagation();
+  row[4](does);
+  return true;
+}

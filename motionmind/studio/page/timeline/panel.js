@@ -1,0 +1,134 @@
+/** The line of time below the viewer: the piece's stretches, what lies at its seams, and what is wished there. */
+
+import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
+import { movement, thumbnail } from "../movements.js";
+import { useStore } from "../store.js";
+import { Actions } from "./actions.js";
+import { Composed, Movements } from "./composed.js";
+import { selected } from "./items.js";
+import { act, KEYS } from "./keys.js";
+import { fitting } from "./scale.js";
+import { Toolbar } from "./toolbar.js";
+import { Tracks } from "./tracks.js";
+import { WishSheet } from "./wishes.js";
+
+const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
+const TEMPO = "motionmind-tempo"; // where this browser keeps it
+const HEIGHT = 48; // pixels of a thumbnail
+/** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
+const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
+const LIMBS = /(wrist|hand|ankle|foot)$/;
+
+export function Panel({ studio }) {
+  const piece = useStore(studio, ({ state }) => state?.piece) ?? EMPTY;
+  const selection = useStore(studio, (store) => store.selection);
+  const [sight, show] = useReducer((old, change) => same(old, change), null, () => ({
+    scale: 60,
+    left: 0,
+    width: 800,
+    fits: true,
+    sheet: false,
+  }));
+  const [tempo, setTempo] = useState(() => Number(localStorage.getItem(TEMPO)) || 120);
+  const [stopped, setStopped] = useState(false);
+  const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
+  does.sight = sight;
+  does.piece = piece;
+  usePlayed(studio, does.movements, piece);
+  useEffect(() => {
+    if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
+  }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
+  useEffect(() => setStopped(false), [piece.blocks]);
+  useEffect(() => studio.keys.add(ROWS), [studio]);
+  const picture = useThumbnails(studio);
+  const seam = selected(piece, selection)?.seam;
+  const joints = (does.movements.at(piece.parts[0]?.key)?.joints ?? []).filter((name) => LIMBS.test(name));
+  return html`<section
+    class="timeline"
+    data-testid="timeline"
+    aria-label="Time line"
+    onKeyDown=${(event) => {
+      if (!event.defaultPrevented && !kept(event)) act(event, KEYS, does);
+    }}
+  >
+    <${Toolbar}
+      does=${does}
+      piece=${piece}
+      selection=${selection}
+      tempo=${tempo}
+      onTempo=${(next) => {
+        localStorage.setItem(TEMPO, String(next));
+        setTempo(next);
+      }}
+      stopped=${stopped}
+      onStop=${(stop) => {
+        setStopped(stop);
+        does.smooth(!stop);
+      }}
+      sheet=${sight.sheet}
+    />
+    <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} tempo=${tempo} thumbnail=${picture} />
+    ${sight.sheet &&
+    seam &&
+    html`<${WishSheet}
+      key=${`${seam.left} ${seam.right}`}
+      does=${does}
+      studio=${studio}
+      seam=${seam}
+      joints=${joints}
+      thumbnail=${picture}
+      onClose=${() => {
+        show({ sheet: false });
+        does.focused = true;
+      }}
+    />`}
+  </section>`;
+}
+
+/** Whether a key is for what has the focus. */
+function kept({ key, target }) {
+  return target.closest("input, select, [role=slider], [role=dialog]") || (key === "Enter" && target.closest("button"));
+}
+
+/** What is in sight with a change; the same object if nothing is different. */
+function same(old, change) {
+  return Object.entries(change).every(([name, value]) => old[name] === value) ? old : { ...old, ...change };
+}
+
+/** Show the piece in the viewer: as soon as the movement that it begins with is there, and again when all are. */
+function usePlayed(studio, movements, { parts }) {
+  const told = JSON.stringify(parts);
+  useEffect(() => {
+    if (parts.length === 0) return undefined;
+    let stale = false;
+    const shown = async () => {
+      await movements.load(parts[0].key);
+      if (stale) return;
+      const composed = new Composed(parts, movements, studio.store.state.title ?? "");
+      const { time } = studio.viewer.isHome ? studio.viewer.player : { time: 0 };
+      studio.viewer.home(composed, { time });
+      await composed.load();
+      if (stale) return;
+      movements.keep(parts.map(({ key }) => key));
+      const now = studio.viewer.isHome ? studio.viewer.player.time : 0;
+      studio.viewer.home(composed, { time: now });
+    };
+    shown().catch((error) => studio.say(error.message, { kind: "error" }));
+    return () => (stale = true);
+  }, [told]);
+}
+
+/** A function that gives a posture's picture, for the paper that the page has. */
+function useThumbnails(studio) {
+  const [dark, setDark] = useState(() => Boolean(studio.viewer.theme?.dark));
+  useEffect(() => {
+    const { theme } = studio.viewer;
+    const change = () => setDark(theme.dark);
+    theme?.addEventListener("change", change);
+    return () => theme?.removeEventListener("change", change);
+  }, [studio]);
+  return useMemo(
+    () => (key, frame) => thumbnail(key, frame, dark, HEIGHT),
+    [dark],
+  );
+}

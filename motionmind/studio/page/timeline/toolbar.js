@@ -1,0 +1,147 @@
+/** The bar above the tracks: what can be done with what is selected, how smoothing goes, tempo and zoom. */
+
+import { html } from "../vendor/htm-preact-standalone.js";
+import { selected } from "./items.js";
+import { clock } from "./scale.js";
+
+const ICONS = {
+  split: "M8 1v14M5 4 2 8l3 4M11 4l3 4-3 4",
+  duplicate: "M5 5h9v9H5zM2 11V2h9",
+  mirror: "M8 1v14M5 4v8L1 8zM11 4v8l4-4z",
+  delete: "M2 4h12M6 4V2h4v2M4 4l1 10h6l1-10",
+  locked: "M4 7h8v7H4zM6 7V5a2 2 0 0 1 4 0v2",
+  open: "M4 7h8v7H4zM6 7V4a2 2 0 0 1 4-1",
+  wishes: "M2 4h12M2 8h12M2 12h12M5 2v4M11 6v4M7 10v4",
+  out: "M3 8h10",
+  in: "M3 8h10M8 3v10",
+  fit: "M1 3v10M15 3v10M4 8h8M4 8l2-2M4 8l2 2M12 8l-2-2M12 8l-2 2",
+};
+
+export function Icon({ name }) {
+  return html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${ICONS[name]} /></svg>`;
+}
+
+/** @param {{does: any, piece: any, selection: any, tempo: number, onTempo: (tempo: number) => void, stopped: boolean,
+ *   onStop: (stopped: boolean) => void, sheet: boolean}} props */
+export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onStop, sheet }) {
+  const item = selected(piece, selection);
+  return html`<div class="toolbar row" role="toolbar" aria-label="Time line">
+    <h2 class="aside">Time line</h2>
+    ${item?.block && html`<${OfStretch} does=${does} block=${item.block} />`}
+    ${item?.seam && html`<${OfSeam} does=${does} seam=${item.seam} sheet=${sheet} />`}
+    ${!item && html`<p class="hint grow cut">${hintFor(piece)}</p>`}
+    <${Smoothing} piece=${piece} stopped=${stopped} onStop=${onStop} />
+    <label class="tempo" title="beats a minute: the ruler's counts">
+      <span class="pale">♩=</span>
+      <input
+        class="field numbers"
+        type="number"
+        min="20"
+        max="300"
+        step="1"
+        value=${tempo}
+        data-testid="tempo"
+        aria-label="Tempo, beats a minute"
+        onChange=${(event) => onTempo(Math.min(Math.max(Number(event.target.value) || 120, 20), 300))}
+      />
+    </label>
+    <div class="zoom row">
+      <${Button} icon="out" words="Zoom out (−)" does=${() => does.zoomOut()} test="zoom-out" />
+      <${Button} icon="fit" words="The whole piece (0)" does=${() => does.fit()} test="zoom-fit" />
+      <${Button} icon="in" words="Zoom in (+)" does=${() => does.zoomIn()} test="zoom-in" />
+    </div>
+  </div>`;
+}
+
+function OfStretch({ does, block }) {
+  return html`<p class="grow cut" data-testid="selected">
+      <b>${block.title}</b>${" "}<span class="pale numbers"
+        >${block.mirrored ? "mirrored, " : ""}${clock(block.seconds)} s · frames ${block.first} to ${block.last} of ${block.frames}</span
+      >
+    </p>
+    <${Button} icon="split" words="Split (S)" does=${() => does.split()} test="split" />
+    <${Button} icon="duplicate" words="Duplicate (D)" does=${() => does.duplicate()} test="duplicate" />
+    <${Button} icon="mirror" words="Mirror (M)" does=${() => does.mirror()} test="mirror" />
+    <${Button} icon="delete" words="Delete (Del)" does=${() => does.remove()} test="delete" />`;
+}
+
+function OfSeam({ does, seam, sheet }) {
+  const { state, alternatives, chosen, decision, words } = seam;
+  const any = alternatives.length > 0;
+  const locked = decision === "locked";
+  return html`<p class="grow cut" data-testid="selected">
+      <b>${any ? `Insertion, ${clock(seam.seconds)} s` : "Seam"}</b>${" "}
+      <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : words}</span>
+    </p>
+    ${any &&
+    html`<div class="row flip">
+        <button
+          class="button icon"
+          data-testid="previous"
+          aria-label="Previous alternative (↑)"
+          title="Previous alternative (↑)"
+          disabled=${alternatives.length < 2 || locked}
+          onClick=${() => does.flip(-1)}
+        >
+          ‹
+        </button>
+        <span class="numbers" data-testid="chosen">${chosen} of ${alternatives.length}</span>
+        <button
+          class="button icon"
+          data-testid="next"
+          aria-label="Next alternative (↓)"
+          title="Next alternative (↓)"
+          disabled=${alternatives.length < 2 || locked}
+          onClick=${() => does.flip(1)}
+        >
+          ›
+        </button>
+      </div>
+      <${Button}
+        icon=${locked ? "locked" : "open"}
+        words=${locked ? "Unlock (L)" : "Lock (L)"}
+        pressed=${locked}
+        does=${() => does.lock()}
+        test="lock"
+      />
+      <button class="button" data-testid="discard" onClick=${() => does.remove()}>
+        ${decision === "discarded" ? "Restore" : "Discard"}
+      </button>`}
+    <${Button}
+      icon="wishes"
+      words="Wishes: length, postures, hands and feet (W)"
+      pressed=${sheet}
+      does=${() => does.show({ sheet: !sheet })}
+      test="wishes"
+    />`;
+}
+
+/** How far smoothing in the background is. */
+function Smoothing({ piece, stopped, onStop }) {
+  const open = piece.seams.filter(({ state }) => state === "waiting" || state === "abrupt").length;
+  if (open === 0) return html`<span class="smoothing" role="status"></span>`;
+  const all = piece.seams.length;
+  return html`<div class="smoothing row" data-testid="smoothing">
+    <span role="status" class="numbers pale">${stopped ? "not smoothed" : "smoothing"}: ${open} of ${all} seams</span>
+    <progress max=${all} value=${all - open} aria-label="Seams that are smooth"></progress>
+    <button class="button" data-testid="smoothing-stop" onClick=${() => onStop(!stopped)}>${stopped ? "Go on" : "Stop"}</button>
+  </div>`;
+}
+
+function Button({ icon, words, does, test, pressed }) {
+  return html`<button
+    class="button icon"
+    data-testid=${test}
+    title=${words}
+    aria-label=${words}
+    aria-pressed=${pressed === undefined ? undefined : String(pressed)}
+    onClick=${does}
+  >
+    <${Icon} name=${icon} />
+  </button>`;
+}
+
+function hintFor({ blocks, seconds }) {
+  if (blocks.length === 0) return "Nothing yet: accept an alternative, or drag a posture here.";
+  return `${blocks.length} stretches, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
+}

@@ -1,0 +1,169 @@
+/** The tracks under the ruler, which scroll together; what pointers and keys do on them. */
+
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { Seams, Stretches, Wishes } from "./blocks.js";
+import { Drag } from "./gestures.js";
+import { placeAt, selected } from "./items.js";
+import { act, KEYS } from "./keys.js";
+import { Playhead, Ruler } from "./ruler.js";
+
+const POSTURE = "application/x-motionmind-posture";
+const END = 160; // pixels after the piece, where a posture may be dropped
+
+export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
+  const scroller = useRef(null);
+  const drag = useRef(null);
+  const [draft, setDraft] = useState(null);
+  const [over, setOver] = useState("");
+
+  useLayoutEffect(() => {
+    const { current } = scroller;
+    const measure = () => does.show({ width: current.clientWidth });
+    const observer = new ResizeObserver(measure);
+    observer.observe(current);
+    // Preact listens passively to wheels, and the page would zoom with them.
+    const wheel = (event) => {
+      if (!event.ctrlKey && !event.metaKey) return;
+      event.preventDefault();
+      does.zoom(Math.exp(-event.deltaY / 240), event.clientX - current.getBoundingClientRect().left);
+    };
+    current.addEventListener("wheel", wheel, { passive: false });
+    return () => {
+      observer.disconnect();
+      current.removeEventListener("wheel", wheel);
+    };
+  }, [does]);
+
+  useLayoutEffect(() => {
+    if (Math.abs(scroller.current.scrollLeft - sight.left) > 1) scroller.current.scrollLeft = sight.left;
+  }, [sight.left, sight.scale]);
+
+  // Whoever came by keys goes on by keys, though the tracks are drawn anew.
+  useEffect(() => {
+    const item = selected(piece, selection);
+    if (!item) return;
+    const { at, seconds } = item.block ?? item.seam;
+    does.reveal(at, seconds);
+  }, [JSON.stringify(selection)]);
+  useLayoutEffect(() => {
+    const { activeElement: at } = document;
+    if (!does.focused || !(at === document.body || at?.closest("[role=option]"))) return;
+    const chosen = scroller.current.querySelector("[aria-selected=true]");
+    if (chosen && chosen !== at) chosen.focus({ preventScroll: true });
+  });
+
+  const down = (event) => {
+    if (event.button !== 0) return;
+    const held = heldBy(event, piece);
+    if (!held) return;
+    does.focused = true;
+    does.select(held.block ? { block: held.block } : { seam: held.seam });
+    if (held.kind !== "select" && !(event.pointerType === "touch" && held.kind === "move" && !held.chosen)) {
+      event.currentTarget.setPointerCapture(event.pointerId);
+      drag.current = new Drag(does, held, event);
+    }
+  };
+  const moved = (event) => {
+    if (drag.current) setDraft(drag.current.take(event, scroller.current.getBoundingClientRect().left));
+  };
+  const up = async () => {
+    const ending = drag.current;
+    drag.current = null;
+    await ending?.end();
+    setDraft(null);
+  };
+  const cancel = () => {
+    drag.current = null;
+    setDraft(null);
+  };
+  const key = (event) => {
+    if (event.key === "Escape" && drag.current) cancel();
+    else if (event.target.closest("[role=option]")) act(event, KEYS, does);
+  };
+  const dragOver = (event) => {
+    if (!event.dataTransfer.types.includes(POSTURE)) return;
+    event.preventDefault();
+    event.dataTransfer.dropEffect = "copy";
+    setOver(event.target.closest("[data-left]")?.dataset.left ?? "track");
+  };
+  const drop = (event) => {
+    setOver("");
+    const data = event.dataTransfer.getData(POSTURE);
+    if (!data) return;
+    event.preventDefault();
+    const posture = JSON.parse(data);
+    const onto = heldBy(event, piece)?.seam;
+    if (onto) {
+      const { left, width } = event.target.closest("[data-left]").getBoundingClientRect();
+      does.pass(onto, { posture: posture.key, frame: posture.frame }, (event.clientX - left) / width);
+    } else {
+      const x = event.clientX - scroller.current.getBoundingClientRect().left + sight.left;
+      does.insert(posture, placeAt(piece, x / sight.scale));
+    }
+  };
+  return html`<div
+    class=${over ? "tracks dropping" : "tracks"}
+    ref=${scroller}
+    onScroll=${(event) => does.show({ left: event.currentTarget.scrollLeft })}
+    onDragOver=${dragOver}
+    onDragLeave=${() => setOver("")}
+    onDrop=${drop}
+  >
+    <div class="inner" style=${{ width: `${Math.max(piece.seconds * sight.scale + END, sight.width)}px` }}>
+      <${Ruler} does=${does} sight=${sight} seconds=${piece.seconds} tempo=${tempo} />
+      <div
+        onPointerDown=${down}
+        onPointerMove=${moved}
+        onPointerUp=${up}
+        onPointerCancel=${cancel}
+        onKeyDown=${key}
+        onFocusIn=${(event) => focusIn(event, does, piece)}
+        onFocusOut=${({ relatedTarget }) => {
+          // What is taken away while it has the focus leaves it to nobody.
+          if (relatedTarget && !relatedTarget.closest("[role=option]")) does.focused = false;
+        }}
+        onDblClick=${(event) => openAt(event, does, piece)}
+      >
+        <${Wishes} piece=${piece} sight=${sight} thumbnail=${thumbnail} />
+        <${Seams} does=${does} piece=${piece} sight=${sight} draft=${draft} selection=${selection} />
+        <${Stretches}
+          does=${does}
+          piece=${piece}
+          sight=${sight}
+          draft=${draft}
+          selection=${selection}
+          thumbnail=${thumbnail}
+        />
+      </div>
+      <${Playhead} does=${does} scale=${sight.scale} />
+    </div>
+  </div>`;
+}
+
+/** What a pointer takes hold of: a stretch, its edge, or an insertion; null for nothing. */
+function heldBy(event, piece) {
+  const element = event.target.closest("[role=option]");
+  if (!element) return null;
+  const edge = event.target.closest("[data-edge]")?.dataset.edge;
+  const chosen = element.getAttribute("aria-selected") === "true";
+  const { block: id, left, right } = element.dataset;
+  if (id) {
+    const block = piece.blocks.find((one) => one.id === id);
+    return block && { kind: edge ? "trim" : "move", side: edge, block, chosen };
+  }
+  const seam = piece.seams.find((one) => one.left === left && one.right === right);
+  return seam && { kind: edge ? "last" : "select", seam, chosen };
+}
+
+/** The focus selects: arrow keys go from one to the next, and the tab key comes to the selected one. */
+function focusIn(event, does, piece) {
+  does.focused = true;
+  const held = heldBy(event, piece);
+  if (held && !held.chosen) does.select(held.block ? { block: held.block } : { seam: held.seam });
+}
+
+function openAt(event, does, piece) {
+  const held = heldBy(event, piece);
+  if (held?.seam) does.show({ sheet: true });
+  else if (held?.block) does.seek(held.block.at);
+}

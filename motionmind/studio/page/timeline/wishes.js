@@ -1,0 +1,164 @@
+/** What is wished of an insertion: its length, postures that it passes, hands and feet that stay. */
+
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { plain } from "./blocks.js";
+import { pass, wish } from "./items.js";
+
+const HOLDS = { start: "stays as at the start", end: "is at once as at the end", throughout: "stays all the way" };
+
+/** @param {{does: any, studio: any, seam: any, joints: string[], thumbnail: any, onClose: () => void}} props */
+export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
+  const { ask } = seam;
+  const element = useRef(null);
+  const postures = usePostures(studio);
+  const [posture, setPosture] = useState("");
+  const [joint, setJoint] = useState("");
+  const [hold, setHold] = useState("start");
+  useEffect(() => element.current.querySelector("input").focus(), []);
+  const locked = seam.decision === "locked";
+  const key = (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    onClose();
+  };
+  const without = (list, index) => list.filter((_, i) => i !== index);
+  const addPosture = () => {
+    if (posture) does.edit(pass(seam, { posture, frame: 0 }));
+    setPosture("");
+  };
+  const addPin = () => {
+    if (joint) does.edit(wish(seam, { pins: [...ask.pins, { joint, hold }] }));
+    setJoint("");
+  };
+  return html`<section
+    class="wish-sheet card stack"
+    ref=${element}
+    role="dialog"
+    aria-label="Wishes for this insertion"
+    data-testid="wish-sheet"
+    onKeyDown=${key}
+  >
+    <div class="row">
+      <h3 class="grow">Wishes for this insertion</h3>
+      <button class="button quiet" onClick=${onClose} data-testid="wishes-close">Close</button>
+    </div>
+    ${locked && html`<p class="said warning">It is locked: unlock it to ask for something else.</p>`}
+    <label class="row">
+      <span class="grow">Seconds</span>
+      <input
+        class="field numbers"
+        type="number"
+        min="0.1"
+        max="60"
+        step="0.1"
+        placeholder="as usual"
+        data-testid="wish-seconds"
+        disabled=${locked}
+        value=${ask.seconds ?? ""}
+        onChange=${(event) => {
+          const seconds = Number(event.target.value);
+          does.edit(wish(seam, { seconds: seconds > 0 ? Math.min(seconds, 600) : null }));
+        }}
+      />
+    </label>
+    <div class="stack">
+      <h3>Passes these postures</h3>
+      <ul class="wishes-list">
+        ${ask.passing.map(
+          (one, i) => html`<li key=${`${i} ${one.posture}`} class="row">
+            <img alt="" src=${thumbnail(one.posture, one.frame)} />
+            <span class="grow cut">${postures.find(({ key }) => key === one.posture)?.name ?? nameOf(one)}</span>
+            <button
+              class="button"
+              aria-label=${`Do not pass posture ${i + 1}`}
+              disabled=${locked}
+              onClick=${() => does.edit(wish(seam, { passing: without(ask.passing, i) }))}
+            >
+              Remove
+            </button>
+          </li>`,
+        )}
+      </ul>
+      <div class="row">
+        <select
+          class="grow"
+          aria-label="Posture to pass"
+          data-testid="wish-posture"
+          value=${posture}
+          disabled=${locked}
+          onChange=${(event) => setPosture(event.target.value)}
+        >
+          <option value="">a posture…</option>
+          ${postures.map(({ key, name }) => html`<option key=${key} value=${key}>${name}</option>`)}
+        </select>
+        <button class="button" data-testid="wish-posture-add" disabled=${locked} onClick=${addPosture}>Pass</button>
+      </div>
+    </div>
+    <div class="stack">
+      <h3>Hands and feet that stay</h3>
+      <ul class="wishes-list">
+        ${ask.pins.map(
+          (pin, i) => html`<li key=${`${i} ${pin.joint}`} class="row">
+            <span class="grow cut">${plain(pin.joint)} ${HOLDS[pin.hold]}</span>
+            <button
+              class="button"
+              aria-label=${`Let go of ${plain(pin.joint)}`}
+              disabled=${locked}
+              onClick=${() => does.edit(wish(seam, { pins: without(ask.pins, i) }))}
+            >
+              Let go
+            </button>
+          </li>`,
+        )}
+      </ul>
+      <div class="row">
+        <select
+          class="grow"
+          aria-label="Hand or foot"
+          data-testid="wish-joint"
+          value=${joint}
+          disabled=${locked}
+          onChange=${(event) => setJoint(event.target.value)}
+        >
+          <option value="">a hand or foot…</option>
+          ${joints.map((name) => html`<option key=${name} value=${name}>${plain(name)}</option>`)}
+        </select>
+        <select
+          class="grow"
+          aria-label="How it stays"
+          data-testid="wish-hold"
+          value=${hold}
+          disabled=${locked}
+          onChange=${(event) => setHold(event.target.value)}
+        >
+          ${Object.entries(HOLDS).map(([value, words]) => html`<option key=${value} value=${value}>${words}</option>`)}
+        </select>
+        <button class="button" data-testid="wish-pin-add" disabled=${locked} onClick=${addPin}>Pin</button>
+      </div>
+    </div>
+  </section>`;
+}
+
+/** Named postures of the corpus, and saved ones: [{key, name}]. */
+function usePostures(studio) {
+  const [postures, setPostures] = useState([]);
+  useEffect(() => {
+    let gone = false;
+    studio.api
+      .get("/api/gallery")
+      .then((gallery) => {
+        if (!gone) setPostures(named(gallery));
+      })
+      .catch((error) => studio.say(error.message, { kind: "error" }));
+    return () => (gone = true);
+  }, [studio]);
+  return postures;
+}
+
+function named({ own = [], corpora = [] }) {
+  return [...own, ...corpora.flatMap(({ postures }) => postures)].map(({ key, name, title }) => ({ key, name: name ?? title }));
+}
+
+function nameOf({ posture, frame }) {
+  return frame > 0 ? `${posture}, frame ${frame}` : posture;
+}

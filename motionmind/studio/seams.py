@@ -1,0 +1,267 @@
+"""The seams of a piece, judged and smoothed in the background: after each edit, the newest seams first.
+
+What is found is a fact, kept under its question: nothing is asked twice, whatever is taken back and done again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from motionmind.body.motion import Motion
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError, MotionMindWarning, enumerated
+from motionmind.studio import api
+from motionmind.studio.alternatives import Account, account, find, usual_likelihoods
+from motionmind.studio.edits import Ask
+from motionmind.studio.piece import Finding, Found, Seam
+from motionmind.studio.sides import Sides, options_of, sides_of
+from motionmind.studio.workers import JobCancelledError, engine_of
+from motionmind.variation.seams import AbruptJoint, TransitionTest
+
+if TYPE_CHECKING:
+    from motionmind.studio.studio import Studio
+    from motionmind.studio.workers import Job, Report
+
+MOST_ALTERNATIVES = 4
+_SETTLE = 0.15  # seconds without another edit before the seams are looked at
+_NO_WAY = "no way found that does all that is wished: let go of a posture, a hand or a foot"
+_NAMED = 3  # joints that are named in words
+
+
+class Question(NamedTuple):
+    """A question at a seam, with all that a worker needs for its answer.
+
+    Attributes:
+        name: its hash (`question_of`).
+        sides: the movement on both sides.
+        options: the wish, as options of the engine.
+        wished: whether movement is to be inserted even where the transition is not abrupt.
+    """
+
+    name: str
+    sides: Sides
+    options: dict[str, Any]
+    wished: bool
+
+
+def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Finding]:
+    """Judge transitions beside a corpus; those that need an insertion are left open (`Finding.insertions` is None).
+
+    Args:
+        report: is told what goes on.
+        corpus: name of the corpus.
+        questions: the questions.
+    """
+    report(0, len(questions), "looking at the seams")
+    test = TransitionTest(engine_of(corpus))
+    findings = []
+    for question in questions:
+        a, b, _, _, seconds = question.sides
+        try:
+            joints = test.abrupt_joints(a, b, seconds)
+        except MotionMindError as error:  # another body than the corpus's
+            findings.append(Finding(question.name, True, f"cannot be judged: {_line(error)}", ()))
+            continue
+        searched = None if joints or question.wished else ()
+        findings.append(Finding(question.name, bool(joints), _why(joints, corpus), searched))
+    return findings
+
+
+def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[Motion, str]], str]:
+    """Find movement for a seam.
+
+    Args:
+        report: is told how many alternatives are found.
+        corpus: name of the corpus.
+        question: the question.
+
+    Returns:
+        Each alternative with words on it, the best first; and why there is none, "" if there is one.
+    """
+    engine = engine_of(corpus)
+    a, b, before, after, _ = question.sides
+    own = usual_likelihoods(engine)
+    distinct: dict[bytes, tuple[Motion, str]] = {}
+    report(0, MOST_ALTERNATIVES, "smoothing a seam")
+    warnings.simplefilter("ignore", MotionMindWarning)  # the words say what goes beyond the corpus
+    try:
+        tweens = find(engine, a, b, MOST_ALTERNATIVES, before=before, after=after, **question.options)
+        for number, tween in enumerate(tweens, start=1):
+            distinct.setdefault(tween.path.tobytes(), (tween.motion, _words(account(tween, engine.corpus, own))))
+            report(number, MOST_ALTERNATIVES, "smoothing a seam")
+    except MotionMindError as error:  # after the first, nothing else differs enough
+        if not distinct:
+            wished = question.options.keys() - {"duration"}
+            return [], _NO_WAY if wished else f"no way found: {_line(error)}"
+    return list(distinct.values()), ""
+
+
+def _why(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
+    """Say in a choreographer's words what makes a transition abrupt."""
+    if not joints:
+        return f"known in {displayed(corpus)}"
+    worst = sorted(joints, key=lambda one: -one.degrees)
+    fast = [one.joint.replace("_", " ") for one in worst if one.fast]
+    unseen = [one.joint.replace("_", " ") for one in worst if not one.fast]
+    said = [f"too sudden: {enumerated(fast, _NAMED)}"] if fast else []
+    return "; ".join(said + ([f"not seen in {displayed(corpus)}: {enumerated(unseen, _NAMED)}"] if unseen else []))
+
+
+def _words(found: Account) -> str:
+    """Say in a line what there is to know of an insertion."""
+    return "; ".join(said for said in (found.usual, found.words, *found.beyond) if said)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+class Smoother:
+    """Keeps a project's seams judged and smoothed.
+
+    Args:
+        studio: the studio whose project it is.
+    """
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._changed = asyncio.Event()
+        self._changed.set()
+        self._state = studio.project.state
+        self._seen: dict[str, int] = {}  # when each question first came up
+        self._job: Job | None = None
+        self._is_stopped = False
+        studio.project.subscribe(self._look)
+
+    def _look(self) -> None:
+        """Note an edit; what was found is none."""
+        if self._studio.project.state is not self._state:
+            self._state = self._studio.project.state
+            self.go_on()
+
+    def go_on(self) -> None:
+        """Judge and smooth what is open."""
+        self._is_stopped = False
+        self._changed.set()
+
+    def stop(self) -> None:
+        """Stop until the next edit; what was found stays."""
+        self._is_stopped = True
+        if self._job is not None:
+            self._job.cancel()
+
+    async def run(self) -> None:
+        """Judge and smooth after each edit, forever."""
+        while True:
+            await self._changed.wait()
+            while self._changed.is_set():
+                self._changed.clear()
+                await asyncio.sleep(_SETTLE)
+            with suppress(JobCancelledError):
+                while not self._is_stopped and await self._step():
+                    pass
+
+    async def _step(self) -> bool:
+        """Judge all seams that are new, or else smooth the newest that is abrupt; return whether there was any."""
+        project = self._studio.project
+        corpus = project.state.corpus
+        open_seams: dict[str, tuple[Seam, Finding | None]] = {}
+        for seam in project.state.seams:
+            if not seam.goes_on and ((finding := project.finding(seam)) is None or finding.insertions is None):
+                open_seams[project.question(seam)] = seam, finding
+        for name in open_seams:
+            self._seen.setdefault(name, len(self._seen))
+        new = {name: seam for name, (seam, finding) in open_seams.items() if finding is None}
+        if new:
+            await self._judge(corpus, new)
+            return True
+        if not open_seams:
+            return False
+        newest = max(open_seams, key=self._seen.__getitem__)
+        seam, judged = open_seams[newest]
+        assert judged is not None
+        await self._smooth(corpus, self._asked(newest, seam), judged)
+        return True
+
+    async def _judge(self, corpus: str, seams: dict[str, Seam]) -> None:
+        questions = []
+        for name, seam in seams.items():
+            try:
+                questions.append(self._asked(name, seam))
+            except MotionMindError as error:  # two bodies, or a joint that there is not
+                self._studio.project.keep_finding(Finding(name, True, f"cannot be joined: {_line(error)}", ()))
+        if not questions:
+            return
+        try:
+            for finding in await self._result("seams", judge, corpus, questions):
+                self._studio.project.keep_finding(finding)
+        except JobCancelledError:
+            raise
+        except MotionMindError:  # which the job's state tells
+            self._is_stopped = True
+
+    async def _smooth(self, corpus: str, question: Question, judged: Finding) -> None:
+        try:
+            alternatives, failure = await self._result("seam", smooth, corpus, question)
+        except JobCancelledError:
+            raise
+        except MotionMindError as error:
+            alternatives, failure = [], _line(error)
+        found = tuple(
+            Found(self._studio.movements.keep(motion), float(motion.times[-1] - motion.times[0]), words)
+            for motion, words in alternatives
+        )
+        finding = msgspec.structs.replace(judged, insertions=found, words=failure or judged.words)
+        self._studio.project.keep_finding(finding)
+
+    def _asked(self, name: str, seam: Seam) -> Question:
+        movement, ask = self._studio.movements.get, seam.verdict.ask
+        sides = sides_of(seam.ends, movement)
+        return Question(name, sides, options_of(ask, sides.a.skeleton, movement), ask != Ask())
+
+    async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a job returns; JobCancelledError if it was cancelled, MotionMindError if it failed."""
+        self._job = self._studio.workers.submit(kind, function, *arguments)
+        try:
+            return await self._job.result()
+        finally:
+            self._job = None
+
+
+_smoothers: WeakKeyDictionary[Studio, Smoother] = WeakKeyDictionary()
+
+
+def smoother_of(studio: Studio) -> Smoother:
+    """Return the smoother of a studio's project."""
+    if studio not in _smoothers:
+        _smoothers[studio] = Smoother(studio)
+    return _smoothers[studio]
+
+
+async def keep_smooth(studio: Studio) -> None:
+    """Keep the seams of a studio's project judged and smoothed, forever."""
+    await smoother_of(studio).run()
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return the routes by which a page stops smoothing, and lets it go on."""
+
+    async def go_on(_: Request) -> Response:
+        smoother_of(studio).go_on()
+        return api.json({})
+
+    async def stop(_: Request) -> Response:
+        smoother_of(studio).stop()
+        return api.json({})
+
+    return [Route("/api/seams", go_on, methods=["POST"]), Route("/api/seams", stop, methods=["DELETE"])]

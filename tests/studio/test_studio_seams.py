@@ -1,0 +1,152 @@
+"""Seams judged and smoothed: what a worker answers, and what the studio makes of it in the background."""
+
+import time
+
+import numpy as np
+import pytest
+
+from motionmind.geometry import rotations as rot
+from motionmind.studio import workers
+from motionmind.studio.edits import Ask, Passing, Pin
+from motionmind.studio.piece import End
+from motionmind.studio.seams import MOST_ALTERNATIVES, Question, judge, smooth
+from motionmind.studio.sides import options_of, sides_of
+from motionmind.tween.engine import Engine
+from motionmind.variation.piece import Piece
+from motionmind.variation.seams import judge_transitions
+
+
+def say_nothing(done, of, words="", partial=None):
+    assert 0 <= done <= of
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return workers.engine_of("ballet")
+
+
+@pytest.fixture(scope="module")
+def clips(engine):
+    return {f"ballet/{clip.name}": engine.corpus.motion(clip) for clip in engine.corpus.clips}
+
+
+def question(clips, ends, ask=Ask()):  # noqa: B008 - it cannot change
+    sides = sides_of(ends, clips.__getitem__)
+    return Question("q", sides, options_of(ask, sides.a.skeleton, clips.__getitem__), ask != Ask())
+
+
+def test_seams_are_abrupt_where_a_variation_says_so(engine, clips):
+    """One definition of abrupt."""
+    clip = clips["ballet/plies"]
+    pairs = [(i, k) for i in range(0, 60, 7) for k in range(3, 66, 9) if k not in (i, i + 1)]
+    judged = judge_transitions(Piece.of(clip), pairs, engine, posturewise=False)
+    asked = [question(clips, (End("ballet/plies", i, True), End("ballet/plies", k, True))) for i, k in pairs]
+    findings = judge(say_nothing, "ballet", asked)
+    assert [found.abrupt for found in findings] == [one.is_abrupt for one in judged]
+    assert {found.abrupt for found in findings} == {True, False}
+    for found in findings:
+        assert found.insertions == (None if found.abrupt else ())
+        assert found.words.startswith(("known in ballet",) if not found.abrupt else ("too sudden: ", "not seen in"))
+
+
+def test_insertions_lead_exactly_from_one_side_to_the_other(clips):
+    ends = End("ballet/plies", 20, True), End("ballet/adagio-barre", 9, True)
+    asked = question(clips, ends)
+    found, failure = smooth(say_nothing, "ballet", asked)
+    assert failure == ""
+    assert 1 < len(found) <= MOST_ALTERNATIVES
+    assert len({motion.rotations.tobytes() for motion, _ in found}) == len(found)
+    for motion, words in found:
+        assert np.array_equal(motion.rotations[[0, -1]], [asked.sides.a.rotations, asked.sides.b.rotations])
+        assert words
+    assert asked.sides.before is not None
+
+
+def test_wishes_are_kept(engine, clips):
+    ends = End("ballet/plies", 20, False), End("ballet/adagio-barre", 9, False)
+    (motion, _), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(3.0)))[0]
+    assert motion.times[-1] == pytest.approx(3.0)
+    passing = Passing("ballet/tendus", 12)
+    (motion, _), *_ = smooth(say_nothing, "ballet", question(clips, ends, Ask(passing=(passing,))))[0]
+    wanted = engine.corpus.to_chains(clips["ballet/tendus"].rotations[12:13])
+    states = engine.space.assign(engine.corpus.to_chains(motion.rotations))
+    way = rot.angle(engine.corpus.to_chains(motion.rotations), wanted)
+    assert (states == engine.space.assign(wanted)).mean(axis=1).max() > 0.9, way.max(axis=1)
+
+
+def test_what_cannot_be_is_said_in_a_line(clips):
+    ends = End("ballet/plies", 20, False), End("ballet/adagio-barre", 9, False)
+    held = Ask(
+        pins=tuple(Pin(f"{side}_{joint}", "throughout") for side in ("left", "right") for joint in ("wrist", "ankle"))
+    )
+    found, failure = smooth(say_nothing, "ballet", question(clips, ends, held))
+    assert found == []
+    assert failure == "no way found that does all that is wished: let go of a posture, a hand or a foot"
+
+
+def test_a_corpus_of_another_body_is_said_in_a_line(clips):
+    ends = End("ballet/plies", 20, True), End("ballet/adagio-barre", 9, True)
+    (found,) = judge(say_nothing, "walk-hexapod", [question(clips, ends)])
+    assert found.abrupt
+    assert found.insertions == ()
+    assert found.words.startswith("cannot be judged: the piece is on another skeleton than corpus 'walk-hexapod'")
+    assert "\n" not in found.words
+
+
+def wait_for(served, wanted, seconds=60.0):
+    """The piece as it is when `wanted` of its seams' states is true."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        piece = served.project()["piece"]
+        if wanted([seam["state"] for seam in piece["seams"]]):
+            return piece
+        time.sleep(0.05)
+    raise AssertionError([seam["state"] for seam in piece["seams"]])
+
+
+def test_seams_are_smoothed_in_the_background(studio_server):
+    studio_server.insert("b1", "ballet/plies", 0, 20)
+    studio_server.insert("b2", "ballet/adagio-barre", 9, 15)
+    studio_server.insert("b3", "ballet/adagio-barre", 16, 20)
+    piece = wait_for(studio_server, lambda states: states == ["inserted", "smooth"])
+    seam = piece["seams"][0]
+    assert len(seam["alternatives"]) > 1
+    assert piece["parts"][1]["key"] == seam["alternatives"][0]["key"]
+    choose = {"left": "b1", "right": "b2", "alternative": 2}
+    chosen = studio_server.edit(edit="choose", **choose)["piece"]
+    assert chosen["parts"][1]["key"] == seam["alternatives"][1]["key"]
+    left_out = studio_server.edit(edit="decide", left="b1", right="b2", decision="discarded")["piece"]
+    assert left_out["seams"][0]["state"] == "discarded"
+    assert len(left_out["parts"]) == 3
+    # Back to where it was: what was found once is a fact, and is there at once.
+    studio_server.edit(edit="trim", block="b1", first=0, last=12)
+    back = studio_server.edit(edit="trim", block="b1", first=0, last=20)["piece"]["seams"][0]
+    assert back["state"] == "inserted"
+    assert back["alternatives"] == seam["alternatives"]
+
+
+def test_smoothing_is_stopped_and_goes_on(studio_server):
+    for number, clip in enumerate(("plies", "adagio-barre", "tendus", "fondus", "plies-crossed", "frappes")):
+        studio_server.insert(f"b{number}", f"ballet/{clip}", 5 + number, 9 + number)
+    wait_for(studio_server, lambda states: "abrupt" in states)
+    assert studio_server.send("DELETE", "/api/seams").status == 200
+    stopped = wait_for(studio_server, lambda states: True)
+    time.sleep(1.0)
+    still = [seam["state"] for seam in studio_server.project()["piece"]["seams"]]
+    assert still == [seam["state"] for seam in stopped["seams"]]
+    assert "abrupt" in still
+    studio_server.post("/api/seams", {})
+    wait_for(studio_server, lambda states: not {"abrupt", "waiting"} & set(states))
+
+
+def test_the_newest_seam_is_smoothed_first(studio_server):
+    for number, clip in enumerate(("plies", "adagio-barre", "tendus", "fondus")):
+        studio_server.insert(f"b{number}", f"ballet/{clip}", 5 + number, 9 + number)
+    assert studio_server.send("DELETE", "/api/seams").status == 200
+    wait_for(studio_server, lambda states: True)
+    studio_server.post("/api/seams", {})
+    wait_for(studio_server, lambda states: "abrupt" in states)
+    studio_server.insert("b9", "ballet/frappes", 5, 9)
+    first = wait_for(studio_server, lambda states: "inserted" in states)
+    second = wait_for(studio_server, lambda states: states.count("inserted") > 1)
+    assert "inserted" in (first["seams"][3]["state"], second["seams"][3]["state"])
