@@ -128,7 +128,7 @@ export function AttractorMap({ studio, varying, playing }) {
     ></canvas>
     <figcaption class="hint" id="map-hint">
       <span class="sign piece">● the piece</span> <span class="sign other">— its variation</span>
-      <span class="sign other">◇ goes elsewhere</span> <span>⌖ the start: drag it, or use the arrow keys</span>
+      <span class="sign other">◇ goes elsewhere</span> <span>⊕ the start: drag it, or use the arrow keys</span>
     </figcaption>
   </figure>`;
 }
