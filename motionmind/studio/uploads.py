@@ -13,8 +13,9 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import Annotated
+from weakref import finalize
 
 import msgspec
 
@@ -85,7 +86,8 @@ class Uploads:
     """The files that were brought since the studio was started; they go with it."""
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory(prefix="motionmind-studio-")
+        self._folder = Path(mkdtemp(prefix="motionmind-studio-"))  # others may not read it
+        self._goes = finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self._uploads: dict[str, Upload] = {}
         self._reading = asyncio.Semaphore(_AT_ONCE)
 
@@ -200,10 +202,10 @@ class Uploads:
     def close(self) -> None:
         """Take all of them away."""
         self._uploads.clear()
-        self._folder.cleanup()
+        self._goes()
 
     def _place(self, upload: str) -> Path:
-        return Path(self._folder.name) / upload
+        return self._folder / upload
 
 
 async def _read(folder: Path, order: Order) -> Answer:

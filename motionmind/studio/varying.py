@@ -2,8 +2,8 @@
 
 A *unit* is a posture of the piece with the frames up to the next one, at the corpus's rate: so units in their own order
 are the piece again, frame by frame. The units that are not kept are laid out along a trajectory; another one, begun
-nearby, says which of them comes at each place (`motionmind.chaos.reorder`). Kept stretches stand between these, each
-after as many places as before. To stay in a unit is no stretch of its own: it is left out.
+nearby, says which of them comes at each place that is free (`motionmind.chaos.reorder`). Kept stretches stand where
+they stood. To stay in a unit is no stretch of its own: it is left out.
 """
 
 from __future__ import annotations
@@ -35,7 +35,20 @@ _SHEETS = 12_000  # points that show an attractor
 _MOST_DRAWN = 6_000  # points of a trajectory that a map is sent
 _USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not in their own order
 
-Times = Callable[[str], Floats]  # returns the times of the frames of a movement [T], seconds
+
+class Clock(NamedTuple):
+    """The time of a movement.
+
+    Attributes:
+        times: of its frames [T], seconds.
+        rate: units a second; None if each frame is one, as of keyframes.
+    """
+
+    times: Floats
+    rate: float | None
+
+
+Clocks = Callable[[str], Clock]  # returns the clock of a movement by its key
 
 
 class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -43,7 +56,7 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         block: the stretch.
-        place: units that are not kept before it.
+        place: the place of its first unit among all units, from 0 on.
     """
 
     block: Block
@@ -116,28 +129,30 @@ class Proposal:
 
     Attributes:
         blocks: its stretches.
-        places: units that are not kept before each stretch.
+        places: the place of each one's first unit among all units.
+        count: number of all units.
         kept: ids of the stretches that were kept.
         order: the order of the units that were not.
     """
 
     blocks: tuple[Block, ...]
     places: tuple[int, ...]
+    count: int
     kept: frozenset[str]
     order: Order
 
 
-def units_of(blocks: Sequence[Block], times: Times, rate: float | None) -> list[Unit]:
+def units_of(blocks: Sequence[Block], clocks: Clocks) -> list[Unit]:
     """Cut stretches into units.
 
     Args:
         blocks: the stretches.
-        times: returns the times of a movement's frames.
-        rate: units a second; None for a unit a frame.
+        clocks: returns the clock of a movement.
     """
     found = []
     for number, block in enumerate(blocks):
-        own = times(block.source)[block.first : block.last + 1]
+        times, rate = clocks(block.source)
+        own = times[block.first : block.last + 1]
         begins = np.arange(len(own))
         if rate is not None and len(own) > 1:
             wanted = own[0] + np.arange(np.floor((own[-1] - own[0]) * rate + 1e-3) + 1.0) / rate
@@ -152,48 +167,58 @@ def units_of(blocks: Sequence[Block], times: Times, rate: float | None) -> list[
     return found
 
 
+def kept_in(blocks: Sequence[Block], ids: Collection[str], clocks: Clocks) -> tuple[Kept, ...]:
+    """Return those stretches of a piece that have these ids, where they stand; arguments as of `units_of`."""
+    places = np.cumsum([0, *(len(units_of([block], clocks)) for block in blocks)]).tolist()
+    return tuple(Kept(block, place) for block, place in zip(blocks, places, strict=False) if block.id in ids)
+
+
 def vary_blocks(
     blocks: Sequence[Block],
     wanted: Wanted,
-    times: Times,
-    rate: float | None,
+    clocks: Clocks,
     *,
-    present: Collection[Block] = (),
+    present: Sequence[Block] | None = None,
     used: Collection[str] = (),
 ) -> Proposal:
     """Vary a piece.
 
     Args:
-        blocks: the piece's stretches.
+        blocks: the stretches that are laid out along the trajectory.
         wanted: the wish.
-        times: returns the times of a movement's frames.
-        rate: units a second; None for a unit a frame.
-        present: stretches whose ids new ones of the same frames may take.
+        clocks: returns the clock of a movement.
+        present: the piece as it stands, as long as the variation becomes, and whose stretches keep their ids; None if
+            it is `blocks`.
         used: ids that no other stretch may take.
 
     Raises:
         MotionMindError: there is nothing to vary, or the wish cannot be met.
     """
-    units = units_of(blocks, times, rate)
-    kept = [(one, units_of([one.block], times, rate)) for one in wanted.kept]
-    free = _without(units, [unit for _, own in kept for unit in own])
-    length = len(units) - sum(len(own) for _, own in kept)
-    if len(free) < 2 or length < 2:
+    present = blocks if present is None else present
+    total = len(units_of(present, clocks))
+    kept = [(one, units_of([one.block], clocks)) for one in wanted.kept]
+    taken = np.zeros(total, dtype=np.bool_)
+    for one, own in kept:
+        stands = slice(one.place, one.place + len(own))
+        if stands.stop > total or taken[stands].any():
+            raise MotionMindError(
+                "the stretches that are kept do not fit beside each other any more: choose them again"
+            )
+        taken[stands] = True
+    free = _without(units_of(blocks, clocks), [unit for _, own in kept for unit in own])
+    places = np.flatnonzero(~taken)
+    if len(free) < 2 or len(places) < 2:
         raise MotionMindError("nothing is left to vary: let go of a stretch that is kept, or put more into the piece")
-    if len(free) > MOST:
-        raise MotionMindError(f"a piece of {len(free):,} postures is too long to vary at once: {MOST:,} are the most")
-    order = find_order(wanted, len(free), length)
-    runs, places = _runs(order.indices, free, {one.place for one in wanted.kept})
+    if max(len(free), total) > MOST:
+        raise MotionMindError(
+            f"a piece of {max(len(free), total):,} postures is too long to vary: {MOST:,} are the most"
+        )
+    order = find_order(wanted, len(free), len(places))
     naming = _Naming(present, used, [one.block for one in wanted.kept])
-    found: list[tuple[int, bool, Block]] = [(one.place, False, one.block) for one in wanted.kept]
-    found += [(place, True, naming.block(run)) for run, place in zip(runs, places, strict=True)]
-    found.sort(key=lambda entry: entry[:2])  # a kept stretch goes before what comes after as many places
-    return Proposal(
-        tuple(block for _, _, block in found),
-        tuple(place for place, _, _ in found),
-        frozenset(one.block.id for one in wanted.kept),
-        order,
-    )
+    found = [(place, naming.block(run)) for place, run in _runs(order.indices, places, free)]
+    found = sorted([*found, *((one.place, one.block) for one in wanted.kept)], key=lambda entry: entry[0])
+    names = frozenset(one.block.id for one in wanted.kept)
+    return Proposal(tuple(block for _, block in found), tuple(place for place, _ in found), total, names, order)
 
 
 def find_order(wanted: Wanted, count: int, length: int) -> Order:
@@ -278,33 +303,33 @@ def _without(units: Sequence[Unit], kept: Sequence[Unit]) -> list[Unit]:
     return free
 
 
-def _runs(indices: Ints, units: Sequence[Unit], breaks: Collection[int]) -> tuple[list[list[Unit]], list[int]]:
-    """The runs of units that go on as recorded, and how many places there are before each.
+def _runs(indices: Ints, places: Ints, units: Sequence[Unit]) -> list[tuple[int, list[Unit]]]:
+    """The runs of units that go on as recorded, each with the place where it begins.
 
     Args:
-        indices: the unit at each place [L].
+        indices: the unit at each free place [L].
+        places: the free places [L]; a run ends before one that is taken.
         units: the units.
-        breaks: places before which a run ends.
     """
-    runs: list[list[Unit]] = []
-    places: list[int] = []
-    for place, index in enumerate(indices.tolist()):
+    runs: list[tuple[int, list[Unit]]] = []
+    before = -2
+    for index, place in zip(indices.tolist(), places.tolist(), strict=True):
         unit = units[index]
-        last = runs[-1][-1] if runs and place not in breaks else None
+        last = runs[-1][1][-1] if place == before + 1 else None
+        before = place
         if last is unit:
             continue
         if last and last.block == unit.block and last.last + 1 == unit.first:
-            runs[-1].append(unit)
+            runs[-1][1].append(unit)
         else:
-            runs.append([unit])
-            places.append(place)
-    return runs, places
+            runs.append((place, [unit]))
+    return runs
 
 
 class _Naming:
     """Gives stretches ids: one that is in the piece keeps its own, new ones get ids that never were."""
 
-    def __init__(self, present: Collection[Block], used: Collection[str], kept: Sequence[Block]) -> None:
+    def __init__(self, present: Sequence[Block], used: Collection[str], kept: Sequence[Block]) -> None:
         self._taken = {block.id for block in kept}
         self._present = {_frames(block): block.id for block in present if block.id not in self._taken}
         self._used = set(used)

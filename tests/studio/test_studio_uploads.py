@@ -242,7 +242,7 @@ def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: 
     with pytest.raises(MotionMindError, match="larger than 1 MB"):
         bring(uploads, "large.bvh", bytes(2**20 + 1))
     assert uploads.list() == ()
-    assert list(Path(uploads._folder.name).iterdir()) == []
+    assert list(uploads._folder.iterdir()) == []
 
 
 def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:

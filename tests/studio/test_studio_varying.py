@@ -5,22 +5,32 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from motionmind._typing import Floats
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Arrange, Block, Insert
 from motionmind.studio.piece import State, apply
-from motionmind.studio.varying import Kept, Proposal, Wanted, drawn, find_order, map_of, units_of, vary_blocks
+from motionmind.studio.varying import (
+    Clock,
+    Kept,
+    Proposal,
+    Wanted,
+    drawn,
+    find_order,
+    kept_in,
+    map_of,
+    units_of,
+    vary_blocks,
+)
 
 PIECE = (Block("b1", "ballet/adagio", 0, 59), Block("b2", "m-0011223344556677", 10, 250, mirrored=True))
 
 
-def times(key: str) -> Floats:
+def clocks(key: str) -> Clock:
     """A clip with a posture every 0.2 s, and a recording of 120 frames a second."""
-    return np.arange(60) / 5.0 if key.startswith("ballet") else np.arange(400) / 120.0
+    return Clock(np.arange(60) / 5.0, None) if key.startswith("ballet") else Clock(np.arange(400) / 120.0, 5.0)
 
 
 def vary(wanted: Wanted, blocks: tuple[Block, ...] = PIECE) -> Proposal:
-    return vary_blocks(blocks, wanted, times, 5.0, present=blocks, used={"b1", "b2"})
+    return vary_blocks(blocks, wanted, clocks, used={"b1", "b2"})
 
 
 def frames(blocks: tuple[Block, ...]) -> list[tuple[str, bool, int]]:
@@ -28,7 +38,7 @@ def frames(blocks: tuple[Block, ...]) -> list[tuple[str, bool, int]]:
 
 
 def test_units_hold_each_frame_once() -> None:
-    units = units_of(PIECE, times, 5.0)
+    units = units_of(PIECE, clocks)
     held = [(u.source, u.mirrored, frame) for u in units for frame in range(u.first, u.last + 1)]
     assert held == frames(PIECE)
     assert [u.last - u.first + 1 for u in units[60:-1]] == [24] * (len(units) - 61)  # 120 frames a second, 5 units
@@ -65,6 +75,29 @@ def test_kept_stretches_stay_in_their_places() -> None:
     assert [b.id for b in third.blocks if b.id in third.kept] == [one.block.id for one in kept]
 
 
+def test_a_stretch_of_the_piece_stays_where_it_is() -> None:
+    blocks = (
+        Block("a", "ballet/adagio", 0, 19),
+        Block("b", "ballet/adagio", 20, 29),
+        Block("c", "ballet/adagio", 30, 59),
+    )
+    (kept,) = kept_in(blocks, {"b"}, clocks)
+    assert kept.place == 20
+    found = vary(Wanted(depart=0.3, kept=(kept,)), blocks)
+    at = found.blocks.index(blocks[1])
+    assert found.places[at] == 20
+    assert 0 < at < len(found.blocks) - 1
+
+
+def test_what_was_varied_is_varied_from_its_first_order_again() -> None:
+    found = vary(Wanted(depart=0.2))
+    kept = kept_in(found.blocks, {found.blocks[3].id}, clocks)
+    again = vary_blocks(PIECE, Wanted(depart=0.2, kept=kept), clocks, present=found.blocks, used={"b1", "b2"})
+    assert found.blocks[3] in again.blocks
+    back = vary_blocks(PIECE, Wanted(nudge=0.0), clocks, present=found.blocks)
+    assert frames(back.blocks) == frames(PIECE)[: len(frames(back.blocks))]
+
+
 def test_a_variation_is_an_edit_of_the_piece() -> None:
     state = State()
     for block in PIECE:
@@ -94,7 +127,8 @@ def test_a_start_on_the_map_is_where_the_piece_begins() -> None:
         (Wanted(flow="opera"), "no attractor 'opera'"),
         (Wanted(flow="duffing"), "no attractor"),  # in four dimensions
         (Wanted(start=(1e12, 0.0, 0.0)), "diverges"),
-        (Wanted(kept=(Kept(PIECE[0], 0), Kept(PIECE[1], 0))), "let go"),
+        (Wanted(kept=kept_in(PIECE, {"b1", "b2"}, clocks)), "let go"),
+        (Wanted(kept=(Kept(PIECE[0], 0), Kept(PIECE[1], 50))), "choose them again"),
     ],
 )
 def test_what_cannot_be_varied(wanted: Wanted, words: str) -> None:

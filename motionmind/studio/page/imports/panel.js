@@ -1,0 +1,85 @@
+/** One's own movement: files are dropped, looked at, put on the time line and learned from; corpora are looked through. */
+
+import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.js";
+import { playable } from "../movements.js";
+import { useChange } from "../shell/hooks.js";
+import { newId } from "../timeline/items.js";
+import { Corpora } from "./corpora.js";
+import { FileCard } from "./file.js";
+import { ACCEPT, Imports } from "./imports.js";
+import { Learn } from "./learn.js";
+
+/** @type {WeakMap<object, Imports>} */
+const kept = new WeakMap(); // so that another panel can be opened meanwhile
+
+/** @param {any} studio */
+function importsOf(studio) {
+  const known = kept.get(studio) ?? new Imports(studio.api);
+  kept.set(studio, known);
+  return known;
+}
+
+/** @param {{studio: any}} props */
+export function Panel({ studio }) {
+  const imports = useMemo(() => importsOf(studio), [studio]);
+  useChange(imports, () => imports.version);
+  const [over, setOver] = useState(false);
+  const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
+  const learning = useChange(studio.store, () => [...studio.store.jobs.values()].filter((job) => job.kind === "learn" && job.state === "done").length);
+  useEffect(() => {
+    imports.refresh().catch(failed);
+  }, [learning]);
+  useEffect(() => () => studio.viewer.back(), []);
+  const look = async (/** @type {any} */ file, /** @type {number} */ clip) => {
+    const data = await imports.movement(file, clip);
+    studio.viewer.show(playable(data), { time: 0, title: `${file.name}${file.facts.clips.length > 1 ? `: ${data.name}` : ""}`, play: true });
+  };
+  const put = async (/** @type {any} */ file, /** @type {number} */ clip) => {
+    const { key, frames } = await imports.keep(file, clip);
+    const id = newId(studio.window);
+    await studio.api.edit({ edit: "insert", id, source: key, first: 0, last: frames - 1, mirrored: false, before: null });
+    studio.viewer.back();
+    studio.say(`${file.facts.clips[clip].name} is on the time line`);
+  };
+  const drop = (/** @type {DragEvent} */ event) => {
+    event.preventDefault();
+    setOver(false);
+    if (event.dataTransfer?.files.length) imports.bring(event.dataTransfer.files);
+  };
+  return html`<section
+    class="stack imports ${over ? "over" : ""}"
+    onDragOver=${(/** @type {DragEvent} */ event) => {
+      if (!event.dataTransfer?.types.includes("Files")) return;
+      event.preventDefault();
+      setOver(true);
+    }}
+    onDragLeave=${() => setOver(false)}
+    onDrop=${drop}
+  >
+    <h2>Movement</h2>
+    <label class="empty drop">
+      <input type="file" class="aside" data-testid="choose-files" multiple accept=${ACCEPT}
+        onChange=${(/** @type {any} */ event) => {
+          imports.bring(event.target.files);
+          event.target.value = "";
+        }} />
+      <span class="button">Choose files</span>
+      <span>or drop them here: BVH, GLB, AMC with its ASF, npz, or a score</span>
+    </label>
+    <ul class="stack files" aria-label="Files">
+      ${imports.coming.map(
+        (coming) => html`<li class="card file" key=${coming.number} data-testid="coming">
+          <div class="row"><strong class="grow cut">${coming.name}</strong>
+            ${coming.error && html`<button class="button quiet" aria-label="Close" onClick=${() => imports.dismiss(coming)}>Close</button>`}</div>
+          ${coming.error ? html`<p class="said error" role="alert" data-testid="file-error">${coming.error}</p>` : html`<p class="hint" aria-live="polite">is being read …</p>`}
+        </li>`,
+      )}
+      ${imports.files.map(
+        (file) => html`<${FileCard} key=${file.id} imports=${imports} file=${file} onFail=${failed}
+          onLook=${(/** @type {number} */ clip) => look(file, clip).catch(failed)} onPut=${(/** @type {number} */ clip) => put(file, clip).catch(failed)} />`,
+      )}
+    </ul>
+    <${Learn} studio=${studio} imports=${imports} />
+    <${Corpora} studio=${studio} imports=${imports} />
+  </section>`;
+}

@@ -1,0 +1,149 @@
+/** The map of the attractor: the piece along it, the variation over it, and the start, which a hand drags. */
+
+import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { useChange } from "../shell/hooks.js";
+import { Chart, draw, points } from "./chart.js";
+import { placeAt } from "./varying.js";
+
+const STEPS = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 40, PageDown: -40 });
+const NOTHING = new Float32Array(0);
+/** @type {Map<string, Promise<{chart: Chart, about: string}>>} */
+const charts = new Map();
+
+/** @param {{get: (path: string) => Promise<any>}} api @param {string} flow */
+function chartOf(api, flow) {
+  const known = charts.get(flow);
+  if (known) return known;
+  const found = api.get(`/api/vary/map?flow=${flow}`).then((map) => ({ chart: new Chart(points(map.points), map.axes), about: map.about }));
+  found.catch(() => charts.delete(flow));
+  charts.set(flow, found);
+  return found;
+}
+
+/**
+ * @param {{studio: any, varying: import("./varying.js").Varying, playing: boolean}} props `playing`: the viewer shows the variation
+ */
+export function AttractorMap({ studio, varying, playing }) {
+  const { viewer } = studio;
+  const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const [chart, setChart] = useState(/** @type {Chart | null} */ (null));
+  const [held, setHeld] = useState(false);
+  const along = useRef(0); // number of the attractor's point where the start is
+  const { flow } = varying.wish;
+  const { proposal } = varying;
+  const dark = useChange(viewer.theme, () => viewer.theme.dark);
+  const shown = useMemo(
+    () =>
+      proposal
+        ? { trail: points(proposal.trail), other: points(proposal.other), every: proposal.every, jumps: proposal.jumps }
+        : { trail: NOTHING, other: NOTHING, every: 1, jumps: [] },
+    [proposal],
+  );
+
+  useEffect(() => {
+    let here = true;
+    chartOf(studio.api, flow).then(
+      (found) => here && setChart(found.chart),
+      (error) => studio.say(error.message, { kind: "error" }),
+    );
+    return () => {
+      here = false;
+    };
+  }, [flow]);
+
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element || !chart) return undefined;
+    let waiting = 0;
+    const inks = colours(element);
+    const paint = () => {
+      waiting = 0;
+      const ratio = window.devicePixelRatio;
+      const { clientWidth: width, clientHeight: height } = element;
+      if (!width || !height) return;
+      if (element.width !== Math.round(width * ratio) || element.height !== Math.round(height * ratio)) {
+        [element.width, element.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+      }
+      chart.resize(width, height);
+      const pen = /** @type {CanvasRenderingContext2D} */ (element.getContext("2d"));
+      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+      const place = playing && proposal ? placeAt(proposal, viewer.player.time) : null;
+      draw(pen, chart, inks, { ...shown, place });
+    };
+    const soon = () => {
+      waiting ||= requestAnimationFrame(paint);
+    };
+    const size = new ResizeObserver(soon);
+    size.observe(element);
+    if (playing) viewer.player.addEventListener("change", soon);
+    soon();
+    return () => {
+      cancelAnimationFrame(waiting);
+      size.disconnect();
+      viewer.player.removeEventListener("change", soon);
+    };
+  }, [chart, shown, dark, playing]);
+
+  const begin = (/** @type {number} */ number) => {
+    if (!chart) return;
+    along.current = number;
+    varying.want({ start: chart.point(number) });
+  };
+  const drag = (/** @type {PointerEvent} */ event) => {
+    if (!chart || !canvas.current) return;
+    const box = canvas.current.getBoundingClientRect();
+    begin(chart.nearest(event.clientX - box.left, event.clientY - box.top));
+  };
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    const step = STEPS[event.key];
+    if (event.key === "Home") varying.want({ start: null });
+    else if (!step) return;
+    else begin(along.current + step * (event.shiftKey ? 10 : 2));
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  return html`<figure class="map">
+    <canvas
+      ref=${canvas}
+      data-testid="map"
+      class=${held ? "held" : ""}
+      tabindex="0"
+      role="slider"
+      aria-label="Where the piece begins on the attractor"
+      aria-valuemin="0"
+      aria-valuemax=${chart ? chart.all.length / 3 - 1 : 1}
+      aria-valuenow=${along.current}
+      aria-valuetext=${varying.wish.start ? varying.wish.start.map((x) => x.toFixed(1)).join(", ") : "its usual start"}
+      aria-describedby="map-hint"
+      onPointerDown=${(/** @type {PointerEvent} */ event) => {
+        if (event.button !== 0) return;
+        canvas.current?.setPointerCapture(event.pointerId);
+        setHeld(true);
+        drag(event);
+      }}
+      onPointerMove=${(/** @type {PointerEvent} */ event) => held && drag(event)}
+      onPointerUp=${() => setHeld(false)}
+      onPointerCancel=${() => setHeld(false)}
+      onKeyDown=${press}
+    ></canvas>
+    <figcaption class="hint" id="map-hint">
+      <span class="sign piece">● the piece</span> <span class="sign other">— its variation</span>
+      <span class="sign other">◇ goes elsewhere</span> <span>⊕ the start: drag it, or use the arrow keys</span>
+    </figcaption>
+  </figure>`;
+}
+
+const INKS = { sheets: "--edge", piece: "--emerald", other: "--violet", paper: "--paper", ink: "--ink" };
+
+/** The page's colours as a canvas understands them: without `light-dark`. @param {HTMLElement} element */
+function colours(element) {
+  const probe = document.createElement("i");
+  element.after(probe);
+  const found = /** @type {any} */ ({});
+  for (const [name, variable] of Object.entries(INKS)) {
+    probe.style.color = `var(${variable})`;
+    found[name] = getComputedStyle(probe).color;
+  }
+  probe.remove();
+  return found;
+}

@@ -1,0 +1,166 @@
+/** Variations: how far to depart, from where, what is kept; the new order at once, and both beside each other. */
+
+import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.js";
+import { movement } from "../movements.js";
+import { useChange } from "../shell/hooks.js";
+import { Composed, Movements } from "../timeline/composed.js";
+import { AttractorMap } from "./map.js";
+import { Tiles } from "./tiles.js";
+import { alike, departure, Varying } from "./varying.js";
+
+const FARTHEST = 0.4; // share of the steps: no attractor departs farther
+const STRETCHES = [1, 2, 4, 8]; // postures
+const FLOWS = [
+  ["lorenz", "Lorenz"],
+  ["rossler", "Rössler"],
+];
+/** @type {WeakMap<object, Varying>} */
+const kept = new WeakMap(); // so that another panel can be opened meanwhile
+
+/** @param {any} studio */
+function varyingOf(studio) {
+  const known = kept.get(studio) ?? new Varying(studio.api);
+  kept.set(studio, known);
+  return known;
+}
+
+/** @param {{studio: any}} props */
+export function Panel({ studio }) {
+  const varying = useMemo(() => varyingOf(studio), [studio]);
+  useChange(varying, () => varying.version);
+  const piece = useChange(studio.store, () => studio.store.state?.piece);
+  const view = useView(studio, varying, piece);
+  const blocks = piece?.blocks.length ?? 0;
+  useEffect(() => {
+    if (blocks) varying.ask(); // the piece is another: its variation is, too
+  }, [piece]);
+  if (!blocks) {
+    return html`<section class="stack vary">
+      <h2>Variations</h2>
+      <p class="empty">There is no piece to vary yet. Put a clip on the time line, or take a way from A to B.</p>
+      <div class="row"><button class="button" onClick=${() => studio.open("between")}>Go from A to B</button>
+      <button class="button" onClick=${() => studio.open("movement")}>Bring movement</button></div>
+    </section>`;
+  }
+  const { wish, proposal, error } = varying;
+  const isPiece = Boolean(proposal) && alike(proposal.piece.blocks, piece.blocks);
+  const shown = isPiece ? piece : proposal?.piece;
+  const vary = async () => {
+    await varying.ask();
+    if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
+  };
+  return html`<section class="stack vary">
+    <h2>Variations</h2>
+    <${AttractorMap} studio=${studio} varying=${varying} playing=${view.playing} />
+    <label class="dial">
+      <span class="row"><span class="grow">How far to depart</span>
+      <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
+      <input type="range" data-testid="depart" min="0" max=${FARTHEST * 100} step="1" value=${Math.round(wish.depart * 100)}
+        aria-valuetext=${proposal ? departure(proposal.departs) : ""}
+        onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
+    </label>
+    <label class="row"><span class="grow">Shortest stretch</span>
+      <select data-testid="stretch" value=${wish.stretch}
+        onChange=${(/** @type {any} */ event) => varying.want({ stretch: Number(event.target.value) })}>
+        ${STRETCHES.map((count) => html`<option value=${count}>${count} posture${count > 1 ? "s" : ""}</option>`)}
+      </select>
+    </label>
+    <div class="row">
+      <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} onClick=${vary}>Vary the piece</button>
+      <button class="button" data-testid="beside" aria-pressed=${view.beside} onClick=${view.toggle}>Beside the original</button>
+    </div>
+    ${error && html`<p class="said error" role="alert" data-testid="vary-error">${error}</p>`}
+    ${shown && html`<${Order} studio=${studio} varying=${varying} shown=${shown} isPiece=${isPiece} view=${view} />`}
+    <${Details} varying=${varying} />
+  </section>`;
+}
+
+/** @param {{studio: any, varying: Varying, shown: any, isPiece: boolean, view: any}} props */
+function Order({ studio, varying, shown, isPiece, view }) {
+  const count = shown.blocks.length;
+  const { wish, proposal } = varying;
+  const waiting = shown.seams.filter((/** @type {any} */ seam) => seam.state === "waiting" || seam.state === "abrupt").length;
+  const locked = proposal?.locked ?? [];
+  return html`<div class="stack">
+    <div class="row">
+      <h3 class="grow" aria-live="polite">${count} stretch${count === 1 ? "" : "es"}, ${shown.seconds.toFixed(0)} s${
+        isPiece && waiting ? ` · ${waiting} seam${waiting > 1 ? "s" : ""} to smooth` : ""
+      }${isPiece ? " · this is the piece" : ""}</h3>
+      ${wish.kept.length > 0 &&
+      html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.want({ kept: [] })}>Let all go</button>`}
+    </div>
+    <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
+    <${Tiles} studio=${studio} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
+      onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
+  </div>`;
+}
+
+/** @param {{varying: Varying}} props */
+function Details({ varying }) {
+  const { wish, proposal } = varying;
+  return html`<details class="details">
+    <summary>Details</summary>
+    <div class="stack">
+      <label class="row"><span class="grow">Attractor</span>
+        <select data-testid="flow" value=${wish.flow}
+          onChange=${(/** @type {any} */ event) => varying.want({ flow: event.target.value, start: null })}>
+          ${FLOWS.map(([name, words]) => html`<option value=${name}>${words}</option>`)}
+        </select>
+      </label>
+      <div class="row"><span class="grow">Start</span>
+        <span class="pale numbers">${wish.start ? wish.start.map((x) => x.toFixed(2)).join(", ") : "the usual one"}</span>
+        ${wish.start && html`<button class="button quiet" data-testid="usual-start" onClick=${() => varying.want({ start: null })}>Back to it</button>`}
+      </div>
+      ${proposal &&
+      html`<div class="row"><span class="grow">Nudge</span><span class="pale numbers">${proposal.nudge.toPrecision(3)}</span></div>
+        <div class="row"><span class="grow">Steps that depart</span><span class="pale numbers">${(100 * proposal.departs).toFixed(1)} %</span></div>`}
+      <p class="hint">The piece is laid out along the attractor. A second path, begun a nudge beside it, passes its postures in
+      another order; because the attractor is chaotic, the two part sooner or later.</p>
+    </div>
+  </details>`;
+}
+
+/**
+ * What the viewer shows of a variation: it, or both beside each other.
+ * @param {any} studio @param {Varying} varying @param {any} piece
+ */
+function useView(studio, varying, piece) {
+  const [beside, setBeside] = useState(false);
+  const [looking, setLooking] = useState(false);
+  const movements = useMemo(() => new Movements((/** @type {string} */ key) => movement(studio.api, key)), [studio]);
+  const { proposal } = varying;
+  const isPiece = Boolean(proposal && piece && alike(proposal.piece.blocks, piece.blocks));
+  const show = async (/** @type {number | undefined} */ time, /** @type {boolean} */ both) => {
+    if (!proposal) return;
+    const parts = isPiece ? piece.parts : proposal.piece.parts;
+    const [own, original] = await Promise.all(
+      [parts, proposal.original].map(async (some) => {
+        await movements.load(some[0].key);
+        const composed = new Composed(some, movements, "");
+        await composed.load();
+        return composed;
+      }),
+    );
+    if (varying.proposal !== proposal) return; // another was asked for meanwhile
+    const { viewer } = studio;
+    const title = both ? "The piece, and its variation" : "The variation";
+    viewer.show(both ? original : own, { time, beside: both ? own : undefined, title, look: !looking });
+  };
+  const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
+  useEffect(() => {
+    if (looking) show(undefined, beside).catch(failed);
+  }, [proposal, piece, beside, looking]);
+  useEffect(() => () => studio.viewer.back(), []);
+  return {
+    beside,
+    playing: looking || isPiece,
+    toggle: () => {
+      setBeside(!beside);
+      setLooking(!beside || looking);
+    },
+    look: (/** @type {number} */ time) => {
+      setLooking(true);
+      show(time, beside).catch(failed);
+    },
+  };
+}

@@ -1,0 +1,122 @@
+/** A variation as it is sought: the wish, what the server makes of it, and what is kept. It knows no page. */
+
+/**
+ * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean}} Block
+ * @typedef {{block: Block, place: number}} Kept
+ * @typedef {{flow: string, depart: number, start: [number, number, number] | null, stretch: number, kept: Kept[]}} Wish
+ * @typedef {object} Proposal
+ * @property {{seconds: number, parts: any[], blocks: any[], seams: any[]}} piece the variation, as a project tells its piece
+ * @property {any[]} original parts of what it varies
+ * @property {number[]} places of the blocks' first postures
+ * @property {number} count of postures
+ * @property {string[]} kept ids of the blocks that are kept
+ * @property {string[]} locked ids of those among them that the time line keeps
+ * @property {number} departs share of the steps that leave the order
+ * @property {number} nudge
+ * @property {number} every points of a trail from one posture to the next
+ * @property {string} trail of the piece, float32 [N][3] in base64
+ * @property {string} other trail of the variation, the same
+ * @property {number[]} jumps postures of the variation that do not follow
+ * @property {object} about what the edit says of it
+ */
+
+/** The wish that a page begins with. @returns {Wish} */
+export function firstWish() {
+  return { flow: "lorenz", depart: 0.2, start: null, stretch: 2, kept: [] };
+}
+
+/** Fires "change" when the wish or the proposal has changed. */
+export class Varying extends EventTarget {
+  /** @param {{post: (path: string, body: object) => Promise<any>}} api */
+  constructor(api) {
+    super();
+    this.api = api;
+    this.wish = firstWish();
+    /** @type {Proposal | null} */
+    this.proposal = null;
+    this.error = "";
+    this.asking = false;
+    this.stale = false;
+    this.version = 0;
+  }
+
+  /** Wish for something else; what is asked meanwhile is asked once, the latest of all. @param {Partial<Wish>} change */
+  want(change) {
+    this.wish = { ...this.wish, ...change };
+    this.#changed();
+    return this.ask();
+  }
+
+  /** Ask for what is wished. */
+  async ask() {
+    this.stale = true;
+    if (this.asking) return;
+    this.asking = true;
+    while (this.stale) {
+      this.stale = false;
+      try {
+        this.proposal = await this.api.post("/api/vary", this.wish);
+        this.error = "";
+      } catch (error) {
+        this.error = /** @type {Error} */ (error).message;
+      }
+      this.#changed();
+    }
+    this.asking = false;
+    this.#changed();
+  }
+
+  /** Whether a block of the proposal is kept. @param {string} id */
+  keeps(id) {
+    return Boolean(this.proposal?.kept.includes(id));
+  }
+
+  /** Keep a block of the proposal where it is, or let it go. @param {string} id */
+  keep(id) {
+    if (!this.proposal) return undefined;
+    const { piece, places } = this.proposal;
+    const kept = this.wish.kept.filter(({ block }) => block.id !== id);
+    if (kept.length === this.wish.kept.length) {
+      const at = piece.blocks.findIndex((block) => block.id === id);
+      if (at >= 0) kept.push({ block: bare(piece.blocks[at]), place: places[at] });
+    }
+    kept.sort((one, other) => one.place - other.place);
+    return this.want({ kept });
+  }
+
+  /** The edit that makes the proposal the piece. */
+  get edit() {
+    return this.proposal && { edit: "arrange", blocks: this.proposal.piece.blocks.map(bare), about: this.proposal.about };
+  }
+
+  #changed() {
+    this.version += 1;
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** @param {Block} block */
+function bare({ id, source, first, last, mirrored }) {
+  return { id, source, first, last, mirrored };
+}
+
+/** Whether two rows of blocks are the same. @param {Block[]} one @param {Block[]} other */
+export function alike(one, other) {
+  return one.length === other.length && one.every((block, i) => JSON.stringify(bare(block)) === JSON.stringify(bare(other[i])));
+}
+
+/** How far it departs, in words. @param {number} share of the steps */
+export function departure(share) {
+  if (share < 0.005) return "as it is";
+  return `1 step in ${Math.max(Math.round(1 / share), 1)} goes elsewhere`;
+}
+
+/** The place among all postures at a time, with its fraction. @param {Proposal} proposal @param {number} time */
+export function placeAt({ piece, places, count }, time) {
+  const { blocks } = piece;
+  let at = 0;
+  while (at + 1 < blocks.length && blocks[at + 1].at <= time) at++;
+  const { at: begin, seconds } = blocks[at];
+  const room = (places[at + 1] ?? count) - places[at];
+  return places[at] + Math.min(Math.max((time - begin) / Math.max(seconds, 0.01), 0), 1) * Math.max(room - 1, 0);
+}

@@ -1,0 +1,175 @@
+"""Variations for the page: the map of an attractor, and what a wish makes of the project's piece."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+import numpy as np
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
+from motionmind.corpus import store
+from motionmind.corpus.gather import RECORDED_RATE
+from motionmind.errors import MotionMindError
+from motionmind.render.page import base64_of
+from motionmind.studio import api
+from motionmind.studio.edits import Block
+from motionmind.studio.piece import State
+from motionmind.studio.varying import (
+    EVERY,
+    Clock,
+    Clocks,
+    Kept,
+    Proposal,
+    Wanted,
+    drawn,
+    kept_in,
+    map_of,
+    vary_blocks,
+)
+from motionmind.studio.view import view_of
+
+if TYPE_CHECKING:
+    from motionmind.studio.studio import Studio
+
+_WORDS = "vary the piece"
+
+
+class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A wish of the page: the fields of `Wanted`, and stretches of the piece that stay, by their ids."""
+
+    flow: str = "lorenz"
+    depart: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.25
+    nudge: float | None = None
+    start: tuple[float, float, float] | None = None
+    stretch: Annotated[int, msgspec.Meta(ge=1, le=100)] = 1
+    kept: Annotated[tuple[Kept, ...], msgspec.Meta(max_length=1_000)] = ()
+    stay: Annotated[tuple[str, ...], msgspec.Meta(max_length=1_000)] = ()
+
+    def wanted(self, kept: tuple[Kept, ...]) -> Wanted:
+        """Return the wish with all that is kept."""
+        return Wanted(self.flow, self.depart, self.nudge, self.start, self.stretch, kept)
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return what the page asks of variations."""
+
+    async def attractor(request: Request) -> Response:
+        found = await run_in_threadpool(map_of, request.query_params.get("flow", "lorenz"))
+        return api.json(found | {"points": encoded(found["points"])})
+
+    async def vary(request: Request) -> Response:
+        return api.json(await propose(studio, await api.body_of(request, Wish)))
+
+    return [Route("/api/vary/map", attractor), Route("/api/vary", vary, methods=["POST"])]
+
+
+async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
+    """Return the variation that a wish makes of the piece, as the page sees it.
+
+    Raises:
+        MotionMindError: there is nothing to vary, or the wish cannot be met.
+    """
+    project = studio.project
+    state = project.state
+    base = base_of(state)
+    locked = locked_in(state)
+    asked = [one for one in wish.kept if one.block.id not in locked]
+    known = {block.source for block in (*base, *state.blocks, *(one.block for one in asked))}
+    recorded = _rate_of(state.corpus, studio)
+    clocks = {source: clock_of(project.movements.get(source), recorded) for source in known}
+    for one in asked:
+        if one.block.first > one.block.last or one.block.last >= len(clocks[one.block.source].times):
+            raise MotionMindError("a stretch that is kept is not there any more: choose again")
+    kept = (
+        *asked,
+        *kept_in(state.blocks, locked | set(wish.stay) - {one.block.id for one in asked}, clocks.__getitem__),
+    )
+    # In a thread: long pieces take some seconds the first time, in which the page is not to wait for other things.
+    found = await run_in_threadpool(_vary, base, wish.wanted(kept), clocks.__getitem__, state)
+    return _shown(studio, state, base, found, locked, wish)
+
+
+def _vary(base: tuple[Block, ...], wanted: Wanted, clocks: Clocks, state: State) -> Proposal:
+    return vary_blocks(base, wanted, clocks, present=state.blocks, used=state.used)
+
+
+def _shown(
+    studio: Studio, state: State, base: tuple[Block, ...], found: Proposal, locked: set[str], wish: Wish
+) -> dict[str, Any]:
+    project, order = studio.project, found.order
+
+    def view(blocks: tuple[Block, ...]) -> dict[str, Any]:
+        return view_of(replace(state, blocks=blocks), project.finding, project.marks, project.movements.title)
+
+    steps = np.diff(order.indices)
+    about = {
+        "words": _WORDS,
+        "variation": {
+            "flow": wish.flow,
+            "nudge": order.nudge,
+            "start": wish.start,
+            "stretch": wish.stretch,
+        },
+        "original": msgspec.to_builtins(base),
+    }
+    return {
+        "piece": view(found.blocks),
+        "original": view(base)["parts"],
+        "places": found.places,
+        "count": found.count,
+        "kept": sorted(found.kept),
+        "locked": sorted(locked),
+        "departs": order.departs,
+        "nudge": order.nudge,
+        "every": EVERY if len(drawn(order.other)) == len(order.other) else 1,
+        "trail": encoded(drawn(order.piece)),
+        "other": encoded(drawn(order.other)),
+        "jumps": (np.flatnonzero((steps != 0) & (steps != 1)) + 1).tolist(),
+        "about": about,
+    }
+
+
+def encoded(points: list[list[float]]) -> str:
+    """Return points as the page reads them: float32 in base64."""
+    return base64_of(np.array(points, dtype="<f4").tobytes())
+
+
+def base_of(state: State) -> tuple[Block, ...]:
+    """Return what is varied: what the piece was before it was varied, or the piece if it has become another since."""
+    given = state.about.get("original")
+    try:
+        base = msgspec.convert(given, type=tuple[Block, ...])
+    except msgspec.ValidationError:
+        return state.blocks
+    whole = all(any(_holds(one, block) for one in base) for block in state.blocks)
+    return base if base and whole else state.blocks
+
+
+def _holds(one: Block, block: Block) -> bool:
+    same = (one.source, one.mirrored) == (block.source, block.mirrored)
+    return same and one.first <= block.first and block.last <= one.last
+
+
+def locked_in(state: State) -> set[str]:
+    """Return the ids of the stretches on both sides of seams whose insertion is locked: it stays as long as they do."""
+    return {name for seam in state.seams if seam.verdict.decision == "locked" for name in seam.pair}
+
+
+def clock_of(motion: Motion, rate: float) -> Clock:
+    """Return the clock of a movement, whose units are postures at a rate if it is recorded, else its frames."""
+    recorded = len(motion) > 1 and not motion.keyframed and motion.fps >= FILM_RATE
+    return Clock(motion.times, rate if recorded else None)
+
+
+def _rate_of(corpus: str, studio: Studio) -> float:
+    """Postures a second that a corpus takes of recordings."""
+    folder = store.list_corpora(studio.home).get(corpus)
+    rate = store.read_manifest(folder).get("rate") if folder else None
+    return float(rate) if isinstance(rate, int | float) and rate > 0.0 else RECORDED_RATE
