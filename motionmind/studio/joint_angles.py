@@ -17,6 +17,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 
 _STEP = 1e-6  # radians by which angles are changed to see where they lead
+_HALF = np.pi - 1e-6  # radians of a swing, which is no more than half round
 _ROUND = 2.0 * np.pi - 1e-9  # radians of a range that is no limit, for it leads all the way round
 
 
@@ -27,6 +28,7 @@ class JointAngles:
         skeleton: the body.
         free: which angles can change [J, 3].
         least, most: their limits [J, 3].
+        swings: which of them are a swing's, not a twist [J, 3].
         frames: the joint in whose frame each joint's angles are measured [J]; -1 for the world.
     """
 
@@ -41,13 +43,16 @@ class JointAngles:
         self.skeleton = skeleton
         self._anatomy, self._rest = anatomy_of(skeleton), given[0]
         self.frames: Ints = np.array(skeleton.parents)
+        self.swings: Bools = np.ones((len(skeleton), 3), dtype=np.bool_)
         if self._anatomy is None:
             self.free: Bools = np.ones((len(skeleton), 3), dtype=np.bool_)
             self.least, self.most = np.full((len(skeleton), 3), -np.inf), np.full((len(skeleton), 3), np.inf)
             return
         for joint, name in enumerate(skeleton.names):
-            if against := self._anatomy.anatomy(name)[1].against:
-                self.frames[joint] = skeleton.index(against)
+            described = self._anatomy.anatomy(name)[1]
+            self.swings[joint, "xyz".index(described.long)] = False
+            if described.against:
+                self.frames[joint] = skeleton.index(described.against)
         angles = self.of(given)
         least, most = np.radians(self._anatomy.limits)
         self.free = np.isfinite(least)
@@ -60,6 +65,12 @@ class JointAngles:
         if self._anatomy is None:
             return rot.log(rot.inv_mul(self._rest, rotations))
         return np.radians(self._anatomy.degrees(rotations))
+
+    def within(self, angles: Floats) -> Floats:
+        """Return angles [J, 3] within their limits; swings beyond half round, which are others, stop there."""
+        angles = np.clip(angles, self.least, self.most)
+        swing = rot.norm(np.where(self.swings, angles, 0.0))[:, None]
+        return np.where(self.swings & (swing > _HALF), angles * (_HALF / np.maximum(swing, _HALF)), angles)
 
     def rotations(self, angles: Floats) -> Floats:
         """Return local rotations [..., J, 4] of angles [..., J, 3]."""

@@ -1,12 +1,12 @@
 """Inverse kinematics: the posture nearest to one that is, in which a joint is where somebody drags it.
 
-Feet that stand stay, and nothing sinks into the floor; the dragged joint goes to its place as far as that leaves room;
-all joints stay near where they were when the drag began. Each step is a damped least-squares step on the joints'
-angles, and an angle that would leave its limits stops there while the others make up for it. Sources: Wampler, "Manipulator
-inverse kinematic solutions based on vector formulations and damped least-squares methods", IEEE Transactions on
-Systems, Man and Cybernetics 16 (1986); Baerlocher and Boulic, "An inverse kinematics architecture enforcing an
-arbitrary number of strict priority levels", The Visual Computer 20 (2004), for the limits. Their strict order of wishes
-was tried: where a standing foot and limits leave no room it becomes unstable, which weights do not.
+Feet that stand stay, and nothing sinks into the floor; the dragged joint goes to its place as far as that leaves
+room; all joints stay near where they were when the drag began. Each step is a damped least-squares step on the joints'
+angles, and an angle that would leave its limits stops there while the others make up for it. Sources: Wampler,
+"Manipulator inverse kinematic solutions based on vector formulations and damped least-squares methods", IEEE
+Transactions on Systems, Man and Cybernetics 16 (1986); for limits Baerlocher and Boulic, "An inverse kinematics
+architecture enforcing an arbitrary number of strict priority levels", The Visual Computer 20 (2004). Their strict order
+of wishes was tried: where a standing foot and limits leave no room it is unstable, and weights are not.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.contact import contact_points, find_feet
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.motion import Posture
-from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import size_of
 from motionmind.geometry import rotations as rot
 from motionmind.studio.joint_angles import JointAngles
@@ -98,6 +97,25 @@ def standing_feet(posture: Posture) -> list[str]:
     return [posture.skeleton.names[leaf] for leaf, sole in body.soles.items() if body.low(sole).any()]
 
 
+def standing_soles(posture: Posture) -> Ints:
+    """Return the points of soles that stand on the floor, as numbers in `motionmind.body.contact.contact_points`."""
+    return _Body(posture).kept(None, None).points[::3]
+
+
+def put_on_floor(posture: Posture) -> Posture:
+    """Return the posture with its lowest point on the floor, and flat on it the feet that are near it then."""
+    lowest = float(contact_points(posture.skeleton, posture.rotations, posture.root)[0][:, 1].min())
+    down = Posture(posture.skeleton, posture.rotations, posture.root - np.array([0.0, lowest, 0.0]))
+    body = _Body(down)
+    near = [sole for sole in body.soles.values() if body.began[sole, 1].min() <= FOOT * body.size]
+    if not near:
+        return down
+    points = np.concatenate(near)
+    flat = Wishes(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), np.zeros(len(points)))
+    nothing = Wishes(points[:0], flat.directions[:0], flat.places[:0])
+    return body.solve(down, flat, nothing, travels=True)
+
+
 class _Body:
     """A body where a drag begins: its angles, the points that it touches the floor with, and how they move."""
 
@@ -114,7 +132,7 @@ class _Body:
         self.segments = np.concatenate([skeleton.offsets, at_rest[count:] - at_rest[joints[count:]]])
         self.above = np.concatenate([skeleton.parents, joints[count:]])
         carries = self.angles.carries
-        # The last point on the way to each point [P] that goes round a joint [J] as it turns; the joint if there is none.
+        # The last point on the way to each point [P] that goes round a joint [J] as it turns; the joint if none does.
         self.last = np.tile(np.arange(count), (len(joints), 1))
         for point, above in enumerate(self.above[1:], start=1):
             self.last[point] = np.where(carries[above], point, self.last[above])
@@ -153,9 +171,9 @@ class _Body:
 
     # --- wishes ---------------------------------------------------------------------------------------------------
 
-    def kept(self, standing: Sequence[str] | None, dragged: int) -> Wishes:
+    def kept(self, standing: Sequence[str] | None, dragged: int | None) -> Wishes:
         """Return the wish that feet stay where they stand."""
-        own = self._foot_of(dragged)
+        own = None if dragged is None else self._foot_of(dragged)
         names = self.skeleton.names
         feet = [leaf for leaf in self.soles if leaf != own and (standing is None or names[leaf] in standing)]
         points = [self.soles[leaf] for leaf in feet]
@@ -201,7 +219,8 @@ class _Body:
         damping, moving = _DAMPING, self._slopes(here)
         cost = self._cost(here, moving[0], problem)
         for _ in range(rounds):
-            step = self._step(here, moving, problem, damping)
+            ahead = here + self._step(here, moving, problem, damping)
+            step = np.append(self.angles.within(ahead[:-3].reshape(-1, 3)).reshape(-1), ahead[-3:]) - here
             found = self._slopes(here + step)
             less = self._cost(here + step, found[0], problem)
             if less <= cost:
@@ -219,7 +238,7 @@ class _Body:
         kept = float(np.sum(_missed(problem.kept, places) ** 2) + sunk @ sunk)
         back = self._back(here) * self.mobile
         wished = float(np.sum(_missed(problem.wished, places) ** 2))
-        return (_JUDGED * problem.keeping) ** 2 * kept + wished + problem.pull**2 * float(back @ back)
+        return float((_JUDGED * problem.keeping) ** 2 * kept + wished + problem.pull**2 * (back @ back))
 
     def _back(self, here: Floats) -> Floats:
         """Return the way back to where angles and root were [D], as readily as they go.
@@ -228,7 +247,7 @@ class _Body:
         """
         way = self.home - here[:-3].reshape(-1, 3)
         way = np.where(np.isfinite(self.angles.least), way, np.angle(np.exp(1j * way)))
-        return np.append(way.reshape(-1), self.start.root - here[-3:]) / self.readily
+        return np.asarray(np.append(way.reshape(-1), self.start.root - here[-3:]) / self.readily)
 
     def _slopes(self, here: Floats) -> tuple[Floats, Floats]:
         """Return the places of all points [P, 3], and how far they go for each angle and along each axis [P, 3, D]."""
