@@ -19,7 +19,7 @@ from motionmind.studio.pages import read_page
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
-_PARTS = ("seams", "between", "export", "varied", "imports", "corpora", "posing", "postures")
+_PARTS = ("seams", "between", "export", "varied", "imports", "corpora", "posing")
 
 
 class _Entering(msgspec.Struct, forbid_unknown_fields=True):

@@ -1,0 +1,138 @@
+"""A body's handles, its joints' angles in words, and turning one of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind.body.anatomy_file import anatomy_of
+from motionmind.body.mirror import mirrored
+from motionmind.body.motion import Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed
+from motionmind.errors import MotionMindError, suggestion
+from motionmind.geometry import rotations as rot
+from motionmind.studio.joint_angles import JointAngles
+
+# The joints that people drag, by what they call them.
+_HANDLES = {
+    "pelvis": "pelvis",
+    "thorax": "chest",
+    "atlantal": "head",
+    "elbow": "elbow",
+    "wrist": "hand",
+    "knee": "knee",
+    "ankle": "foot",
+}
+_FREELY = ("bend", "turn", "lean")  # about x, y and z, of a joint whose angles have no names
+_WORDS = {"lumbar": "lower back", "thorax": "upper back", "cervical": "neck", "atlantal": "head"}
+
+
+class Handle(NamedTuple):
+    """A joint that can be dragged, and the words for it."""
+
+    joint: str
+    words: str
+
+
+class Turn(NamedTuple):
+    """An angle of a joint, degrees.
+
+    Attributes:
+        joint: the joint.
+        words: words for the joint.
+        angle: the angle's name, and its opposite's if it has one: "flexion", "extension".
+        opposite: the name of its negative; "" if it has none.
+        least, most: its limits.
+        degrees: its value.
+    """
+
+    joint: str
+    words: str
+    angle: str
+    opposite: str
+    least: float
+    most: float
+    degrees: float
+
+
+def words_of(joint: str) -> str:
+    """Return a joint's name in words."""
+    side, _, stem = joint.partition("_")
+    if side in ("left", "right"):
+        return f"{side} {_WORDS.get(stem, stem).replace('_', ' ')}"
+    return displayed(_WORDS.get(joint, joint).replace("_", " "))
+
+
+def handles_of(skeleton: Skeleton) -> list[Handle]:
+    """Return a body's handles: a person's by name; of any other the root, the ends of its limbs and their middles."""
+    if anatomy_of(skeleton) is not None:
+        out = []
+        for name in skeleton.names:
+            side, _, stem = name.partition("_")
+            if name in _HANDLES:
+                out.append(Handle(name, _HANDLES[name]))
+            elif side in ("left", "right") and stem in _HANDLES:
+                out.append(Handle(name, f"{side} {_HANDLES[stem]}"))
+        return out
+    leaves = [joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)]
+    middles = [skeleton.parents[leaf] for leaf in leaves]
+    chosen = sorted({0, *leaves, *(joint for joint in middles if len(skeleton.children(joint)) == 1)})
+    return [Handle(skeleton.names[joint], words_of(skeleton.names[joint])) for joint in chosen]
+
+
+def turns_of(posture: Posture) -> list[Turn]:
+    """Return all angles of a posture's joints that can be turned."""
+    skeleton, out = posture.skeleton, []
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None:
+        vectors = np.degrees(rot.log(posture.rotations))
+        return [
+            Turn(name, words_of(name), angle, "", -180.0, 180.0, float(vectors[joint, axis]))
+            for joint, name in enumerate(skeleton.names)
+            for axis, angle in enumerate(_FREELY)
+        ]
+    angles = JointAngles(skeleton, posture.rotations[None])
+    values, least, most = (np.degrees(a) for a in (angles.of(posture.rotations), angles.least, angles.most))
+    for joint, name in enumerate(skeleton.names):
+        for called, angle in anatomy.anatomy(name)[1].angles.items():
+            at = joint, angle.axis
+            ends = sorted(angle.sign * end for end in np.clip((least[at], most[at]), -180.0, 180.0))
+            value = float(angle.sign * values[at])
+            out.append(Turn(name, words_of(name), called, angle.opposite, float(ends[0]), float(ends[1]), value))
+    return out
+
+
+def turned(posture: Posture, joint: str, angle: str, degrees: float) -> Posture:
+    """Return the posture with one angle of a joint set, within its limits.
+
+    Raises:
+        SkeletonError: there is no such joint.
+        MotionMindError: it has no such angle.
+    """
+    skeleton = posture.skeleton
+    number, anatomy = skeleton.index(joint), anatomy_of(skeleton)
+    if anatomy is None:
+        if angle not in _FREELY:
+            raise MotionMindError(f"{displayed(joint)} has no angle {displayed(angle)}{suggestion(angle, _FREELY)}")
+        rotations, vector = posture.rotations.copy(), rot.log(posture.rotations[number])
+        vector[_FREELY.index(angle)] = np.radians(degrees)
+        rotations[number] = rot.exp(vector)
+        return Posture(skeleton, rotations, posture.root)
+    named = anatomy.anatomy(joint)[1].angles
+    if angle not in named:
+        raise MotionMindError(f"{displayed(joint)} has no angle {displayed(angle)}{suggestion(angle, [*named])}")
+    angles = JointAngles(skeleton, posture.rotations[None])
+    values, at = angles.of(posture.rotations), (number, named[angle].axis)
+    values[at] = named[angle].sign * np.radians(degrees)
+    return Posture(skeleton, rot.normalise(angles.rotations(angles.within(values))), posture.root)
+
+
+def mirror(posture: Posture) -> Posture:
+    """Return the posture with left and right exchanged, about where it is, on the same body.
+
+    Raises:
+        SkeletonError: the body is not symmetric.
+    """
+    return Posture(posture.skeleton, mirrored(posture.as_motion()).rotations[0], posture.root)

@@ -1,0 +1,102 @@
+"""The angles by which a posture is changed: a body's own, with its anatomy's limits, or turns from where joints were.
+
+A body with an anatomy has the angles that people describe it by (`motionmind.body.anatomy`): a knee bends and does
+nothing else, so it keeps its side. Limits are widened to the posture that is changed, for dancers go further than
+tables say. The joints of any other body turn freely about three axes.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.anatomy_file import anatomy_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
+
+_STEP = 1e-6  # radians by which angles are changed to see where they lead
+_HALF = np.pi - 1e-6  # radians of a swing, which is no more than half round
+_ROUND = 2.0 * np.pi - 1e-9  # radians of a range that is no limit, for it leads all the way round
+
+
+class JointAngles:
+    """The angles of a body's joints, radians, and how far they go around one posture.
+
+    Attributes:
+        skeleton: the body.
+        free: which angles can change [J, 3].
+        least, most: their limits [J, 3].
+        swings: which of them are a swing's, not a twist [J, 3].
+        frames: the joint in whose frame each joint's angles are measured [J]; -1 for the world.
+    """
+
+    def __init__(self, skeleton: Skeleton, given: Floats) -> None:
+        """Find the angles around postures.
+
+        Args:
+            skeleton: the body.
+            given: local rotations of postures that are within the limits whatever they are [G, J, 4]; joints without
+                an anatomy turn from where they are in the first.
+        """
+        self.skeleton = skeleton
+        self._anatomy, self._rest = anatomy_of(skeleton), given[0]
+        self.frames: Ints = np.array(skeleton.parents)
+        self.swings: Bools = np.ones((len(skeleton), 3), dtype=np.bool_)
+        if self._anatomy is None:
+            self.free: Bools = np.ones((len(skeleton), 3), dtype=np.bool_)
+            self.least, self.most = np.full((len(skeleton), 3), -np.inf), np.full((len(skeleton), 3), np.inf)
+            return
+        for joint, name in enumerate(skeleton.names):
+            described = self._anatomy.anatomy(name)[1]
+            self.swings[joint, "xyz".index(described.long)] = False
+            if described.against:
+                self.frames[joint] = skeleton.index(described.against)
+        angles = self.of(given)
+        least, most = np.radians(self._anatomy.limits)
+        self.free = np.isfinite(least)
+        unlimited = most - least >= _ROUND
+        self.least = np.where(unlimited, -np.inf, np.minimum(least, angles.min(axis=0)))
+        self.most = np.where(unlimited, np.inf, np.maximum(most, angles.max(axis=0)))
+
+    def of(self, rotations: Floats) -> Floats:
+        """Return the angles [..., J, 3] of local rotations [..., J, 4]: the inverse of `rotations`."""
+        if self._anatomy is None:
+            return rot.log(rot.inv_mul(self._rest, rotations))
+        return np.radians(self._anatomy.degrees(rotations))
+
+    def within(self, angles: Floats) -> Floats:
+        """Return angles [J, 3] within their limits; swings beyond half round, which are others, stop there."""
+        angles = np.clip(angles, self.least, self.most)
+        swing = rot.norm(np.where(self.swings, angles, 0.0))[:, None]
+        return np.where(self.swings & (swing > _HALF), angles * (_HALF / np.maximum(swing, _HALF)), angles)
+
+    def rotations(self, angles: Floats) -> Floats:
+        """Return local rotations [..., J, 4] of angles [..., J, 3]."""
+        if self._anatomy is None:
+            return rot.mul(self._rest, rot.exp(angles))
+        flat = np.degrees(angles).reshape(-1, len(self.skeleton), 3)
+        named = {name: flat[:, joint] for joint, name in enumerate(self.skeleton.names)}
+        return self._anatomy.rotations(named).reshape(*angles.shape[:-1], 4)
+
+    def turns(self, angles: Floats) -> tuple[Floats, Floats]:
+        """Return the global rotations [J, 4] of angles [J, 3], and the axes that each angle turns about [J, 3, 3].
+
+        An axis is that of the world, times the radians that the joint turns by for a radian of the angle.
+        """
+        steps = np.concatenate([np.zeros((1, 3)), _STEP * np.eye(3)])
+        turned = self.skeleton.global_rotations(self.rotations(angles + steps[:, None, :]))
+        frames = np.where((self.frames >= 0)[:, None], turned[:, self.frames], rot.IDENTITY)
+        own = rot.inv_mul(frames, turned)
+        axes = rot.mul_vec(frames[0], rot.log(rot.mul_inv(own[1:], own[0])) / _STEP)
+        return turned[0], np.swapaxes(axes, 0, 1)
+
+    @cached_property
+    def carries(self) -> Bools:
+        """Whether a joint's turn turns the frame of another [J, J]: carries[j, i] for i and all that hangs from it."""
+        count = len(self.skeleton)
+        out = np.eye(count, dtype=np.bool_)
+        for joint in range(1, count):
+            out[joint] |= out[self.frames[joint]]
+        return out

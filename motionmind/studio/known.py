@@ -1,0 +1,110 @@
+"""How well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.contact import contact_points
+from motionmind.body.motion import Posture
+from motionmind.discretize.states import nearest
+from motionmind.geometry import rotations as rot
+from motionmind.studio.reach import drag, standing_soles
+
+if TYPE_CHECKING:
+    from motionmind.learned.learning import Learned
+
+Known = Literal["seen", "near", "unseen"]
+NEAR = 2.0  # tolerances of a joint's states within which an orientation is near one that was seen
+_COUNTED = 1e-9  # degrees by which rounding may lead over a tolerance
+
+
+class Memory:
+    """What a corpus has seen of each joint."""
+
+    def __init__(self, learned: Learned) -> None:
+        self.corpus, self.space = learned.corpus, learned.space
+        chains = len(learned.corpus.skeleton)
+        recorded = learned.corpus.to_chains(learned.corpus.rotations)
+        self._orientations = []
+        for chain in range(chains):
+            centres = self.space.of(chain)[np.unique(np.asarray(learned.states[:, chain]))]
+            # A library that somebody made need not have a state for everything that was recorded.
+            _, cosines = nearest(recorded[:, chain], centres)
+            lacking = cosines < np.cos(0.5 * np.radians(self.space.tolerances[chain]))
+            self._orientations.append(np.concatenate([centres, recorded[lacking, chain]]))
+
+    def fits(self, posture: Posture) -> bool:
+        """Return whether the corpus has the posture's joints."""
+        return self.corpus.skeleton.difference(posture.skeleton) is None
+
+    def known(self, posture: Posture) -> list[Known]:
+        """Return how well the corpus knows each joint's orientation [J].
+
+        It is seen where an orientation that was observed stands for it, near where one does within twice as much.
+        """
+        degrees, _ = self._nearest(posture.rotations)
+        limits = self.space.tolerances[: len(degrees)] + _COUNTED
+        return [
+            "seen" if off <= limit else "near" if off <= NEAR * limit else "unseen"
+            for off, limit in zip(degrees, limits, strict=True)
+        ]
+
+    def bring_joints(self, posture: Posture, kept: str | None = None) -> Posture:
+        """Return the posture with each joint that was not seen as it was seen nearest to that; feet stay.
+
+        Args:
+            posture: the posture.
+            kept: the joint whose place is kept, if no joint becomes one that is not even near.
+        """
+        _, numbers = self._nearest(posture.rotations)
+        chains = self.corpus.to_chains(posture.rotations).copy()
+        for joint, known in enumerate(self.known(posture)):
+            if known != "seen":
+                chains[joint] = self._orientations[joint][numbers[joint]]
+        found = settle(Posture(posture.skeleton, rot.normalise(self.corpus.from_chains(chains)), posture.root), posture)
+        if kept is None:
+            return found
+        place = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index(kept)]
+        held = drag(found, kept, place)
+        return held if "unseen" not in self.known(held) else found
+
+    def bring_whole(self, posture: Posture) -> tuple[Posture, str, float]:
+        """Return the corpus's nearest whole posture, where this one stands and faces; its clip, and seconds into it."""
+        corpus, count = self.corpus, len(self.corpus.skeleton)
+        mine, theirs = corpus.to_chains(posture.rotations)[:count], corpus.to_chains(corpus.rotations)[:, :count]
+        number = int(np.argmin(np.sum(rot.angle(theirs, mine) ** 2, axis=1)))
+        rotations = np.array(corpus.rotations[number])
+        way = rot.heading(posture.rotations[0]) - rot.heading(rotations[0])
+        rotations[0] = rot.mul(rot.about_vertical(way), rotations[0])
+        clip = corpus.clip_of(number)
+        seconds = float(corpus.times[number] - corpus.times[clip.start])
+        return settle(Posture(posture.skeleton, rot.normalise(rotations), posture.root), posture), clip.label, seconds
+
+    def _nearest(self, rotations: Floats) -> tuple[Floats, Ints]:
+        """Return the degrees from each joint's nearest orientation that was seen [J], and the number of that [J]."""
+        chains = self.corpus.to_chains(rotations)
+        cosines = np.empty(len(self._orientations))
+        numbers = np.empty(len(self._orientations), dtype=np.int64)
+        for joint, orientations in enumerate(self._orientations):
+            close = np.abs(orientations @ chains[joint])
+            numbers[joint] = close.argmax()
+            cosines[joint] = close[numbers[joint]]
+        return np.degrees(2.0 * np.arccos(np.minimum(cosines, 1.0))), numbers
+
+
+def settle(posture: Posture, before: Posture) -> Posture:
+    """Return a posture put where another stood: its soles over the places of those that stood, and as high.
+
+    Where none stood, the root stays.
+    """
+    soles = standing_soles(before)
+    if len(soles) == 0:
+        return posture
+    was, _ = contact_points(before.skeleton, before.rotations, before.root)
+    now, _ = contact_points(posture.skeleton, posture.rotations, posture.root)
+    shift = (was[soles] - now[soles]).mean(axis=0)
+    shift[1] = min(0.0, float(was[soles, 1].min())) - now[:, 1].min()
+    return Posture(posture.skeleton, posture.rotations, posture.root + shift)

@@ -1,0 +1,226 @@
+"""The pose editor's routes: open a posture, drag it, turn a joint of it, bring it to what the corpus knows, keep it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from motionmind.body.mirror import find_sides
+from motionmind.body.motion import Posture
+from motionmind.body.skeleton import Skeleton
+from motionmind.errors import MotionMindError, SkeletonError
+from motionmind.geometry import rotations as rot
+from motionmind.studio.api import body_of, error, json
+from motionmind.studio.edits import Frame, Key
+from motionmind.studio.handles import handles_of, mirror, turned, turns_of, words_of
+from motionmind.studio.known import Memory
+from motionmind.studio.reach import drag, put_on_floor, standing_feet
+from motionmind.studio.score_lines import score_lines
+
+if TYPE_CHECKING:
+    from motionmind.studio.studio import Studio
+
+_UNIT = 1e-3  # by which a rotation's length may differ from 1: pages round
+_REACH = 1e4  # metres from the middle of the floor at which nothing is posed
+
+Name = Annotated[str, msgspec.Meta(max_length=200)]
+Metres = Annotated[float, msgspec.Meta(ge=-_REACH, le=_REACH)]
+Coefficient = Annotated[float, msgspec.Meta(ge=-2.0, le=2.0)]
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A posture as the page holds it.
+
+    Attributes:
+        key: a movement on the same body.
+        rotations: x, y, z, w of each joint in turn, local to the parent [4 J].
+        root: place of the root, metres.
+    """
+
+    key: Key
+    rotations: Annotated[tuple[Coefficient, ...], msgspec.Meta(max_length=40_000)]
+    root: tuple[Metres, Metres, Metres]
+
+
+class Opening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request for a frame of a movement."""
+
+    key: Key
+    frame: Frame = 0
+
+
+class Dragging(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to drag a joint to a place.
+
+    Attributes:
+        pose: where the body is.
+        start: where it was when the drag began.
+        joint: the joint that is dragged.
+        place: where to, metres.
+        standing: the last joints of the feet that stay.
+    """
+
+    pose: Pose
+    start: Pose
+    joint: Name
+    place: tuple[Metres, Metres, Metres]
+    standing: Annotated[tuple[Name, ...], msgspec.Meta(max_length=100)]
+
+
+class Turning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to set an angle of a joint."""
+
+    pose: Pose
+    joint: Name
+    angle: Name
+    degrees: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
+
+
+class Changing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request for another posture, made of one.
+
+    Attributes:
+        pose: the posture.
+        to: "mirror" exchanges left and right, "floor" puts it on the floor, "known" brings it joint by joint to what
+            the corpus knows, "whole" to the corpus's nearest posture.
+        kept: the joint that stays in its place, if that can be.
+    """
+
+    pose: Pose
+    to: Literal["mirror", "floor", "known", "whole"]
+    kept: Name | None = None
+
+
+class Keeping(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to keep a posture in the project, or to write it as lines of a score."""
+
+    pose: Pose
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=80)]
+
+
+class Poser:
+    """Answers to what the editor asks."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._memories: dict[str, tuple[object, Memory]] = {}
+
+    def opened(self, asked: Opening) -> dict[str, Any]:
+        """Return a frame of a movement, and all that the editor shows of its body."""
+        motion = self._studio.movements.get(asked.key)
+        if asked.frame >= len(motion):
+            raise MotionMindError(f"{asked.key} has frames 0 to {len(motion) - 1}, no frame {asked.frame}")
+        posture = motion.posture(asked.frame)
+        skeleton = posture.skeleton
+        try:
+            find_sides(skeleton)
+            mirrors = True
+        except SkeletonError:
+            mirrors = False
+        return self.told(posture) | {
+            "key": asked.key,
+            "title": self._studio.movements.title(asked.key),
+            "joints": [{"joint": name, "words": words_of(name)} for name in skeleton.names],
+            "handles": [handle._asdict() for handle in handles_of(skeleton)],
+            "mirrors": mirrors,
+        }
+
+    def dragged(self, asked: Dragging) -> dict[str, Any]:
+        """Return the posture that a drag leads to."""
+        posture, start = self._posture(asked.pose), self._posture(asked.start)
+        found = drag(posture, asked.joint, np.array(asked.place), start=start, standing=asked.standing)
+        return self.told(found, turns=False)
+
+    def turned(self, asked: Turning) -> dict[str, Any]:
+        """Return the posture with a joint turned."""
+        return self.told(turned(self._posture(asked.pose), asked.joint, asked.angle, asked.degrees))
+
+    def changed(self, asked: Changing) -> dict[str, Any]:
+        """Return another posture made of one."""
+        posture = self._posture(asked.pose)
+        if asked.to == "mirror":
+            return self.told(mirror(posture))
+        if asked.to == "floor":
+            return self.told(put_on_floor(posture))
+        memory = self._memory()
+        if not memory.fits(posture):
+            raise MotionMindError("this corpus is of another body: it knows nothing of these joints")
+        if asked.to == "known":
+            return self.told(memory.bring_joints(posture, asked.kept))
+        found, clip, seconds = memory.bring_whole(posture)
+        return self.told(found) | {"words": f"as in {clip} at {int(seconds // 60)}:{seconds % 60:04.1f}"}
+
+    def kept(self, asked: Keeping) -> dict[str, Any]:
+        """Keep the posture in the project, and return the key of it."""
+        return {"key": self._studio.movements.keep(self._posture(asked.pose).as_motion(), asked.name)}
+
+    def scored(self, asked: Keeping) -> dict[str, Any]:
+        """Return the posture as lines of a score."""
+        return {"lines": score_lines(self._posture(asked.pose), asked.name)}
+
+    def told(self, posture: Posture, *, turns: bool = True) -> dict[str, Any]:
+        """Return what the editor shows of a posture, with the angles of its joints only if they are wanted."""
+        out: dict[str, Any] = {
+            "rotations": posture.rotations.reshape(-1).tolist(),
+            "root": posture.root.tolist(),
+            "standing": standing_feet(posture),
+            "corpus": self._studio.project.state.corpus,
+        }
+        memory = self._memory()
+        out["known"] = memory.known(posture) if memory.fits(posture) else []
+        if turns:
+            out["turns"] = [turn._asdict() for turn in turns_of(posture)]
+        return out
+
+    def _memory(self) -> Memory:
+        name = self._studio.project.state.corpus
+        engine = self._studio.engine(name)
+        if name not in self._memories or self._memories[name][0] is not engine:
+            self._memories = {name: (engine, Memory(engine))}
+        return self._memories[name][1]
+
+    def _posture(self, pose: Pose) -> Posture:
+        skeleton = self._skeleton(pose.key)
+        rotations = np.array(pose.rotations)
+        if len(rotations) != 4 * len(skeleton):
+            raise MotionMindError(f"a posture of {skeleton.name} has {4 * len(skeleton)} numbers, not {len(rotations)}")
+        rotations = rotations.reshape(-1, 4)
+        if np.any(np.abs(rot.norm(rotations) - 1.0) > _UNIT):
+            raise MotionMindError("a rotation is no unit quaternion")
+        return Posture(skeleton, rot.normalise(rotations), np.array(pose.root))
+
+    def _skeleton(self, key: str) -> Skeleton:
+        return self._studio.movements.get(key).skeleton
+
+
+def routes(studio: Studio) -> list[BaseRoute]:
+    """Return the routes of the editor."""
+    poser = Poser(studio)
+    one = asyncio.Lock()  # at a time: they share what is known of the corpus
+
+    def route(path: str, schema: type[Any], answer: Callable[[Any], dict[str, Any]]) -> Route:
+        async def respond(request: Request) -> Response:
+            asked = await body_of(request, schema)
+            async with one:
+                try:
+                    return json(await asyncio.to_thread(answer, asked))
+                except MotionMindError as problem:
+                    return error(str(problem))
+
+        return Route(path, respond, methods=["POST"])
+
+    return [
+        route("/api/pose/open", Opening, poser.opened),
+        route("/api/pose/drag", Dragging, poser.dragged),
+        route("/api/pose/turn", Turning, poser.turned),
+        route("/api/pose/change", Changing, poser.changed),
+        route("/api/pose/keep", Keeping, poser.kept),
+        route("/api/pose/score", Keeping, poser.scored),
+    ]

@@ -1,0 +1,308 @@
+"""Inverse kinematics: the posture nearest to one that is, in which a joint is where somebody drags it.
+
+Feet that stand stay, and nothing sinks into the floor; the dragged joint goes to its place as far as that leaves
+room; all joints stay near where they were when the drag began. Each step is a damped least-squares step on the joints'
+angles, and an angle that would leave its limits stops there while the others make up for it. Sources: Wampler,
+"Manipulator inverse kinematic solutions based on vector formulations and damped least-squares methods", IEEE
+Transactions on Systems, Man and Cybernetics 16 (1986); for limits Baerlocher and Boulic, "An inverse kinematics
+architecture enforcing an arbitrary number of strict priority levels", The Visual Computer 20 (2004). Their strict order
+of wishes was tried: where a standing foot and limits leave no room it is unstable, and weights are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Ints
+from motionmind.body.contact import contact_points, find_feet
+from motionmind.body.limbs import limb_of_points, limbs_of
+from motionmind.body.motion import Posture
+from motionmind.body.support import size_of
+from motionmind.geometry import rotations as rot
+from motionmind.studio.joint_angles import JointAngles
+
+STANDS = 0.04  # metres above the floor below which a foot's sole stands, of a body as large as a person
+SNAPS = 0.04  # metres above its height in a foot that is flat within which a dragged joint puts its foot on the floor
+FOOT = 0.12  # metres above the sole at rest up to which a joint is a part of the foot
+SOLE = 0.03  # metres above a foot's lowest point at rest of what is its sole
+# Of a miss of a metre: feet and floor count most, at the end even more, then the dragged joint, then where joints were.
+_KEPT, _KEPT_AT_LAST, _PULL = 10.0, 100.0, 0.02
+_JUDGED = 0.1  # how much less feet count where a step is judged: a foot that a step lifts a little, the next puts back
+_DAMPING = 0.01  # metres for a radian of a step: a bone stretched straight does not jerk
+_ROUNDS, _SETTLING = 14, 14  # steps at most with the pull to where joints were, then without it
+_TRIES = 6  # to find the angles that stop at their limits in a step
+_AT_REST, _SLOW, _SMALL = 1e-6, 1e-3, 1e-9  # radians of a step, share and square metres of a gain, at which steps end
+_CLEAR = 1e-4  # metres by which a point may be under the floor
+_STRIDE = 0.25  # metres that a step goes at most, of a body as large as a person
+_FURTHEST = 0.4  # radians that an angle changes in a step at most
+_TRUNK, _ROOT, _TRAVEL = 0.4, 0.25, 0.15  # how readily trunk and root turn beside limbs, and metres to a radian
+
+
+class Wishes(NamedTuple):
+    """Wished places of points, each along one direction.
+
+    Attributes:
+        points: numbers of the points [R].
+        directions: unit vectors [R, 3].
+        places: along these, metres [R].
+    """
+
+    points: Ints
+    directions: Floats
+    places: Floats
+
+    def and_also(self, other: Wishes) -> Wishes:
+        """Return these and other wishes."""
+        return Wishes(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+
+class _Problem(NamedTuple):
+    """The weighted sum of squares of a drag: what is kept, what is wished, and the way back to where joints were."""
+
+    kept: Wishes
+    wished: Wishes
+    keeping: float
+    pull: float
+
+
+def drag(
+    posture: Posture, joint: str, place: Floats, *, start: Posture | None = None, standing: Sequence[str] | None = None
+) -> Posture:
+    """Return the posture with a joint at a place, or as near to it as the body reaches.
+
+    Args:
+        posture: where the body is.
+        joint: the joint that is dragged.
+        place: where to [3], metres.
+        start: the posture in which the drag began, near which joints stay; `posture` by default.
+        standing: the last joints of the feet that stay where they are in `start`; None for all that stand there. The
+            foot that the dragged joint is a part of never stays.
+
+    Raises:
+        SkeletonError: there is no such joint.
+    """
+    start = posture if start is None else start
+    body = _Body(start)
+    dragged = posture.skeleton.index(joint)
+    kept, wished = body.kept(standing, dragged), body.wished(dragged, place)
+    return body.solve(posture, kept, wished, travels=len(kept.points) > 0 or dragged == 0)
+
+
+def standing_feet(posture: Posture) -> list[str]:
+    """Return the last joints of the feet that stand on the floor."""
+    body = _Body(posture)
+    return [posture.skeleton.names[leaf] for leaf, sole in body.soles.items() if body.low(sole).any()]
+
+
+def standing_soles(posture: Posture) -> Ints:
+    """Return the points of soles that stand on the floor, as numbers in `motionmind.body.contact.contact_points`."""
+    return _Body(posture).kept(None, None).points[::3]
+
+
+def put_on_floor(posture: Posture) -> Posture:
+    """Return the posture with its lowest point on the floor, and flat on it the feet that are near it then."""
+    lowest = float(contact_points(posture.skeleton, posture.rotations, posture.root)[0][:, 1].min())
+    down = Posture(posture.skeleton, posture.rotations, posture.root - np.array([0.0, lowest, 0.0]))
+    body = _Body(down)
+    near = [sole for sole in body.soles.values() if body.began[sole, 1].min() <= FOOT * body.size]
+    if not near:
+        return down
+    points = np.concatenate(near)
+    flat = Wishes(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), np.zeros(len(points)))
+    nothing = Wishes(points[:0], flat.directions[:0], flat.places[:0])
+    return body.solve(down, flat, nothing, travels=True)
+
+
+class _Body:
+    """A body where a drag begins: its angles, the points that it touches the floor with, and how they move."""
+
+    def __init__(self, start: Posture) -> None:
+        self.skeleton = skeleton = start.skeleton
+        self.size, self.start = size_of(skeleton), start
+        self.angles = JointAngles(skeleton, start.rotations[None])
+        self.home = self.angles.of(start.rotations)
+        count = len(skeleton)
+        upright = np.tile(rot.IDENTITY, (count, 1))
+        at_rest, joints = contact_points(skeleton, upright, np.zeros(3))
+        self.began = contact_points(skeleton, start.rotations, start.root)[0]
+        # Segments lead from each joint's parent to it, then from joints to their points.
+        self.segments = np.concatenate([skeleton.offsets, at_rest[count:] - at_rest[joints[count:]]])
+        self.above = np.concatenate([skeleton.parents, joints[count:]])
+        carries = self.angles.carries
+        # The last point on the way to each point [P] that goes round a joint [J] as it turns; the joint if none does.
+        self.last = np.tile(np.arange(count), (len(joints), 1))
+        for point, above in enumerate(self.above[1:], start=1):
+            self.last[point] = np.where(carries[above], point, self.last[above])
+        self.limbs = limbs_of(skeleton)
+        self.heights = at_rest[:, 1]
+        self.bottom = np.minimum(self.began[:, 1], 0.0)
+        self.soles = self._soles(self.heights, limb_of_points(skeleton)[joints])
+        readily = np.full((count, 3), _TRUNK)
+        readily[[joint for limb in self.limbs for joint in limb]] = 1.0
+        readily[0] = _ROOT
+        self.readily = np.append(readily.reshape(-1), np.full(3, _TRAVEL * self.size))
+
+    def _soles(self, heights: Floats, limb: Ints) -> dict[int, Ints]:
+        """Return the points of each foot's sole, by the foot's last joint."""
+        out = {}
+        for leaf in find_feet(self.skeleton):
+            points = np.flatnonzero(limb == limb[leaf])
+            out[leaf] = points[heights[points] <= heights[points].min() + SOLE * self.size]
+        return out
+
+    def low(self, points: Ints) -> Bools:
+        """Return which points stood on the floor when the drag began."""
+        return np.asarray(self.began[points, 1] <= STANDS * self.size)
+
+    def _foot_of(self, joint: int) -> int | None:
+        """Return the last joint of the foot that a joint is a part of; None if it is of none."""
+        for limb in self.limbs:
+            for leaf in set(limb) & set(self.soles):
+                if joint in limb and self.above_sole(joint, leaf) <= FOOT * self.size:
+                    return leaf
+        return None
+
+    def above_sole(self, joint: int, leaf: int) -> float:
+        """Return how high a joint is above the sole of its foot at rest, metres."""
+        return float(self.heights[joint] - self.heights[self.soles[leaf]].min())
+
+    # --- wishes ---------------------------------------------------------------------------------------------------
+
+    def kept(self, standing: Sequence[str] | None, dragged: int | None) -> Wishes:
+        """Return the wish that feet stay where they stand."""
+        own = None if dragged is None else self._foot_of(dragged)
+        names = self.skeleton.names
+        feet = [leaf for leaf in self.soles if leaf != own and (standing is None or names[leaf] in standing)]
+        points = [self.soles[leaf] for leaf in feet]
+        if standing is None:
+            points = [sole[self.low(sole)] for sole in points]
+        chosen = np.concatenate([np.zeros(0, dtype=np.int64), *points])
+        places = self.began[chosen].reshape(-1)
+        return Wishes(np.repeat(chosen, 3), np.tile(np.eye(3), (len(chosen), 1)), places)
+
+    def wished(self, dragged: int, place: Floats) -> Wishes:
+        """Return the wish for a joint's place; near the floor a foot is put down flat."""
+        leaf = self._foot_of(dragged)
+        whole = Wishes(np.full(3, dragged), np.eye(3), np.asarray(place, dtype=np.float64))
+        if leaf is None:
+            return whole
+        sole = self.soles[leaf]
+        if place[1] > self.above_sole(dragged, leaf) + SNAPS * self.size:
+            return whole
+        level = Wishes(whole.points[::2], whole.directions[::2], whole.places[::2])
+        down = Wishes(sole, np.tile([0.0, 1.0, 0.0], (len(sole), 1)), np.zeros(len(sole)))
+        return level.and_also(down)
+
+    # --- steps ----------------------------------------------------------------------------------------------------
+
+    def solve(self, posture: Posture, kept: Wishes, wished: Wishes, *, travels: bool) -> Posture:
+        """Return the posture in which both wishes are met, the first before the second.
+
+        Args:
+            posture: where to begin.
+            kept: the wish that comes first.
+            wished: the wish that comes second.
+            travels: whether the root's place may change.
+        """
+        here = np.append(self.angles.of(posture.rotations).reshape(-1), posture.root)
+        self.mobile = np.append(self.angles.free.reshape(-1), np.full(3, travels))
+        for keeping, pull, rounds in ((_KEPT, _PULL, _ROUNDS), (_KEPT_AT_LAST, 0.0, _SETTLING)):
+            problem = _Problem(kept, wished, keeping, pull)
+            here = self._descend(here, problem, rounds)
+        return Posture(self.skeleton, rot.normalise(self.angles.rotations(here[:-3].reshape(-1, 3))), here[-3:])
+
+    def _descend(self, here: Floats, problem: _Problem, rounds: int) -> Floats:
+        """Return angles and root [D] that make the weighted sum of squares less in some rounds, from `here` [D] on."""
+        damping, moving = _DAMPING, self._slopes(here)
+        cost = self._cost(here, moving[0], problem)
+        for _ in range(rounds):
+            ahead = here + self._step(here, moving, problem, damping)
+            step = np.append(self.angles.within(ahead[:-3].reshape(-1, 3)).reshape(-1), ahead[-3:]) - here
+            found = self._slopes(here + step)
+            less = self._cost(here + step, found[0], problem)
+            if less <= cost:
+                rests = np.abs(step).max() < _AT_REST or less > (1.0 - _SLOW) * cost - _SMALL
+                here, moving, cost, damping = here + step, found, less, max(0.3 * damping, _DAMPING)
+                if rests:
+                    break
+            else:
+                damping *= 6.0
+        return here
+
+    def _cost(self, here: Floats, places: Floats, problem: _Problem) -> float:
+        """Return the weighted sum of squares that is to be small."""
+        sunk = np.minimum(places[:, 1] - self.bottom, 0.0)
+        kept = float(np.sum(_missed(problem.kept, places) ** 2) + sunk @ sunk)
+        back = self._back(here) * self.mobile
+        wished = float(np.sum(_missed(problem.wished, places) ** 2))
+        return float((_JUDGED * problem.keeping) ** 2 * kept + wished + problem.pull**2 * (back @ back))
+
+    def _back(self, here: Floats) -> Floats:
+        """Return the way back to where angles and root were [D], as readily as they go.
+
+        A body that turned goes back the short way round.
+        """
+        way = self.home - here[:-3].reshape(-1, 3)
+        way = np.where(np.isfinite(self.angles.least), way, np.angle(np.exp(1j * way)))
+        return np.asarray(np.append(way.reshape(-1), self.start.root - here[-3:]) / self.readily)
+
+    def _slopes(self, here: Floats) -> tuple[Floats, Floats]:
+        """Return the places of all points [P, 3], and how far they go for each angle and along each axis [P, 3, D]."""
+        angles, root = here[:-3].reshape(-1, 3), here[-3:]
+        turned, axes = self.angles.turns(angles)
+        bones = rot.mul_vec(turned[np.maximum(self.above, 0)], self.segments)
+        places = np.empty_like(bones)
+        places[0] = root
+        for point, above in enumerate(self.above[1:], start=1):
+            places[point] = places[above] + bones[point]
+        levers = places[self.last] - places[: len(self.skeleton)]
+        slopes = np.empty((len(places), 3, axes.size // 3 + 3))
+        across = rot.cross(axes[None], levers[:, :, None, :])
+        slopes[..., :-3] = np.moveaxis(across.reshape(len(places), -1, 3), -1, 1)
+        slopes[..., -3:] = np.eye(3)
+        return places, slopes
+
+    def _step(self, here: Floats, moving: tuple[Floats, Floats], problem: _Problem, damping: float) -> Floats:
+        """Return the step [D] of angles and root: those at their limits stop, and nothing sinks into the floor."""
+        (places, slopes), (kept, wished, keeping, pull) = moving, problem
+        angles = here[:-3].reshape(-1, 3)
+        least = np.append((self.angles.least - angles).reshape(-1), np.full(3, -np.inf))
+        most = np.append((self.angles.most - angles).reshape(-1), np.full(3, np.inf))
+        back = self._back(here)
+        step, stopped = np.zeros(len(back)), ~self.mobile
+        sunk = places[:, 1] < self.bottom - _CLEAR
+        rows = [self._rows(wishes, places, slopes) for wishes in (kept, wished)]
+        for _ in range(_TRIES):
+            floor = np.flatnonzero(sunk)
+            first, second, third = *rows, (self.bottom[floor] - places[floor, 1], slopes[floor, 1])
+            missed = np.concatenate([keeping * first[0], second[0], keeping * third[0]])
+            turns = np.concatenate([keeping * first[1], second[1], keeping * third[1]])
+            free = ~stopped
+            mine = turns[:, free] * self.readily[free]
+            square = mine.T @ mine + (damping**2 + pull**2) * np.eye(mine.shape[1])
+            right = mine.T @ (missed - turns[:, stopped] @ step[stopped]) + pull**2 * back[free]
+            step[free] = self.readily[free] * np.linalg.solve(square, right)
+            step *= min(1.0, _FURTHEST / max(np.abs(step).max(), 1e-12))
+            over = free & ((step < least) | (step > most))
+            falling = places[:, 1] + slopes[:, 1] @ step < self.bottom - _CLEAR
+            if not over.any() and not (falling & ~sunk).any():
+                break
+            step[over] = np.clip(step, least, most)[over]
+            stopped |= over
+            sunk |= falling
+        return np.clip(step, least, most)
+
+    def _rows(self, wishes: Wishes, places: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+        """Return what is missed of wishes [R], a stride at most, and how far each angle brings it [R, D]."""
+        missed = _missed(wishes, places)
+        far = np.abs(missed).max(initial=0.0)
+        missed = missed * min(1.0, _STRIDE * self.size / max(far, 1e-12))
+        return missed, np.einsum("rx,rxd->rd", wishes.directions, slopes[wishes.points])
+
+
+def _missed(wishes: Wishes, places: Floats) -> Floats:
+    """Return by how much wishes are missed [R], metres, by points at places [P, 3]."""
+    return np.asarray(wishes.places - np.sum(wishes.directions * places[wishes.points], axis=-1))
