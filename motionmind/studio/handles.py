@@ -25,6 +25,22 @@ _HANDLES = {
     "knee": "knee",
     "ankle": "foot",
 }
+_LABELS = {
+    "flexion": "bend / stretch",
+    "abduction": "out / across",
+    "rotation": "turn out / in",
+    "tilt": "lean forward / back",
+    "list": "lean left / right",
+    "bend": "lean left / right",
+    "turn": "turn left / right",
+    "plantar": "point / flex",
+    "inversion": "roll in / out",
+    "elevation": "up / down",
+    "protraction": "forward / back",
+    "supination": "palm up / down",
+    "radial": "to the thumb / little finger",
+    "spread": "spread",
+}
 _FREELY = ("bend", "turn", "lean")  # about x, y and z, of a joint whose angles have no names
 _WORDS = {"lumbar": "lower back", "thorax": "upper back", "cervical": "neck", "atlantal": "head"}
 
@@ -42,8 +58,8 @@ class Turn(NamedTuple):
     Attributes:
         joint: the joint.
         words: words for the joint.
-        angle: the angle's name, and its opposite's if it has one: "flexion", "extension".
-        opposite: the name of its negative; "" if it has none.
+        angle: the angle's name: "flexion".
+        label: words for its positive and negative sense: "bend / stretch".
         least, most: its limits.
         degrees: its value.
     """
@@ -51,7 +67,7 @@ class Turn(NamedTuple):
     joint: str
     words: str
     angle: str
-    opposite: str
+    label: str
     least: float
     most: float
     degrees: float
@@ -89,7 +105,7 @@ def turns_of(posture: Posture) -> list[Turn]:
     if anatomy is None:
         vectors = np.degrees(rot.log(posture.rotations))
         return [
-            Turn(name, words_of(name), angle, "", -180.0, 180.0, float(vectors[joint, axis]))
+            Turn(name, words_of(name), angle, angle, -180.0, 180.0, float(vectors[joint, axis]))
             for joint, name in enumerate(skeleton.names)
             for axis, angle in enumerate(_FREELY)
         ]
@@ -100,7 +116,8 @@ def turns_of(posture: Posture) -> list[Turn]:
             at = joint, angle.axis
             ends = sorted(angle.sign * end for end in np.clip((least[at], most[at]), -180.0, 180.0))
             value = float(angle.sign * values[at])
-            out.append(Turn(name, words_of(name), called, angle.opposite, float(ends[0]), float(ends[1]), value))
+            label = _LABELS.get(called, " / ".join(filter(None, (called, angle.opposite))))
+            out.append(Turn(name, words_of(name), called, label, float(ends[0]), float(ends[1]), value))
     return out
 
 

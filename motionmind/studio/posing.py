@@ -83,6 +83,12 @@ class Turning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     degrees: Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 
 
+class Telling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request for what the editor shows of a posture."""
+
+    pose: Pose
+
+
 class Changing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A request for another posture, made of one.
 
@@ -134,17 +140,17 @@ class Poser:
 
     def dragged(self, asked: Dragging) -> dict[str, Any]:
         """Return the posture that a drag leads to."""
-        posture, start = self._posture(asked.pose), self._posture(asked.start)
+        posture, start = self.posture(asked.pose), self.posture(asked.start)
         found = drag(posture, asked.joint, np.array(asked.place), start=start, standing=asked.standing)
         return self.told(found, turns=False)
 
     def turned(self, asked: Turning) -> dict[str, Any]:
         """Return the posture with a joint turned."""
-        return self.told(turned(self._posture(asked.pose), asked.joint, asked.angle, asked.degrees))
+        return self.told(turned(self.posture(asked.pose), asked.joint, asked.angle, asked.degrees))
 
     def changed(self, asked: Changing) -> dict[str, Any]:
         """Return another posture made of one."""
-        posture = self._posture(asked.pose)
+        posture = self.posture(asked.pose)
         if asked.to == "mirror":
             return self.told(mirror(posture))
         if asked.to == "floor":
@@ -159,14 +165,14 @@ class Poser:
 
     def kept(self, asked: Keeping) -> dict[str, Any]:
         """Keep the posture in the project, and return the key of it."""
-        return {"key": self._studio.movements.keep(self._posture(asked.pose).as_motion(), asked.name)}
+        return {"key": self._studio.movements.keep(self.posture(asked.pose).as_motion(), asked.name)}
 
     def scored(self, asked: Keeping) -> dict[str, Any]:
         """Return the posture as lines of a score."""
-        return {"lines": score_lines(self._posture(asked.pose), asked.name)}
+        return {"lines": score_lines(self.posture(asked.pose), asked.name)}
 
     def told(self, posture: Posture, *, turns: bool = True) -> dict[str, Any]:
-        """Return what the editor shows of a posture, with the angles of its joints only if they are wanted."""
+        """Return what the editor shows of a posture; of the angles without `turns` only the degrees."""
         out: dict[str, Any] = {
             "rotations": posture.rotations.reshape(-1).tolist(),
             "root": posture.root.tolist(),
@@ -175,9 +181,10 @@ class Poser:
         }
         memory = self._memory()
         out["known"] = memory.known(posture) if memory.fits(posture) else []
-        if turns:
-            out["turns"] = [turn._asdict() for turn in turns_of(posture)]
-        return out
+        found = turns_of(posture)
+        return out | (
+            {"turns": [turn._asdict() for turn in found]} if turns else {"degrees": [t.degrees for t in found]}
+        )
 
     def _memory(self) -> Memory:
         name = self._studio.project.state.corpus
@@ -186,7 +193,8 @@ class Poser:
             self._memories = {name: (engine, Memory(engine))}
         return self._memories[name][1]
 
-    def _posture(self, pose: Pose) -> Posture:
+    def posture(self, pose: Pose) -> Posture:
+        """Return the posture that the page holds; MotionMindError if it is none."""
         skeleton = self._skeleton(pose.key)
         rotations = np.array(pose.rotations)
         if len(rotations) != 4 * len(skeleton):
@@ -218,6 +226,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
 
     return [
         route("/api/pose/open", Opening, poser.opened),
+        route("/api/pose/tell", Telling, lambda asked: poser.told(poser.posture(asked.pose))),
         route("/api/pose/drag", Dragging, poser.dragged),
         route("/api/pose/turn", Turning, poser.turned),
         route("/api/pose/change", Changing, poser.changed),

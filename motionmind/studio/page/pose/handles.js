@@ -1,0 +1,178 @@
+/** The handles over the picture: a button on each joint that can be dragged, a mark on every other. */
+
+import { Vector3 } from "three";
+
+const STEP = 0.01; // metres that a key moves a handle, of a body as large as a person; with Shift five times as far
+const WORDS = { seen: "seen", near: "nearly seen", unseen: "never seen" };
+const WAYS = /** @type {Record<string, number[]>} */ ({
+  ArrowLeft: [-1, 0, 0],
+  ArrowRight: [1, 0, 0],
+  ArrowUp: [0, 1, 0],
+  ArrowDown: [0, -1, 0],
+  PageUp: [0, 0, -1], // away from whoever looks
+  PageDown: [0, 0, 1],
+});
+
+export class Handles {
+  /** @param {import("./session.js").Editor} editor */
+  constructor(editor) {
+    this.editor = editor;
+    this.viewer = editor.studio.viewer;
+    this.element = Object.assign(document.createElement("div"), { className: "pose-handles" });
+    this.element.setAttribute("role", "group");
+    this.element.setAttribute("aria-label", "Handles of the body");
+    this.viewer.overlay.append(this.element);
+    /** @type {HTMLElement[]} one a joint */
+    this.marks = [];
+    this.point = new Vector3();
+    /** @type {{joint: string, plane: Vector3, away: Vector3, moved: boolean} | null} */
+    this.held = null;
+    /** @type {number[] | null} where keys have moved the handle to */
+    this.goal = null;
+    this.listening = new AbortController();
+    const { signal } = this.listening;
+    this.viewer.addEventListener("draw", () => this.#follow(), { signal });
+    this.viewer.addEventListener("show", () => this.#appear(), { signal });
+    editor.addEventListener("open", () => this.#make(), { signal });
+    editor.addEventListener("change", () => this.#tell(), { signal });
+    this.#make();
+  }
+
+  /** Take the handles away. */
+  remove() {
+    this.listening.abort();
+    this.element.remove();
+  }
+
+  #make() {
+    const { editor } = this;
+    const handles = new Map(editor.handles.map(({ joint, words }) => [joint, words]));
+    this.marks = editor.joints.map(({ joint }) => {
+      const words = handles.get(joint);
+      return words === undefined ? mark() : this.#handle(joint, words);
+    });
+    // The Tab key goes from handle to handle as they are listed.
+    this.element.replaceChildren(...this.marks);
+    this.#appear();
+    this.#tell();
+  }
+
+  #appear() {
+    this.element.hidden = !this.editor.shown;
+    this.viewer.stale();
+  }
+
+  /** @param {string} joint @param {string} words */
+  #handle(joint, words) {
+    const handle = document.createElement("button");
+    Object.assign(handle, { type: "button", className: "pose-handle", title: words });
+    handle.dataset.testid = `handle-${joint}`;
+    handle.dataset.words = words;
+    handle.append(mark());
+    handle.addEventListener("focus", () => this.editor.select(joint));
+    handle.addEventListener("pointerdown", (event) => this.#hold(event, handle, joint));
+    handle.addEventListener("pointermove", (event) => this.#move(event));
+    for (const over of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      handle.addEventListener(over, () => this.#release(words));
+    }
+    handle.addEventListener("keydown", (event) => this.#press(event, joint));
+    handle.addEventListener("keyup", () => this.#let(words));
+    handle.addEventListener("blur", () => this.#let(words));
+    return handle;
+  }
+
+  /** Show how well each joint is known. */
+  #tell() {
+    const { known, selected, joints } = this.editor;
+    this.marks.forEach((element, i) => {
+      const how = known[i] ?? "seen";
+      element.dataset.known = known.length ? how : "";
+      if (element.dataset.words) {
+        const words = known.length ? `${element.dataset.words}: ${WORDS[how]}` : element.dataset.words;
+        if (element.getAttribute("aria-label") !== words) element.setAttribute("aria-label", words);
+        element.classList.toggle("selected", joints[i].joint === selected);
+      }
+    });
+  }
+
+  /** Put the handles where their joints are seen. */
+  #follow() {
+    const { editor, viewer } = this;
+    if (!editor.shown || !viewer.stage) return;
+    const { camera } = viewer.stage;
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const places = editor.places();
+    this.marks.forEach((element, i) => {
+      this.point.fromArray(places, 3 * i).project(camera);
+      const [x, y] = [0.5 * (this.point.x + 1) * width, 0.5 * (1 - this.point.y) * height];
+      element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
+      element.style.zIndex = String(1000 - Math.round(1000 * this.point.z)); // the nearest is on top
+    });
+  }
+
+  /** @param {PointerEvent} event @param {HTMLElement} handle @param {string} joint */
+  #hold(event, handle, joint) {
+    if (event.button !== 0) return;
+    event.preventDefault();
+    handle.focus({ preventScroll: true });
+    handle.setPointerCapture(event.pointerId);
+    const plane = new Vector3().fromArray(this.editor.place(joint));
+    this.held = { joint, plane, away: new Vector3(), moved: false };
+    this.held.away.copy(plane).sub(this.#under(event, plane) ?? plane);
+  }
+
+  /** @param {PointerEvent} event */
+  #move(event) {
+    const { held } = this;
+    const place = held && this.#under(event, held.plane);
+    if (!held || !place) return;
+    held.moved = true;
+    this.editor.drag(held.joint, place.add(held.away).toArray());
+  }
+
+  /** @param {string} words */
+  #release(words) {
+    const { held } = this;
+    this.held = null;
+    if (held?.moved) this.editor.end(`drag the ${words}`);
+  }
+
+  /** The place under the pointer in the plane through `place` that faces the camera. @param {PointerEvent} event @param {Vector3} place */
+  #under(event, place) {
+    const { camera } = this.viewer.stage;
+    const { left, top, width, height } = this.element.getBoundingClientRect();
+    const x = (2 * (event.clientX - left)) / width - 1;
+    const y = 1 - (2 * (event.clientY - top)) / height;
+    const ray = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
+    const facing = camera.getWorldDirection(new Vector3());
+    const along = ray.dot(facing);
+    if (along < 1e-6) return null;
+    return ray.multiplyScalar(place.clone().sub(camera.position).dot(facing) / along).add(camera.position);
+  }
+
+  /** @param {KeyboardEvent} event @param {string} joint */
+  #press(event, joint) {
+    const way = WAYS[event.key];
+    if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const far = STEP * this.editor.motion.body.size * (event.shiftKey ? 5 : 1);
+    const towards = new Vector3(...way).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(far);
+    this.goal ??= this.editor.place(joint);
+    this.goal = new Vector3(...this.goal).add(towards).toArray();
+    this.editor.drag(joint, this.goal);
+  }
+
+  /** @param {string} words */
+  #let(words) {
+    if (!this.goal) return;
+    this.goal = null;
+    this.editor.end(`drag the ${words}`);
+  }
+}
+
+function mark() {
+  const element = Object.assign(document.createElement("span"), { className: "pose-mark" });
+  element.setAttribute("aria-hidden", "true");
+  return element;
+}

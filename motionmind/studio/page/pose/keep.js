@@ -1,0 +1,75 @@
+/** What becomes of a posture: a name, an end of a movement, a place on the line of time, lines of a score. */
+
+import { html, useState } from "../vendor/htm-preact-standalone.js";
+import { deskOf } from "../between/desk.js";
+import { forget } from "../movements.js";
+
+/** @param {{studio: any, editor: import("./session.js").Editor}} props */
+export function Keep({ studio, editor }) {
+  const [name, setName] = useState("");
+  const [lines, setLines] = useState("");
+  const called = name.trim() || fresh(studio);
+  const save = async () => {
+    const key = await editor.keep(called);
+    forget(`own/${called}`);
+    await studio.api.edit({ edit: "posture", name: called, posture: key });
+    studio.say(`Saved as ${called}.`);
+    return `own/${called}`;
+  };
+  const end = (/** @type {"a" | "b"} */ which) => async () => {
+    const key = await editor.keep(called);
+    deskOf(studio).set(which, { key, frame: 0, title: called });
+    studio.open("between");
+  };
+  const place = async () => {
+    const key = await editor.keep(called);
+    const id = `${studio.window}-p${Date.now().toString(36)}`;
+    await studio.api.edit({ edit: "insert", id, source: key, first: 0, last: 0, mirrored: false, before: null });
+    studio.say("On the time line.");
+  };
+  const copy = async () => {
+    const text = await editor.lines(called);
+    setLines(text);
+    await navigator.clipboard?.writeText(text).then(
+      () => studio.say("Copied as lines of a score."),
+      () => {},
+    );
+  };
+  const doing = (/** @type {() => Promise<any>} */ act) => () => studio.act(act);
+  return html`<section class="stack" aria-label="Keep the posture">
+    <h3>Keep it</h3>
+    <form
+      class="row"
+      onSubmit=${(/** @type {Event} */ event) => {
+        event.preventDefault();
+        studio.act(save);
+      }}
+    >
+      <input
+        class="field grow"
+        data-testid="posture-name"
+        aria-label="Name of the posture"
+        placeholder=${called}
+        maxlength="40"
+        value=${name}
+        onInput=${(/** @type {any} */ event) => setName(event.target.value)}
+      />
+      <button class="button" type="submit" data-testid="save-posture">Save</button>
+    </form>
+    <div class="row wide">
+      <button class="button" data-testid="use-a" onClick=${doing(end("a"))}>Use as A</button>
+      <button class="button" data-testid="use-b" onClick=${doing(end("b"))}>Use as B</button>
+      <button class="button" data-testid="posture-to-timeline" onClick=${doing(place)}>Onto the time line</button>
+      <button class="button" data-testid="copy-score" onClick=${doing(copy)}>Copy for a score</button>
+    </div>
+    ${lines && html`<textarea readonly aria-label="Lines of a score" data-testid="score-lines" value=${lines}></textarea>`}
+  </section>`;
+}
+
+/** A name that no saved posture has. @param {any} studio */
+function fresh(studio) {
+  const taken = new Set((studio.store.state?.postures ?? []).map((/** @type {any} */ posture) => posture.name));
+  let number = 1;
+  while (taken.has(`posture-${number}`)) number++;
+  return `posture-${number}`;
+}

@@ -1,0 +1,173 @@
+/** Flow 4, postures: what is posed, what the corpus knows of it, its joints one by one, and what becomes of it. */
+
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
+import { useChange, useKeys } from "../shell/hooks.js";
+import { Handles } from "./handles.js";
+import { Joints } from "./joints.js";
+import { Keep } from "./keep.js";
+import { editorOf } from "./session.js";
+
+const GROUP = "Pose";
+const KNOWN = /** @type {[import("./session.js").Known, string][]} */ ([
+  ["seen", "seen"],
+  ["near", "nearly"],
+  ["unseen", "never"],
+]);
+
+/** @param {{studio: any}} props */
+export function Panel({ studio }) {
+  const editor = editorOf(studio);
+  useChange(editor, () => editor.version);
+  useEffect(() => {
+    if (editor.motion) editor.show();
+    else studio.act(() => start(studio));
+    const handles = new Handles(editor);
+    return () => handles.remove();
+  }, []);
+  useKeys(studio, [
+    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: () => editor.undo() },
+    { keys: ["Ctrl+Shift+Z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: () => editor.redo() },
+    { keys: ["k"], does: "bring it to what is known", group: GROUP, act: () => toKnown(editor) },
+    { keys: ["f"], does: "feet on the floor", group: GROUP, act: () => toFloor(editor) },
+    { shown: ["Tab"], does: "from handle to handle", group: GROUP },
+    { shown: ["arrows", "Page up", "Page down"], does: "move a handle in the picture, away, towards; with Shift further", group: GROUP },
+  ]);
+  return html`<div class="pose stack" data-testid="editor">
+    <${Start} studio=${studio} />
+    ${
+      editor.motion
+        ? html`<${Known} editor=${editor} /><${Whole} editor=${editor} />
+            <${Keep} studio=${studio} editor=${editor} />
+            <${Joints} editor=${editor} />`
+        : html`<p class="empty">Let the viewer show a moment, then pose it.</p>`
+    }
+  </div>`;
+}
+
+/** Where posing starts. @param {{studio: any}} props */
+function Start({ studio }) {
+  const editor = editorOf(studio);
+  const postures = useGallery(studio);
+  const open = (/** @type {string} */ key, frame = 0) => studio.act(() => editor.open(key, frame));
+  const drop = (/** @type {DragEvent} */ event) => {
+    event.preventDefault();
+    const given = event.dataTransfer?.getData("application/x-motionmind-posture");
+    if (!given) return;
+    const { key, frame } = JSON.parse(given);
+    open(key, frame);
+  };
+  const moment = editor.shown ? null : studio.viewer.moment;
+  return html`<div onDragOver=${(/** @type {Event} */ event) => event.preventDefault()} onDrop=${drop}>
+    <label class="stack">
+      <h3>Start from</h3>
+      <select
+        data-testid="pose-from"
+        value=${editor.key}
+        onChange=${(/** @type {any} */ event) => event.target.value && open(event.target.value)}
+      >
+        <option value="">${editor.title || "a posture"}</option>
+        ${postures.map(({ group, of }) => html`<optgroup label=${group}>${of.map(({ key, title }) => html`<option value=${key}>${title}</option>`)}</optgroup>`)}
+      </select>
+    </label>
+    ${
+      moment &&
+      html`<button class="button" data-testid="pose-moment" onClick=${() => open(moment.key, moment.frame)}>
+        Pose the moment that is shown
+      </button>`
+    }
+    ${editor.motion && !editor.shown && html`<button class="button" onClick=${() => editor.show()}>Go on with the posture</button>`}
+  </div>`;
+}
+
+/** How much of the body the corpus knows. @param {{editor: import("./session.js").Editor}} props */
+function Known({ editor }) {
+  const { known, corpus, joints, words } = editor;
+  if (!known.length) return html`<p class="hint">${corpus} is of another body, and knows nothing of this one's joints.</p>`;
+  const strangers = joints.filter((_, i) => known[i] === "unseen").map((joint) => joint.words);
+  return html`<section aria-label="What the corpus knows">
+    <h3>Joints as ${corpus} has them</h3>
+    <div class="known" data-testid="known">
+      ${KNOWN.map(
+        ([how, label]) =>
+          html`<span><span class="known-mark ${how}" aria-hidden="true"></span>${known.filter((one) => one === how).length} ${label}</span>`,
+      )}
+    </div>
+    <p class="hint" aria-live="polite" data-testid="strangers">
+      ${words || (strangers.length ? `Never seen so: ${strangers.slice(0, 4).join(", ")}${strangers.length > 4 ? " …" : ""}` : "")}
+    </p>
+  </section>`;
+}
+
+/** What changes the whole posture. @param {{editor: import("./session.js").Editor}} props */
+function Whole({ editor }) {
+  const { past, future, known, standing, released, joints, mirrors } = editor;
+  const strange = known.some((one) => one !== "seen");
+  const wordsOf = (/** @type {string} */ joint) => joints.find((one) => one.joint === joint)?.words.replace(/ toes$/, " foot") ?? joint;
+  return html`<section class="stack" aria-label="The whole posture">
+    <div class="row wide">
+      <button class="button ${strange ? "primary" : ""}" data-testid="to-known" disabled=${!strange} onClick=${() => toKnown(editor)}>
+        Bring to what is known
+      </button>
+      <button class="button" data-testid="to-whole" disabled=${!known.length} onClick=${() => editor.change("whole", "take the nearest posture")}>
+        Nearest posture
+      </button>
+      <button class="button" data-testid="to-floor" onClick=${() => toFloor(editor)}>Feet on the floor</button>
+      <button class="button" data-testid="mirror-posture" disabled=${!mirrors} onClick=${() => editor.change("mirror", "mirror the posture")}>
+        Mirror
+      </button>
+      <button class="button" data-testid="pose-undo" disabled=${!past.length} title=${past.at(-1)?.words ?? ""} onClick=${() => editor.undo()}>
+        Back a step
+      </button>
+      <button class="button" data-testid="pose-redo" disabled=${!future.length} title=${future.at(-1)?.words ?? ""} onClick=${() => editor.redo()}>
+        Step again
+      </button>
+    </div>
+    ${standing.map(
+      (foot) =>
+        html`<label class="check">
+          <input
+            type="checkbox"
+            checked=${!released.has(foot)}
+            onChange=${(/** @type {any} */ event) => editor.hold(foot, event.target.checked)}
+          />
+          The ${wordsOf(foot)} stays where it stands
+        </label>`,
+    )}
+  </section>`;
+}
+
+/** @param {import("./session.js").Editor} editor */
+function toKnown(editor) {
+  return editor.change("known", "bring it to what is known");
+}
+
+/** @param {import("./session.js").Editor} editor */
+function toFloor(editor) {
+  return editor.change("floor", "put it on the floor");
+}
+
+/** Start from what is shown, or else from the first posture there is. @param {any} studio */
+async function start(studio) {
+  const { moment } = studio.viewer;
+  const from = moment ?? listed(await studio.api.get("/api/gallery"))[0]?.of[0];
+  if (from) await editorOf(studio).open(from.key, from.frame ?? 0);
+}
+
+/** The postures that there are, in groups. @param {any} studio */
+function useGallery(studio) {
+  const [found, setFound] = useState(/** @type {ReturnType<typeof listed>} */ ([]));
+  const saved = useChange(studio.store, () => studio.store.state?.postures?.length);
+  useEffect(() => {
+    studio.act(async () => setFound(listed(await studio.api.get("/api/gallery"))));
+  }, [saved]);
+  return found;
+}
+
+/**
+ * @param {{corpora: {name: string, postures: {key: string, title: string}[]}[], own: {key: string, title: string}[]}} gallery
+ * @returns {{group: string, of: {key: string, title: string, frame?: number}[]}[]}
+ */
+function listed({ corpora, own }) {
+  const groups = [{ group: "Your own", of: own }, ...corpora.map(({ name, postures }) => ({ group: name, of: postures }))];
+  return groups.filter(({ of }) => of.length > 0);
+}

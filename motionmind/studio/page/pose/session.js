@@ -1,0 +1,230 @@
+/** The pose editor: the posture that is being made, the steps that led to it, and what the corpus knows of it. */
+
+import { movement } from "../movements.js";
+import { Latest } from "./latest.js";
+import { Posed } from "./posed.js";
+
+const STEPS = 200; // that can be taken back
+
+/**
+ * @typedef {{rotations: number[], root: number[]}} Posture
+ * @typedef {{joint: string, words: string}} Handle
+ * @typedef {{joint: string, words: string, angle: string, label: string, least: number, most: number, degrees: number}} Turn
+ * @typedef {"seen" | "near" | "unseen"} Known
+ */
+
+/** @type {WeakMap<object, Editor>} */
+const editors = new WeakMap();
+
+/** The editor of a page. @param {any} studio @returns {Editor} */
+export function editorOf(studio) {
+  const known = editors.get(studio) ?? new Editor(studio);
+  editors.set(studio, known);
+  return known;
+}
+
+/** Fires "change" whenever something has changed, and "open" when another posture was opened. */
+export class Editor extends EventTarget {
+  /** @param {any} studio */
+  constructor(studio) {
+    super();
+    this.studio = studio;
+    /** @type {any} the posture as the viewer shows it */
+    this.motion = null;
+    this.key = "";
+    this.title = "";
+    this.corpus = "";
+    /** @type {Handle[]} */
+    this.joints = [];
+    /** @type {Handle[]} */
+    this.handles = [];
+    /** @type {Turn[]} */
+    this.turns = [];
+    /** @type {Known[]} how well each joint is known; empty where the corpus is of another body */
+    this.known = [];
+    /** @type {string[]} the feet that stand, by their last joints */
+    this.standing = [];
+    /** @type {Set<string>} feet that may leave their places */
+    this.released = new Set();
+    this.mirrors = false;
+    this.selected = "";
+    this.dragged = ""; // the joint that was dragged last
+    this.words = "";
+    /** @type {Posture} */
+    this.posture = { rotations: [], root: [] };
+    /** @type {{posture: Posture, words: string}[]} */
+    this.past = [];
+    /** @type {{posture: Posture, words: string}[]} */
+    this.future = [];
+    /** @type {{posture: Posture, standing: string[]} | null} where a drag or a turn began */
+    this.began = null;
+    this.version = 0; // counts changes, for views
+    this.requests = new Latest(
+      (told) => this.#take(told),
+      (error) => studio.say(error instanceof Error ? error.message : String(error), { kind: "error" }),
+    );
+  }
+
+  /** Open a frame of a movement. @param {string} key @param {number} frame */
+  async open(key, frame = 0) {
+    const [told, source] = await Promise.all([
+      this.studio.api.post("/api/pose/open", { key, frame }),
+      movement(this.studio.api, key),
+    ]);
+    const { joints, handles, title, mirrors } = told;
+    const shown = told.rotations.length ? { rotations: told.rotations, root: told.root } : this.posture;
+    Object.assign(this, { key, title, joints, handles, mirrors, selected: handles[0]?.joint ?? "", dragged: "", words: "" });
+    Object.assign(this, { past: [], future: [], began: null, released: new Set(), motion: new Posed(source, shown) });
+    this.#take(told);
+    this.show();
+    this.dispatchEvent(new Event("open"));
+  }
+
+  /** Have the viewer show it. */
+  show() {
+    if (!this.motion) return;
+    this.studio.viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
+  }
+
+  /** Whether the viewer shows it. */
+  get shown() {
+    return this.motion !== null && this.studio.viewer.motion === this.motion;
+  }
+
+  /** The places of all joints, metres [J * 3]. @returns {Float64Array} */
+  places() {
+    const { body } = this.motion;
+    body.pose(this.posture.rotations, this.posture.root);
+    return body.joints;
+  }
+
+  /** The place of a joint. @param {string} joint @returns {number[]} */
+  place(joint) {
+    const at = 3 * this.motion.joints.indexOf(joint);
+    return [...this.places().slice(at, at + 3)];
+  }
+
+  /** @param {string} joint */
+  select(joint) {
+    if (joint === this.selected) return;
+    this.selected = joint;
+    this.#changed();
+  }
+
+  /** Let a foot leave its place, or hold it there. @param {string} foot @param {boolean} stays */
+  hold(foot, stays) {
+    this.released = new Set(this.released);
+    if (stays) this.released.delete(foot);
+    else this.released.add(foot);
+    this.#changed();
+  }
+
+  /** Drag a joint to a place, until `end`. @param {string} joint @param {number[]} place */
+  drag(joint, place) {
+    this.#begin();
+    this.dragged = joint;
+    const { began } = this;
+    if (!began) return;
+    const standing = began.standing.filter((foot) => !this.released.has(foot));
+    this.requests.send(() =>
+      this.studio.api.post("/api/pose/drag", {
+        pose: this.#pose(this.posture),
+        start: this.#pose(began.posture),
+        joint,
+        place: [place[0], Math.max(place[1], 0), place[2]],
+        standing,
+      }),
+    );
+  }
+
+  /** Set an angle of a joint, until `end`. @param {string} joint @param {string} angle @param {number} degrees */
+  turn(joint, angle, degrees) {
+    this.#begin();
+    this.requests.send(() => this.studio.api.post("/api/pose/turn", { pose: this.#pose(this.posture), joint, angle, degrees }));
+  }
+
+  /** What was dragged or turned is one step. @param {string} words of the step */
+  async end(words) {
+    await this.requests.settled();
+    const { began } = this;
+    this.began = null;
+    if (began && differ(began.posture, this.posture)) this.#step(began.posture, words);
+  }
+
+  /** Make another posture of it. @param {"mirror" | "floor" | "known" | "whole"} to @param {string} words */
+  async change(to, words) {
+    await this.requests.settled();
+    const before = this.posture;
+    const kept = to === "known" && this.dragged ? this.dragged : null;
+    this.requests.send(() => this.studio.api.post("/api/pose/change", { pose: this.#pose(this.posture), to, kept }));
+    await this.requests.settled();
+    if (differ(before, this.posture)) this.#step(before, words);
+  }
+
+  undo() {
+    this.#travel(this.past, this.future);
+  }
+
+  redo() {
+    this.#travel(this.future, this.past);
+  }
+
+  /** Keep it in the project: its key. @param {string} name @returns {Promise<string>} */
+  async keep(name) {
+    await this.requests.settled();
+    return (await this.studio.api.post("/api/pose/keep", { pose: this.#pose(this.posture), name })).key;
+  }
+
+  /** It as lines of a score. @param {string} name @returns {Promise<string>} */
+  async lines(name) {
+    return (await this.studio.api.post("/api/pose/score", { pose: this.#pose(this.posture), name })).lines;
+  }
+
+  #begin() {
+    this.began ??= { posture: this.posture, standing: this.standing };
+  }
+
+  /** @param {Posture} before @param {string} words */
+  #step(before, words) {
+    this.past = [...this.past, { posture: before, words }].slice(-STEPS);
+    this.future = [];
+    this.#changed();
+  }
+
+  /** @param {{posture: Posture, words: string}[]} from @param {{posture: Posture, words: string}[]} to */
+  #travel(from, to) {
+    const step = from.pop();
+    if (!step || !this.motion) return;
+    to.push({ posture: this.posture, words: step.words });
+    this.posture = step.posture;
+    this.dragged = "";
+    this.requests.send(() => this.studio.api.post("/api/pose/tell", { pose: this.#pose(this.posture) }));
+    this.#changed();
+  }
+
+  /** @param {any} told */
+  #take(told) {
+    this.posture = { rotations: told.rotations, root: told.root };
+    this.motion.take(this.posture);
+    Object.assign(this, { known: told.known, corpus: told.corpus, standing: told.standing, words: told.words ?? "" });
+    this.turns = told.turns ?? this.turns.map((turn, i) => ({ ...turn, degrees: told.degrees[i] }));
+    this.#changed();
+  }
+
+  /** @param {Posture} posture */
+  #pose(posture) {
+    return { key: this.key, ...posture };
+  }
+
+  #changed() {
+    this.version++;
+    this.studio.viewer.stale();
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** Whether one can see that postures differ. @param {Posture} a @param {Posture} b */
+function differ(a, b) {
+  const far = (/** @type {number[]} */ one, /** @type {number[]} */ other) => one.some((x, i) => Math.abs(x - other[i]) > 1e-5);
+  return far(a.rotations, b.rotations) || far(a.root, b.root);
+}
