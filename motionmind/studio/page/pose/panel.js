@@ -92,7 +92,7 @@ function Known({ editor }) {
           html`<span><span class="known-mark ${how}" aria-hidden="true"></span>${known.filter((one) => one === how).length} ${label}</span>`,
       )}
     </div>
-    <p class="hint" aria-live="polite" data-testid="strangers">
+    <p class="hint strangers" aria-live="polite" data-testid="strangers">
       ${words || (strangers.length ? `Never seen so: ${strangers.slice(0, 4).join(", ")}${strangers.length > 4 ? " …" : ""}` : "")}
     </p>
   </section>`;
