@@ -7,9 +7,11 @@ import logging
 import os
 import pickle
 import re
+import shutil
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -19,6 +21,7 @@ from typing import Any, TypeVar, cast
 import numba
 import platformdirs
 from numba.core import ccallback, compiler, serialize, sigutils
+from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
 from motionmind.files import make_folder, replace_file
@@ -26,6 +29,7 @@ from motionmind.files import make_folder, replace_file
 _F = TypeVar("_F", bound=Callable[..., object])
 _HERE = Path(__file__).parent
 _HASH = 32  # bytes of a hash
+_MONTH = 30 * 86400.0  # seconds
 # Of numba's core, which is not typed.
 _normalise: Any = sigutils.normalize_signature
 _CFunc: Any = ccallback.CFunc
@@ -86,11 +90,28 @@ def decorated_names() -> frozenset[str]:
 
 def compiled_names() -> frozenset[str]:
     """Return those of them whose compiled code is on disk."""
-    found = set()
-    for package in {name.partition("/")[0] for name in decorated_names()}:
-        if folder := _folder(_HERE / package):
-            found |= {f"{package}/{file.name.rsplit('-', 1)[0]}" for file in folder.glob("*.nbc")}
-    return frozenset(found)
+    return frozenset(
+        f"{folder.name.rpartition('-')[0]}/{file.name.rsplit('-', 1)[0]}"
+        for folder in _folders()
+        for file in folder.glob("*.nbc")
+    )
+
+
+def is_all_compiled() -> bool:
+    """Return whether what `note_all_compiled` found is all there still, and for this state of what code depends on."""
+    if (note := _note()) is None:
+        return False
+    with suppress(OSError, UnicodeDecodeError):
+        return all((note.parent / name).is_file() for name in note.read_text("utf-8").splitlines())
+    return False
+
+
+def note_all_compiled() -> None:
+    """Note that what is compiled now is all that there is to compile."""
+    if (note := _note()) is not None:
+        names = [str(file.relative_to(note.parent)) for folder in _folders() for file in sorted(folder.glob("*.nbc"))]
+        with suppress(OSError):
+            replace_file(note, "\n".join(names).encode())
 
 
 def place_of_code() -> Path | None:
@@ -156,6 +177,21 @@ class _Kept:
         return folder / f"{name}-{code.co_firstlineno}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
 
+def _folders() -> list[Path]:
+    """Return the folders of compiled code of all subpackages that have some."""
+    packages = sorted({name.partition("/")[0] for name in decorated_names()})
+    return [folder for package in packages if (folder := _folder(_HERE / package))]
+
+
+def _note() -> Path | None:
+    """Return the file that says that all is compiled, named after what code depends on but for its signatures."""
+    if not (folders := _folders()):
+        return None
+    codegen = cpu_target.target_context.codegen()
+    key = (numba.__version__, sys.version_info, codegen.magic_tuple(), [folder.name for folder in folders])
+    return folders[0].parent / f"all-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}"
+
+
 @cache
 def _say(message: str) -> None:
     """Log a warning, once."""
@@ -178,11 +214,29 @@ def _folder(source: Path) -> Path | None:
         with suppress(OSError, ValueError):
             place = _temporary() if temporary else Path(own)
             folder = place / "compiled" / f"{source.name}-{state}"
+            is_new = not folder.is_dir()
             make_folder(folder)
             if os.access(folder, os.W_OK):
+                os.utime(folder)
+                if is_new:
+                    _remove_unused(folder.parent)
                 return folder
     _say(f"compiled code can be kept neither in {own} nor among temporary files; each run compiles it again")
     return None
+
+
+def _remove_unused(place: Path) -> None:
+    """Remove compiled code that no process has asked for in a month: of sources that have changed since, most likely.
+
+    Whoever comes for it now compiles it again.
+    """
+    for found in [*place.glob("*-" + "[0-9a-f]" * 16), *place.glob("all-" + "[0-9a-f]" * 24)]:
+        with suppress(OSError):
+            if time.time() - found.lstat().st_mtime > _MONTH:
+                if found.is_dir():
+                    shutil.rmtree(found, ignore_errors=True)
+                else:
+                    found.unlink()
 
 
 @cache

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import compileall
 import random
 import shutil
 import subprocess
@@ -12,11 +13,12 @@ import pytest
 from command_line import Ran, Run
 from hypothesis import HealthCheck, settings
 
+import motionmind
 from motionmind.cli import main
 from motionmind.cli.warming import NOTICE
 from motionmind.discretize import Codebook
 from motionmind.formats import read_motion
-from motionmind.jit import compiled_names, decorated_names
+from motionmind.jit import is_all_compiled
 from motionmind.retarget.retarget import own_skeleton
 from motionmind.tween.engine import Engine
 
@@ -36,15 +38,19 @@ SHARED_DATA = TESTS.parents[1] / "shared" / "data"
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile the inner loops before all tests: else each worker would compile them, all at the same moment.
+    """Compile before all tests what each worker, or each process that a test starts, would else compile for itself.
 
-    A few tests compile what they need.
+    These are the inner loops, which workers would come to at the same moment, and the bytecode of the package, which an
+    environment may keep Python from writing. A few tests compile what they need.
     """
     config = session.config
     asked = {(config.invocation_params.dir / argument).resolve() for argument in config.args}
     is_whole = not asked.isdisjoint({TESTS, TESTS.parent})
     is_worker, only_lists = hasattr(config, "workerinput"), config.option.collectonly
-    if is_whole and not is_worker and not only_lists and decorated_names() != compiled_names():
+    if not is_whole or is_worker or only_lists:
+        return
+    compileall.compile_dir(Path(motionmind.__file__).parent, quiet=1)
+    if not is_all_compiled():
         config.pluginmanager.getplugin("terminalreporter").write_line(NOTICE)
         subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
 

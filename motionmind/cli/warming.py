@@ -37,10 +37,13 @@ def warm() -> None:
     The first search does what it needs of this on its own. It takes half a minute to a minute, once for each version of
     MotionMind and Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
-    from motionmind.jit import compiled_names, place_of_code
+    from motionmind.jit import compiled_names, is_all_compiled, place_of_code
 
     if place_of_code() is None:
         raise MotionMindError("compiled code can be kept neither in the user's cache directory nor in NUMBA_CACHE_DIR")
+    if is_all_compiled():
+        click.echo(f"nothing to do: all {len(compiled_names())} functions are compiled")
+        return
     began = monotonic()
     _compile()
     click.echo(f"compiled {len(compiled_names())} functions in {monotonic() - began:.0f} s; the next search needs none")
@@ -82,7 +85,7 @@ def _compile() -> None:
 
     A worker that fails leaves its part to whoever needs it: its errors are not of interest here.
     """
-    from motionmind.jit import compiled_names, decorated_names
+    from motionmind.jit import compiled_names, decorated_names, note_all_compiled
 
     total, known = len(decorated_names()), 0
     works = [draw, search, realise]
@@ -98,6 +101,8 @@ def _compile() -> None:
                 sleep(_LOOK)
         finally:
             _end(workers)
+    if all(worker.returncode == 0 for worker in workers):
+        note_all_compiled()
 
 
 def _start(programs: Sequence[Sequence[Callable[[], None]]]) -> list[subprocess.Popen[bytes]]:

@@ -54,11 +54,16 @@ def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
     assert jit.decorated_names() - reached == set()
 
 
-def test_warm_says_what_it_did(run: Run) -> None:
+def test_warm_says_what_it_did_and_does_nothing_a_second_time(run: Run) -> None:
+    note = jit._note()
+    assert note is not None
+    note.unlink(missing_ok=True)
     done = run("warm")
     assert done.code == 0
     assert done.out.startswith(f"compiled {len(jit.decorated_names())} functions in ")
     assert jit.decorated_names() == jit.compiled_names()
+    done = run("warm")
+    assert (done.code, done.out) == (0, f"nothing to do: all {len(jit.decorated_names())} functions are compiled\n")
 
 
 @pytest.mark.parametrize("is_first", [True, False])
