@@ -4,6 +4,7 @@ import { html, render } from "./vendor/htm-preact-standalone.js";
 import { Api } from "./api.js";
 import * as between from "./between/panel.js";
 import * as take from "./export/panel.js";
+import * as movement from "./imports/panel.js";
 import { Bar } from "./shell/bar.js";
 import { useChange } from "./shell/hooks.js";
 import { icon } from "./shell/icons.js";
@@ -11,11 +12,15 @@ import { Keys } from "./shell/keys.js";
 import { View } from "./shell/stage.js";
 import { Shown, Toasts } from "./shell/toasts.js";
 import { Store } from "./store.js";
+import { Panel as Timeline } from "./timeline/panel.js";
+import * as vary from "./vary/panel.js";
 import { Viewer } from "./viewer.js";
 
 /** The panels by name, in their order on the rail: what each is called, and its views. */
 const PANELS = [
   { name: "between", words: "A to B", about: "From one posture to another", views: between },
+  { name: "vary", words: "Variations", about: "The piece in another order", views: vary },
+  { name: "movement", words: "Movement", about: "One's own movement, and corpora", views: movement },
   { name: "take", words: "Take away", about: "Film, Blender, a page: take the piece away", views: take },
 ];
 
@@ -43,6 +48,7 @@ function Studio({ studio, open }) {
       <${View} studio=${studio} />
       ${Centre && html`<${Centre} key=${name} studio=${studio} />`}
     </main>
+    <div class="strip"><${Timeline} studio=${studio} /></div>
     <${Shown} toasts=${studio.toasts} />`;
 }
 

@@ -56,12 +56,15 @@ export class Viewer extends EventTarget {
    */
   home(motion, { time } = {}) {
     this.piece = motion;
-    if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: !this.motion });
+    // As long as nobody has turned the camera, all of it is in the picture.
+    if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: Boolean(this.stage?.view) });
   }
 
   /** Show the piece again. */
   back() {
+    this.isHome = true; // also of a piece that is to come
     if (this.piece) this.#take(this.piece, { title: "", home: true, look: true });
+    else this.dispatchEvent(new Event("show"));
   }
 
   /**

@@ -130,6 +130,7 @@ function Frames({ studio, clip }) {
   const { viewer } = studio;
   const [frame, setFrame] = useState(0);
   const motion = useRef(/** @type {any} */ (null));
+  const wanted = useRef(-1); // the frame that was sought before the movement came
   const place = (/** @type {number} */ at) => ({ key: clip.key, frame: at, title: `${clip.title} ${at}` });
   useEffect(() => {
     let here = true;
@@ -137,7 +138,8 @@ function Frames({ studio, clip }) {
       if (!here || !found) return;
       motion.current = found;
       desk.show(false);
-      viewer.show(found, { time: found.start, title: clip.title, play: true });
+      const sought = wanted.current >= 0;
+      viewer.show(found, { time: sought ? found.times[wanted.current] : found.start, title: clip.title, play: !sought });
     });
     const follow = () => viewer.motion === motion.current && setFrame(viewer.player.frame);
     viewer.player.addEventListener("change", follow);
@@ -149,6 +151,7 @@ function Frames({ studio, clip }) {
   const seek = (/** @type {any} */ event) => {
     const at = Number(event.target.value);
     setFrame(at);
+    wanted.current = at;
     if (!motion.current) return;
     if (viewer.motion !== motion.current) viewer.show(motion.current, { title: clip.title });
     viewer.player.pause();

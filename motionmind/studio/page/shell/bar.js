@@ -16,9 +16,9 @@ export function Bar({ studio }) {
   const redo = () => studio.act(() => studio.api.redo());
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "undo", act: undo },
-    { keys: ["Ctrl+Shift+Z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
+    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
     { keys: ["d"], does: "dark paper, or light", act: () => viewer.theme.toggle() },
-    { keys: ["?", "Shift+?"], shown: ["?"], does: "these keys", act: () => setSheet(true) },
+    { keys: ["?"], does: "these keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
     <div class="brand">${icon("brand")}<span>MotionMind</span></div>

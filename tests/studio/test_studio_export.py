@@ -1,0 +1,83 @@
+"""Taking a piece away: each file holds the piece, under a name that every system takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from studio_server import Answer, Served
+
+from motionmind import read_motion
+from motionmind.studio.export import composed, file_name
+from motionmind.studio.project import Project
+
+
+@pytest.fixture
+def with_piece(studio_server: Served) -> Served:
+    studio_server.insert("b1", "ballet/adagio", 0, 20)
+    studio_server.insert("b2", "ballet/adagio", 21, 40)
+    studio_server.edit(edit="title", title="Evening: 1/2")
+    return studio_server
+
+
+def taken(server: Served, form: str) -> Answer:
+    answer = server.send("GET", f"/api/export/{form}")
+    assert answer.status == 200, answer
+    return answer
+
+
+@pytest.mark.parametrize("form", ["bvh", "glb", "json"])
+def test_a_file_holds_the_whole_piece(with_piece: Served, form: str, tmp_path: Path) -> None:
+    answer = taken(with_piece, form)
+    assert unquote(answer.headers["content-disposition"]).endswith(f"''Evening- 1-2.{form}")
+    path = tmp_path / f"taken.{form}"
+    path.write_bytes(answer.body)
+    motion, whole = read_motion(path), composed(with_piece.studio)
+    assert motion.times[-1] - motion.times[0] == pytest.approx(whole.times[-1] - whole.times[0], abs=0.02)
+    ends = motion.positions()[[0, -1]] - motion.root[[0, -1]][:, None]
+    expected = whole.positions()[[0, -1]] - whole.root[[0, -1]][:, None]
+    names = [motion.skeleton.names.index(name) for name in whole.skeleton.names]
+    assert np.allclose(ends[:, names], expected, atol=1e-3)
+
+
+def test_the_page_asks_nobody_for_anything(with_piece: Served) -> None:
+    page = taken(with_piece, "html").body.decode()
+    assert "default-src 'none'" in page
+    assert "Evening: 1/2" in page
+    assert "/api/" not in page
+
+
+def test_the_project_opens_again(with_piece: Served, tmp_path: Path) -> None:
+    path = tmp_path / "again.motionmind"
+    path.write_bytes(taken(with_piece, "project").body)
+    project = Project.open(path)
+    assert project.state == with_piece.studio.project.state
+    project.close()
+
+
+def test_nothing_is_taken_away_of_an_empty_piece(studio_server: Served) -> None:
+    answer = studio_server.send("GET", "/api/export/bvh")
+    assert (answer.status, answer.value["error"]) == (400, "the piece is empty: there is nothing to take away yet")
+
+
+def test_an_unknown_format_is_refused(with_piece: Served) -> None:
+    answer = with_piece.send("GET", "/api/export/fbx")
+    assert answer.status == 400
+    assert "'fbx'" in answer.value["error"]
+
+
+@pytest.mark.parametrize(
+    ("title", "name"),
+    [
+        ("", "piece.bvh"),
+        ("...", "piece.bvh"),
+        ("a/b\\c", "a-b-c.bvh"),
+        ('"Swan" <1>', "-Swan- -1-.bvh"),
+        ("schön", "schön.bvh"),
+        ("x" * 300, "x" * 100 + ".bvh"),
+    ],
+)
+def test_names_are_those_that_every_system_takes(title: str, name: str) -> None:
+    assert file_name(title, "bvh") == name

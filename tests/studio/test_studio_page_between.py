@@ -1,0 +1,218 @@
+"""From A to B and taking it away, as somebody does it: in a browser, by mouse, and by keyboard alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+LONG = 120_000  # milliseconds: whoever searches first compiles
+FOUND = "[data-testid=alternatives][data-state=found]"
+
+
+class Counted:
+    """A mouse whose clicks are counted."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.clicks = page, 0
+
+    def click(self, testid: str) -> None:
+        self.page.get_by_test_id(testid).click()
+        self.clicks += 1
+
+
+def until(page: Any, script: str) -> None:
+    """Wait until a script holds; the page's own policy forbids Playwright's way to."""
+    for _ in range(400):
+        if page.evaluate(script):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never: {script}")
+
+
+def from_a_to_b(page: Any, a: str = "arabesque", b: str = "fifth") -> None:
+    page.get_by_test_id(f"posture-{a}").click()
+    page.get_by_test_id(f"posture-{b}").click()
+    page.wait_for_selector(FOUND, timeout=LONG)
+
+
+def painted(page: Any, canvas: str) -> int:
+    """The number of colours of a canvas, some pixels of it."""
+    script = """(canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const seen = new Set();
+      for (let i = 0; i < data.length; i += 4) seen.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
+      return seen.size;
+    }"""
+    return int(page.locator(canvas).evaluate(script))
+
+
+def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: Path) -> None:
+    mouse = Counted(studio_page)
+    mouse.click("posture-arabesque")
+    mouse.click("posture-fifth")
+    studio_page.wait_for_selector(FOUND, timeout=LONG)
+    mouse.click("alternative-2")
+    mouse.click("accept")
+    mouse.click("open-take")
+    with studio_page.expect_download() as download:
+        mouse.click("export-html")
+    assert mouse.clicks <= 6
+    assert download.value.suggested_filename == "piece.html"
+    download.value.save_as(tmp_path / "piece.html")
+    shared = studio_page.context.new_page()
+    shared.goto((tmp_path / "piece.html").as_uri())
+    until(shared, "window.motionmind?.motion.length > 10")
+    assert shared.evaluate("motionmind.motion.insertions.length") == 1
+
+
+def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
+    from_a_to_b(studio_page)
+    assert [studio_page.get_by_test_id(f"alternative-{n}").count() for n in range(1, 6)] == [1, 1, 1, 1, 0]
+    cards = studio_page.locator(".alternative .words")
+    for text in cards.all_inner_texts():
+        assert " s" in text
+        assert "ballet" in text  # how usual it is
+        assert "best" in text or "better" in text  # how sure
+    until(studio_page, "document.querySelector('.alternatives input[type=range]').value > 0.1")
+    studio_page.get_by_test_id("play-alternatives").click()
+    for n in range(1, 5):
+        assert painted(studio_page, f"[data-testid=alternative-{n}] > canvas") > 50
+
+
+def test_only_one_renderer_draws_all_alternatives(studio_page: Any) -> None:
+    from_a_to_b(studio_page)
+    script = "[...document.querySelectorAll('.alternatives canvas')].filter((c) => c.getContext('webgl2')).length"
+    assert studio_page.evaluate(script) == 1
+
+
+def test_pointing_at_a_joint_says_where_it_was_seen(studio_page: Any) -> None:
+    from_a_to_b(studio_page)
+    studio_page.get_by_test_id("play-alternatives").click()
+    box = studio_page.get_by_test_id("alternative-1").bounding_box()
+    words = studio_page.get_by_test_id("alternative-1").locator(".seen")
+    said = set()
+    for share in range(30, 70, 4):
+        studio_page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + share / 100 * box["height"])
+        said.add(words.inner_text())
+    assert len(said - {""}) > 1
+    studio_page.mouse.move(0, 0)
+    assert words.inner_text() == ""
+    assert studio_page.get_by_text("seen in", exact=False).count() > 0  # joint by joint
+
+
+def test_buttons_set_the_ends_and_dragging_does(studio_page: Any) -> None:
+    page = studio_page
+    page.get_by_test_id("posture-first").click()
+    page.get_by_test_id("set-b").click()
+    ends = "JSON.stringify([studio.desk.ends.a?.key, studio.desk.ends.b?.key])"
+    assert page.evaluate(ends) == '["ballet/first","ballet/first"]'
+    page.get_by_test_id("posture-passe").drag_to(page.locator(".end").nth(1))
+    assert page.evaluate(ends) == '["ballet/first","ballet/passe"]'
+    page.get_by_label("Exchange A and B").click()
+    assert page.evaluate(ends) == '["ballet/passe","ballet/first"]'
+
+
+def test_any_moment_of_a_clip_is_an_end(studio_page: Any) -> None:
+    page = studio_page
+    page.get_by_placeholder("Search postures and clips").fill("adagio")
+    page.get_by_test_id("clip-adagio").click()
+    page.get_by_test_id("frames").fill("20")
+    page.get_by_role("button", name="As A").click()
+    page.get_by_test_id("frames").fill("30")
+    page.get_by_role("button", name="As B").click()
+    assert page.evaluate("[studio.desk.ends.a.frame, studio.desk.ends.b.frame]") == [20, 30]
+    page.wait_for_selector(FOUND, timeout=LONG)
+
+
+def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
+    page = studio_page
+    page.wait_for_selector("[data-testid=posture-arabesque]")
+    page.keyboard.press("Tab")
+
+    def reach(selector: str) -> None:
+        for _ in range(200):
+            if page.evaluate(f"document.activeElement.matches('{selector}')"):
+                return
+            page.keyboard.press("Tab")
+        raise AssertionError(f"no Tab leads to {selector}")
+
+    for posture in ("arabesque", "fifth"):
+        reach(f"[data-testid=posture-{posture}]") if posture == "arabesque" else None
+        if posture == "fifth":
+            page.keyboard.press("Shift+Tab")
+            while not page.evaluate("document.activeElement.matches('[data-testid=posture-fifth]')"):
+                page.keyboard.press("Shift+Tab")
+        page.keyboard.press("Enter")
+    page.wait_for_selector(FOUND, timeout=LONG)
+    page.keyboard.press("3")
+    assert page.get_by_test_id("alternative-3").get_attribute("aria-checked") == "true"
+    reach("[data-testid=alternative-3]")
+    page.keyboard.press("ArrowDown")
+    assert page.get_by_test_id("alternative-3").locator(".seen").inner_text() != ""
+    page.keyboard.press("Enter")
+    until(page, "studio.store.state.piece.blocks.length === 2")
+    assert page.evaluate("studio.store.state.piece.seams[0].chosen") == 3
+    page.keyboard.press("Control+z")
+    until(page, "studio.store.state.piece.blocks.length === 0")
+    page.keyboard.press("Control+Shift+z")
+    until(page, "studio.store.state.piece.blocks.length === 2")
+    page.evaluate("document.activeElement.blur()")
+    reach("[role=tab]")
+    while not page.evaluate("document.activeElement.matches('[data-testid=open-take]')"):
+        page.keyboard.press("ArrowDown")
+    reach("[data-testid=export-bvh]")
+    with page.expect_download() as download:
+        page.keyboard.press("Enter")
+    assert download.value.suggested_filename == "piece.bvh"
+
+
+def test_the_title_is_edited_and_taken_back(studio_page: Any) -> None:
+    title = studio_page.get_by_test_id("title")
+    title.fill("Evening")
+    title.press("Enter")
+    until(studio_page, "studio.store.state.title === 'Evening'")
+    assert studio_page.title().startswith("Evening")
+    studio_page.get_by_test_id("undo").click()
+    until(studio_page, "studio.store.state.title === 'piece'")
+    assert title.input_value() == "piece"
+
+
+def test_what_fails_is_said_in_one_line(studio_page: Any) -> None:
+    studio_page.evaluate("studio.act(() => Promise.reject(new Error('nothing came of it')))")
+    assert "nothing came of it" in studio_page.get_by_test_id("toast").inner_text()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_paper_is_as_the_system_has_it_until_it_is_switched(studio_page: Any, scheme: str) -> None:
+    studio_page.emulate_media(color_scheme=scheme)
+    paper = "getComputedStyle(document.body).backgroundColor"
+    before = studio_page.evaluate(paper)
+    assert (before == "rgb(27, 26, 30)") == (scheme == "dark")
+    studio_page.get_by_test_id("dark").click()
+    assert studio_page.evaluate(paper) != before
+
+
+def test_nothing_plays_by_itself_where_motion_is_to_be_reduced(studio_page: Any) -> None:
+    studio_page.emulate_media(reduced_motion="reduce")
+    from_a_to_b(studio_page)
+    assert studio_page.get_by_test_id("play-alternatives").get_attribute("aria-label") == "Play all"
+
+
+def test_the_sheet_of_keys_tells_what_they_do(studio_page: Any) -> None:
+    studio_page.wait_for_selector("[data-testid=gallery]")
+    studio_page.keyboard.press("?")
+    sheet = studio_page.get_by_test_id("keys")
+    assert "play or pause" in sheet.inner_text()
+    studio_page.keyboard.press("Escape")
+    sheet.wait_for(state="detached")
+
+
+def test_a_telephone_shows_and_approves(studio_page: Any) -> None:
+    studio_page.set_viewport_size({"width": 390, "height": 844})
+    from_a_to_b(studio_page)
+    studio_page.get_by_test_id("alternative-2").click()
+    studio_page.get_by_test_id("accept").click()
+    until(studio_page, "studio.store.state.piece.blocks.length === 2")
+    assert studio_page.evaluate("document.documentElement.scrollWidth") <= 390
