@@ -5,6 +5,7 @@ import { Api } from "./api.js";
 import * as between from "./between/panel.js";
 import * as take from "./export/panel.js";
 import * as movement from "./imports/panel.js";
+import * as pose from "./pose/panel.js";
 import { Bar } from "./shell/bar.js";
 import { useChange } from "./shell/hooks.js";
 import { icon } from "./shell/icons.js";
@@ -20,6 +21,7 @@ import { Viewer } from "./viewer.js";
 const PANELS = [
   { name: "between", words: "A to B", about: "From one posture to another", views: between },
   { name: "vary", words: "Variations", about: "The piece in another order", views: vary },
+  { name: "pose", words: "Pose", about: "A posture, moved by hand", views: pose },
   { name: "movement", words: "Movement", about: "One's own movement, and corpora", views: movement },
   { name: "take", words: "Take away", about: "Film, Blender, a page: take the piece away", views: take },
 ];
