@@ -31,6 +31,7 @@ from motionmind.studio.varying import (
     drawn,
     kept_in,
     map_of,
+    units_of,
     vary_blocks,
 )
 from motionmind.studio.view import view_of
@@ -87,17 +88,20 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     for one in asked:
         if one.block.first > one.block.last or one.block.last >= len(clocks[one.block.source].times):
             raise MotionMindError("a stretch that is kept is not there any more: choose again")
-    kept = (
-        *asked,
-        *kept_in(state.blocks, locked | set(wish.stay) - {one.block.id for one in asked}, clocks.__getitem__),
-    )
+    staying = (locked | set(wish.stay)) - {one.block.id for one in asked}
+    total, standing = standing_in(state, clocks.__getitem__)
+    kept = (*asked, *(one for one in standing if one.block.id in staying))
     # In a thread: long pieces take some seconds the first time, in which the page is not to wait for other things.
-    found = await run_in_threadpool(_vary, base, wish.wanted(kept), clocks.__getitem__, state)
+    found = await run_in_threadpool(
+        vary_blocks,
+        base,
+        wish.wanted(kept),
+        clocks.__getitem__,
+        present=state.blocks,
+        total=total,
+        used=state.used,
+    )
     return _shown(studio, state, base, found, locked, wish)
-
-
-def _vary(base: tuple[Block, ...], wanted: Wanted, clocks: Clocks, state: State) -> Proposal:
-    return vary_blocks(base, wanted, clocks, present=state.blocks, used=state.used)
 
 
 def _shown(
@@ -118,6 +122,8 @@ def _shown(
             "stretch": wish.stretch,
         },
         "original": msgspec.to_builtins(base),
+        "places": {block.id: place for block, place in zip(found.blocks, found.places, strict=True)},
+        "count": found.count,
     }
     return {
         "piece": view(found.blocks),
@@ -155,6 +161,18 @@ def base_of(state: State) -> tuple[Block, ...]:
 def _holds(one: Block, block: Block) -> bool:
     same = (one.source, one.mirrored) == (block.source, block.mirrored)
     return same and one.first <= block.first and block.last <= one.last
+
+
+def standing_in(state: State, clocks: Clocks) -> tuple[int, tuple[Kept, ...]]:
+    """Return the number of units that the piece has, and its stretches where they stand.
+
+    A variation has left out its stays; as long as its order is as it was made, they count.
+    """
+    places, count = state.about.get("places"), state.about.get("count")
+    if isinstance(places, dict) and isinstance(count, int) and list(places) == [block.id for block in state.blocks]:
+        return count, tuple(Kept(block, places[block.id]) for block in state.blocks)
+    kept = kept_in(state.blocks, {block.id for block in state.blocks}, clocks)
+    return sum(len(units_of([block], clocks)) for block in state.blocks), kept
 
 
 def locked_in(state: State) -> set[str]:

@@ -179,6 +179,7 @@ def vary_blocks(
     clocks: Clocks,
     *,
     present: Sequence[Block] | None = None,
+    total: int | None = None,
     used: Collection[str] = (),
 ) -> Proposal:
     """Vary a piece.
@@ -187,15 +188,15 @@ def vary_blocks(
         blocks: the stretches that are laid out along the trajectory.
         wanted: the wish.
         clocks: returns the clock of a movement.
-        present: the piece as it stands, as long as the variation becomes, and whose stretches keep their ids; None if
-            it is `blocks`.
+        present: the piece as it stands, whose stretches keep their ids; None if it is `blocks`.
+        total: units that the variation has; None for as many as `present`.
         used: ids that no other stretch may take.
 
     Raises:
         MotionMindError: there is nothing to vary, or the wish cannot be met.
     """
     present = blocks if present is None else present
-    total = len(units_of(present, clocks))
+    total = len(units_of(present, clocks)) if total is None else total
     kept = [(one, units_of([one.block], clocks)) for one in wanted.kept]
     taken = np.zeros(total, dtype=np.bool_)
     for one, own in kept:

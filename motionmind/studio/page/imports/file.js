@@ -61,7 +61,7 @@ function Questions({ file, choose }) {
     ${WITH_UNIT.includes(kind) &&
     html`<label class="row"><span class="grow">Unit of length</span>
       <select data-testid="unit" value=${chosen} onChange=${(/** @type {any} */ event) => choose({ unit: event.target.value || null })}>
-        <option value="">${facts.is_guessed ? `${nameOf(facts.unit)}, by its height` : "as the file says"}</option>
+        <option value="">${facts.is_guessed ? `${nameOf(facts.unit)} (guessed)` : "as the file says"}</option>
         ${UNITS.map(([unit, words]) => html`<option value=${unit}>${words}</option>`)}
       </select></label>`}
     ${WITH_RATE.includes(kind) &&

@@ -67,6 +67,7 @@ export function Panel({ studio }) {
     </label>
     <div class="row">
       <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} onClick=${vary}>Vary the piece</button>
+      <button class="button" data-testid="another" disabled=${!proposal} title="Begin elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>
       <button class="button" data-testid="beside" aria-pressed=${view.beside} onClick=${view.toggle}>Beside the original</button>
     </div>
     ${error && html`<p class="said error" role="alert" data-testid="vary-error">${error}</p>`}

@@ -1,5 +1,7 @@
 /** A variation as it is sought: the wish, what the server makes of it, and what is kept. It knows no page. */
 
+import { points } from "./chart.js";
+
 /**
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean}} Block
  * @typedef {{block: Block, place: number}} Kept
@@ -64,6 +66,13 @@ export class Varying extends EventTarget {
     }
     this.asking = false;
     this.#changed();
+  }
+
+  /** Begin where the variation ends, which is somewhere else on the attractor. */
+  another() {
+    if (!this.proposal) return undefined;
+    const end = points(this.proposal.other).slice(-3);
+    return this.want({ start: [end[0], end[1], end[2]] });
   }
 
   /** Whether a block of the proposal is kept. @param {string} id */
