@@ -5,8 +5,9 @@ It lies between them as they meet and as they part; where these are opposite sid
 of the other to behind it, the plane turns on the way by the line from one hip (or shoulder) to the other, so that the
 limbs open. Each limb turns as a whole about its hip or shoulder, as little as will do, and smoothly in time; feet keep
 their orientations. A foot that stands does not slide: it stands elsewhere from the step that leads there on or, where a
-given posture has it, its leg turns about the line from hip to ankle alone. A foot that would sink into the floor is
-lifted by its knee. The given postures do not change; what they have in each other, or the corpus usually has, stays.
+given posture has it, its leg turns about the line from hip to ankle alone; of two such legs that are in each other the
+one whose foot steps sooner gives way. A foot that would sink into the floor is lifted by its knee. The given postures
+do not change; what they have in each other, or the corpus usually has, stays.
 
 Constants were chosen on random pairs of `cmu-05` and ballet.
 """
@@ -28,7 +29,7 @@ from motionmind.jit import jit
 from motionmind.realise.least_squares import solve_rows
 from motionmind.realise.legs import find_legs, reach
 
-ROUNDS = 8  # corrections, each of what those before it have left
+ROUNDS = 12  # corrections, each of what those before it have left
 TOUCHES = 0.005  # metres that any two limbs may be in each other
 LEAST = 1e-3  # metres that are not corrected
 SPREADS = 0.12  # seconds in which a correction begins and ends
@@ -114,14 +115,22 @@ def keep_limbs_apart(
     if root is not None:
         still[:, :2] = _standing(capsules, places + root[:, None], fps)
     frozen = np.isin(frames, held + np.array([[-1], [0], [1]]))
-    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], _held(still, frozen))
+    of_legs = np.isin(limbs.owner[pairs], (0, 1)).all(axis=1)
+    crossed = np.any(depths[:, of_legs] > allowed[:, of_legs] + LEAST, axis=1)
+    firmly, still = _give_way(_held(still, frozen), still, crossed)
+    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], firmly)
     sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
     free = ~(fixed[limbs.first] | fixed[limbs.last])
-    turned = np.tile(rot.IDENTITY, (len(rotations), 4, 1))
-    for _ in range(ROUNDS):
-        needed, steps = _steps(placed, limbs, capsules.radii, pairs, allowed, sides)
-        needed &= free & ~frozen[:, None]
-        if not needed.any():
+    turned = best = np.tile(rot.IDENTITY, (len(rotations), 4, 1))
+    least = np.inf
+    for number in range(ROUNDS + 1):
+        deep, steps = _steps(placed, limbs, capsules.radii, pairs, allowed, sides)
+        needed = (deep > 0.0) & free & ~frozen[:, None]
+        # Limbs that are turned out of each other may meet others: the best of all rounds counts, not the last.
+        left = float(np.where(needed, deep, 0.0).max(axis=0).sum())
+        if left < least:
+            best, least = turned, left
+        if not needed.any() or number == ROUNDS:
             break
         turns = np.zeros_like(steps)
         for limb in np.flatnonzero(needed.any(axis=0)):
@@ -131,7 +140,7 @@ def keep_limbs_apart(
             turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
         _turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)
-    out = _with_turned(skeleton, rotations, limbs, turned, ~frozen)
+    out = _with_turned(skeleton, rotations, limbs, best, ~frozen)
     if root is None:
         return out
     lowest = lowest_height(skeleton, rotations, root)
@@ -293,6 +302,32 @@ def _held(still: Floats, frozen: Bools) -> Floats:
     return out
 
 
+def _give_way(held: Floats, still: Floats, crossed: Bools) -> tuple[Floats, Floats]:
+    """Return how firmly limbs stand where given postures have them [N, 4], and at all [N, 4], less where legs cross.
+
+    Two legs that both stand where a given posture has them cannot part. The one whose step is nearer in time does not
+    stand from there to its step.
+
+    Args:
+        held: how firmly limbs stand where given postures have them [N, 4], from 0 to 1.
+        still: how firmly they stand [N, 4].
+        crossed: whether the legs are too deep in each other [N].
+    """
+    held, still = held.copy(), still.copy()
+    both = crossed & (held[:, :2] > 0.5).all(axis=1)
+    edges = np.flatnonzero(np.diff(both, prepend=False, append=False))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        ways = []
+        for leg in range(2):
+            swings = np.flatnonzero(held[:, leg] <= 0.5)
+            ways += [(begin - frame, leg, slice(frame, end)) for frame in swings[swings < begin][-1:]]
+            ways += [(frame + 1 - end, leg, slice(begin, frame)) for frame in swings[swings >= end][:1]]
+        if ways:
+            _, leg, frames = min(ways, key=lambda way: way[:2])
+            held[frames, leg] = still[frames, leg] = 0.0
+    return held, still
+
+
 @jit
 def _sides(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, pivots: Floats) -> Floats:
     """Return normals of the planes that keep pairs apart, towards the first [N, P, 3]; 0 where no plane is needed.
@@ -330,11 +365,11 @@ def _sides(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, pivots: 
 @jit
 def _steps(
     placed: _Placed, limbs: _Limbs, radii: Floats, pairs: Ints, allowed: Floats, sides: Floats
-) -> tuple[Bools, Floats]:
-    """Return which limbs have to turn [N, 4], and the least rotation vectors that part them [N, 4, 3].
+) -> tuple[Floats, Floats]:
+    """Return how deep limbs are that have to turn [N, 4], metres, and the least rotation vectors for it [N, 4, 3].
 
     Of several pairs that a limb is in, the deepest counts. Where a pair has a plane, its ends are to be on either side
-    of it; elsewhere its nearest points are to move apart.
+    of it; elsewhere its nearest points are to move apart. Pairs that are apart stay as they are.
 
     Args:
         placed: the limbs as they are.
@@ -345,7 +380,7 @@ def _steps(
         sides: normals of planes, 0 where there is none [N, P, 3].
     """
     count = len(placed.ends)
-    needed, steps = np.zeros((count, 4), np.bool_), np.zeros((count, 4, 3))
+    deep, steps = np.zeros((count, 4)), np.zeros((count, 4, 3))
     points, levers, gives = np.empty((2, 3)), np.empty((2, 3)), np.empty(2, np.bool_)
     for t in range(count):
         worst = np.zeros(4)
@@ -353,21 +388,19 @@ def _steps(
             one, other = placed.ends[t, pairs[p, 0]], placed.ends[t, pairs[p, 1]]
             gap, s, u = nearest_points(one, other)
             reach = radius_at(radii[pairs[p, 0]], s) + radius_at(radii[pairs[p, 1]], u)
-            side = sides[t, p]
-            parted = side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0
-            if not parted and reach - gap - allowed[t, p] <= LEAST:
+            depth = reach - gap - allowed[t, p]
+            if depth <= LEAST:
                 continue
+            side = sides[t, p]
             points[0] = one[0] + s * (one[1] - one[0])
             points[1] = other[0] + u * (other[1] - other[0])
-            if parted:
+            if side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0:
                 ahead, behind = _along(one, side), _along(other, side)
                 points[0], points[1] = one[ahead.argmin()], other[behind.argmax()]
                 gap = ahead.min() - behind.max()
             else:
                 side = (points[0] - points[1]) / max(gap, 1e-9)
             excess = reach - gap - allowed[t, p]
-            if excess <= LEAST:
-                continue
             size = LEVER**2
             for k in range(2):
                 limb, against = limbs.owner[pairs[p, k]], limbs.owner[pairs[p, 1 - k]]
@@ -383,11 +416,14 @@ def _steps(
                 size += np.sum(lever * levers[k])
             for k in range(2):
                 limb = limbs.owner[pairs[p, k]]
-                if gives[k] and excess > worst[limb]:
-                    worst[limb], needed[t, limb] = excess, True
+                if not gives[k]:
+                    continue
+                deep[t, limb] = max(deep[t, limb], depth)
+                if excess > worst[limb]:
+                    worst[limb] = excess
                     step = levers[k] * excess / size
                     steps[t, limb] = step * min(1.0, MOST / max(np.sqrt(np.sum(step**2)), 1e-9))
-    return needed, steps
+    return deep, steps
 
 
 @jit
