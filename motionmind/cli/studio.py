@@ -13,7 +13,7 @@ from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import HOME, Section, command, given_option, option
 from motionmind.cli.printing import note
 from motionmind.cli.types import FILE
-from motionmind.cli.warming import warm_once
+from motionmind.cli.warming import compile_all, is_cold
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
@@ -69,7 +69,6 @@ def studio(
     except ImportError as error:
         raise MotionMindError(f'the studio needs an extra: pip install "motionmind[studio]" ({error})') from None
 
-    warm_once()
     with listen(host, port) as listening:
         url, is_open = address_of(listening)
         project = _project(file, corpus, home)
@@ -86,7 +85,7 @@ def studio(
                     f"whoever has the URL below and reaches {url.removeprefix('http://')} can work on this project, "
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
-            work, keys = Studio(project, home), Keys()
+            work, keys = Studio(project, home, first=compile_all if is_cold() else None), Keys()
             work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"
 

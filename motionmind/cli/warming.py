@@ -54,11 +54,29 @@ def warm_once() -> None:
 
     Nothing is done where compiled code cannot be kept: whatever needs it then compiles it.
     """
-    from motionmind.jit import is_compiled, place_of_code
-
-    if not is_compiled("search") and place_of_code() is not None:
+    if is_cold():
         _say()
         _compile()
+
+
+def is_cold() -> bool:
+    """Return whether nothing is compiled, and compiled code can be kept."""
+    from motionmind.jit import is_compiled, place_of_code
+
+    return not is_compiled("search") and place_of_code() is not None
+
+
+def compile_all(report: Callable[[int, int, str], None]) -> None:
+    """Compile all, as a job of the studio's, which tells how far it has come."""
+    from motionmind.jit import compiled_names, decorated_names
+
+    total, workers = len(decorated_names()), _start([[work] for work in (search, realise, draw)])
+    try:
+        while any(worker.poll() is None for worker in workers):
+            report(min(len(compiled_names()), total), total, "getting ready, once, for half a minute")
+            sleep(_LOOK)
+    finally:
+        _end(workers)
 
 
 def help_first_search() -> None:

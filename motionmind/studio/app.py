@@ -5,21 +5,20 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from importlib import import_module
-from importlib.util import find_spec
+from itertools import chain
 
 import msgspec
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, Router
 
-from motionmind.studio import api
+from motionmind.studio import api, between, export, imports, posing, seams, varied
 from motionmind.studio.guard import ENTER, Application, Guard, Message, Receive, Send, policy
 from motionmind.studio.pages import read_page
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
-_PARTS = ("seams", "between", "export", "varied", "imports", "corpora", "posing")
+_PARTS = (api, seams, between, export, varied, imports, posing)
 
 
 class _Entering(msgspec.Struct, forbid_unknown_fields=True):
@@ -39,21 +38,15 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
     @asynccontextmanager
     async def lifespan(_: object) -> AsyncIterator[None]:
         studio.start()
-        tasks = [asyncio.create_task(part.keep_smooth(studio)) for part in parts if hasattr(part, "keep_smooth")]
+        smoothing = asyncio.create_task(seams.keep_smooth(studio))
         yield
         studio.events.close()
-        for task in tasks:
-            task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
+        smoothing.cancel()
+        with suppress(asyncio.CancelledError):
+            await smoothing
         studio.close()
 
-    parts = [import_module(f"motionmind.studio.{name}") for name in _PARTS if find_spec(f"motionmind.studio.{name}")]
-    found: list[BaseRoute] = [*_open_routes(keys, port), *api.routes(studio)]
-    for part in parts:
-        if hasattr(part, "routes"):
-            found += part.routes(studio)
-
+    found = [*_open_routes(keys, port), *chain.from_iterable(part.routes(studio) for part in _PARTS)]
     router = Router(found, lifespan=lifespan)
 
     async def routed(scope: Message, receive: Receive, send: Send) -> None:

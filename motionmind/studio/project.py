@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
-
-import msgspec
+from typing import Self
 
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
@@ -18,44 +16,13 @@ from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
 from motionmind.studio.piece import Finding, Seam, State, key_of
 from motionmind.studio.placement import Marks
+from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 
 _EVERY = 16  # edits after which the state is remembered, so that an undo need not apply all of them again
 
 
 class RefusedError(MotionMindError):
     """Nothing was done, for as things stand it cannot be."""
-
-
-class _Head(msgspec.Struct, frozen=True):
-    format: str
-    version: int
-    corpora: dict[str, str]
-    title: str = ""
-    corpus: str = ""
-
-
-class _Corpora(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """From here on the project uses these versions of corpora, beside those named before."""
-
-    corpora: dict[str, str]
-
-
-class _Edited(msgspec.Struct, frozen=True):
-    edit: Edit
-    number: int
-    window: str
-
-
-class _Undone(msgspec.Struct, frozen=True):
-    undo: int
-    number: int
-    window: str
-
-
-class _Redone(msgspec.Struct, frozen=True):
-    redo: int
-    number: int
-    window: str
 
 
 @dataclass
@@ -192,7 +159,7 @@ class Project:
         except MotionMindError as error:
             raise RefusedError(str(error)) from error
         self._note_versions(state)
-        line = self._journal.append(_Edited(edit, self.sequence, window))
+        line = self._journal.append(EditLine(edit, self.sequence, window))
         self._redoable.pop(window, None)
         self._add(Change(line.number, edit, window), state)
         self._changed()
@@ -209,7 +176,7 @@ class Project:
         if change is None:
             raise RefusedError("this window has nothing to take back")
         state = self._without_conflict(change, undone=True)
-        self._journal.append(_Undone(change.number, self.sequence, window))
+        self._journal.append(UndoLine(change.number, self.sequence, window))
         self._switch(change, True, state)
         self._redoable.setdefault(window, []).append(change)
         self._changed()
@@ -221,7 +188,7 @@ class Project:
             raise RefusedError("this window has nothing to do again")
         change = stack[-1]
         state = self._without_conflict(change, undone=False)
-        self._journal.append(_Redone(change.number, self.sequence, window))
+        self._journal.append(RedoLine(change.number, self.sequence, window))
         self._switch(change, False, state)
         stack.pop()
         self._changed()
@@ -297,27 +264,27 @@ class Project:
         start = State()
         for line in self._journal.lines():
             try:
-                record = _decoded(line.data)
+                record = decode_line(line.data)
             except (ValueError, RecursionError) as error:
                 raise FormatError(f"is damaged: {error}", path=self.path, line=line.number + 1) from error
             match record:
-                case _Head():
+                case Head():
                     start = State(title=record.title, corpus=record.corpus)
                     written |= record.corpora
-                case _Corpora():
+                case Corpora():
                     written |= record.corpora
                 case None:
                     self.movements.take_in(line)
                 case Finding():
                     self._findings[record.finding] = record
-                case _Edited():
+                case EditLine():
                     changes[line.number] = Change(line.number, record.edit, record.window)
                     self._redoable.pop(record.window, None)
-                case _Undone(undo=number, window=window) | _Redone(redo=number, window=window):
+                case UndoLine(undo=number, window=window) | RedoLine(redo=number, window=window):
                     if (change := changes.get(number)) is None:
                         message = f"is damaged: there is no edit {number}"
                         raise FormatError(message, path=self.path, line=line.number + 1)
-                    change.undone = isinstance(record, _Undone)
+                    change.undone = isinstance(record, UndoLine)
                     stack = self._redoable.setdefault(window, [])
                     if change.undone:
                         stack.append(change)
@@ -368,13 +335,13 @@ class Project:
         if changed:
             names = enumerated([displayed(name) for name in changed])
             self.words.append(f"{names} has changed since this piece was made: its seams are judged anew")
-            self._journal.append(_Corpora({name: self.versions[name] for name in changed}))
+            self._journal.append(Corpora({name: self.versions[name] for name in changed}))
 
     def _note_versions(self, state: State) -> None:
         """Write down the versions of corpora that a state uses for the first time."""
         new = {name: version_of(name, self._home) for name in sorted(self._used(state) - self.versions.keys())}
         if new:
-            self._journal.append(_Corpora(new))
+            self._journal.append(Corpora(new))
             self.versions |= new
 
     def _used(self, state: State) -> set[str]:
@@ -388,24 +355,3 @@ class Project:
 def _corpora_of(keys: Iterable[str]) -> set[str]:
     parts = (key.lstrip("~").partition("/") for key in keys)
     return {name for name, slash, _ in parts if slash and f"{name}/" != piece.OWN}
-
-
-_KINDS: Mapping[str, Any] = {
-    "format": _Head,
-    "corpora": _Corpora,
-    "finding": Finding,
-    "edit": _Edited,
-    "undo": _Undone,
-    "redo": _Redone,
-}
-
-
-def _decoded(data: bytes) -> Any:
-    """Decode a line; None if it holds a movement, which is read when it is needed. ValueError if it is damaged."""
-    fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
-    if "movement" in fields:
-        return None
-    for name, kind in _KINDS.items():
-        if name in fields:
-            return msgspec.json.decode(data, type=kind)
-    raise ValueError(f"a line of unknown kind, with {enumerated(sorted(fields))}")

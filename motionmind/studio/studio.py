@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from motionmind.studio.movements import Movements
 from motionmind.studio.project import Project
 from motionmind.studio.thumbnails import Thumbnails
 from motionmind.studio.view import view_of
-from motionmind.studio.workers import Job, Workers
+from motionmind.studio.workers import Job, Report, Workers
 
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
@@ -33,17 +33,24 @@ class Studio:
 
     workers: Workers
 
-    def __init__(self, project: Project, home: Path | None = None, processes: int | None = None) -> None:
+    def __init__(
+        self,
+        project: Project,
+        home: Path | None = None,
+        processes: int | None = None,
+        first: Callable[[Report], None] | None = None,
+    ) -> None:
         """Set up a studio.
 
         Args:
             project: the project.
             home: the folder of the user's corpora; None for the usual one.
             processes: the number of workers; by default as many as this computer has room for.
+            first: what a worker does first, as a job.
         """
         self.project, self.home = project, home
         self.events, self.thumbnails = Events(), Thumbnails()
-        self._processes = processes
+        self._processes, self._first = processes, first
         self._engines: OrderedDict[str, Engine] = OrderedDict()
         project.subscribe(self._tell_of_project)
 
@@ -55,6 +62,8 @@ class Studio:
     def start(self) -> None:
         """Start the workers, in the event loop."""
         self.workers = Workers(self.home, self._tell_of_job, self.project.state.corpus, self._processes)
+        if self._first is not None:
+            self.workers.submit("getting ready", self._first)
 
     def close(self) -> None:
         """End the workers, and let others open the project."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 _ENGINES = 2  # that a worker keeps loaded
+_TRIES = 3  # starts of a worker that ends before it has begun
 _JOBS = 200  # that are over and can still be asked for
 _FEW = 4  # processors with which a second worker would only slow the first
 _MEMORY = 6 * 2**30  # bytes of it that allow for a second worker
@@ -152,6 +153,7 @@ class Workers:
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
         self._workers = [_Worker(self, home, warm) for _ in range(number or _room())]
+        self._failures = 0  # workers that have ended before they began, one after another
 
     @property
     def jobs(self) -> list[Job]:
@@ -215,6 +217,10 @@ class Workers:
 
     def go_on(self) -> None:
         """Give the workers that are free the jobs that wait."""
+        while self._waiting and not self._workers:
+            job = self._waiting.popleft()
+            job.end("failed", words="the engine does not start; the terminal says why")
+            self._tell(job)
         for worker in self._workers:
             if worker.job is None and self._waiting:
                 job = self._waiting.popleft()
@@ -227,9 +233,14 @@ class Workers:
             return
         job = worker.job
         if message is None:
-            self._workers[self._workers.index(worker)] = _Worker(self, self._home, self._warm)
+            self._failures += not worker.has_begun
+            self._workers.remove(worker)
+            if self._failures < _TRIES:
+                self._workers.append(_Worker(self, self._home, self._warm))
             if job:
                 job.end("failed", words="this took more than this computer has, and was ended")
+        elif message[0] == "begun":
+            worker.has_begun, self._failures = True, 0
         elif job is None:
             return
         elif message[0] == "report":
@@ -256,11 +267,12 @@ class _Worker:
 
     Attributes:
         job: the job that it does; None if it is free.
+        has_begun: whether it has come to wait for jobs.
     """
 
     def __init__(self, workers: Workers, home: Path | None, warm: str) -> None:
         self.job: Job | None = None
-        self._workers, self._is_killed = workers, False
+        self._workers, self._is_killed, self.has_begun = workers, False, False
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
@@ -342,6 +354,7 @@ def _work(connection: Connection, home: Path | None, warm: str) -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    connection.send(("begun",))
     with suppress(MotionMindError):
         if warm:
             engine_of(warm)

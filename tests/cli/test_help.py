@@ -82,6 +82,7 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "vary",
             "review",
             "attractor",
+            "studio",
             "serve",
             "warm",
             "completion",
@@ -137,9 +138,9 @@ def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 24
+    assert len(EXAMPLES) == 25
     for line in EXAMPLES:
-        if line.startswith("motionmind serve"):  # which does not end
+        if line.startswith(("motionmind serve", "motionmind studio")):  # which do not end
             continue
         program, *words = shlex.split(line)
         assert program == "motionmind"

@@ -1,0 +1,73 @@
+"""Lines of a project's file: what each of them says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from motionmind.errors import enumerated
+from motionmind.studio.edits import Edit
+from motionmind.studio.piece import Finding
+
+
+class Head(msgspec.Struct, frozen=True):
+    """The first line."""
+
+    format: str
+    version: int
+    corpora: dict[str, str]
+    title: str = ""
+    corpus: str = ""
+
+
+class Corpora(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """From here on the project uses these versions of corpora, beside those named before."""
+
+    corpora: dict[str, str]
+
+
+class EditLine(msgspec.Struct, frozen=True):
+    """An edit, the number of its line, and the window in which it was done."""
+
+    edit: Edit
+    number: int
+    window: str
+
+
+class UndoLine(msgspec.Struct, frozen=True):
+    """The number of an edit that is taken back."""
+
+    undo: int
+    number: int
+    window: str
+
+
+class RedoLine(msgspec.Struct, frozen=True):
+    """The number of an edit that is done again."""
+
+    redo: int
+    number: int
+    window: str
+
+
+_KINDS: Mapping[str, Any] = {
+    "format": Head,
+    "corpora": Corpora,
+    "finding": Finding,
+    "edit": EditLine,
+    "undo": UndoLine,
+    "redo": RedoLine,
+}
+
+
+def decode_line(data: bytes) -> Any:
+    """Decode a line; None if it holds a movement, which is read when it is needed. ValueError if it is damaged."""
+    fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
+    if "movement" in fields:
+        return None
+    for name, kind in _KINDS.items():
+        if name in fields:
+            return msgspec.json.decode(data, type=kind)
+    raise ValueError(f"a line of unknown kind, with {enumerated(sorted(fields))}")
