@@ -115,7 +115,9 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         return Project.open(place, home)
     if place == file:
         return Project.create(place, corpus, home)
-    motions = read_movements(parse_movement(str(file), home).source, (), home)
+    as_it_says = dict.fromkeys(("joints", "unit", "asf", "source_fps"))
+    source = parse_movement(str(file), home).source
+    motions = read_movements(source, (), home, **as_it_says)
     project = Project.create(place, corpus, home)
     keys = [project.movements.keep(motion) for motion in motions]
     blocks = [
