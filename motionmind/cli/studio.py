@@ -115,9 +115,8 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         return Project.open(place, home)
     if place == file:
         return Project.create(place, corpus, home)
-    as_it_says = dict.fromkeys(("joints", "unit", "asf", "source_fps"))
     source = parse_movement(str(file), home).source
-    motions = read_movements(source, (), home, **as_it_says)
+    motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None)
     project = Project.create(place, corpus, home)
     keys = [project.movements.keep(motion) for motion in motions]
     blocks = [
