@@ -115,7 +115,8 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         return Project.open(place, home)
     if place == file:
         return Project.create(place, corpus, home)
-    motions = read_movements(parse_movement(str(file), home).source, (), home)
+    source = parse_movement(str(file), home).source
+    motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None)
     project = Project.create(place, corpus, home)
     keys = [project.movements.keep(motion) for motion in motions]
     blocks = [

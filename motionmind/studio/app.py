@@ -47,7 +47,7 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
         studio.close()
 
     found = [*_open_routes(keys, port), *chain.from_iterable(part.routes(studio) for part in _PARTS)]
-    router = Router(found, lifespan=lifespan)
+    router = Router(found, redirect_slashes=False, lifespan=lifespan)
 
     async def routed(scope: Message, receive: Receive, send: Send) -> None:
         scope["app"] = router  # or it would answer by itself, in plain text, what it does not know

@@ -41,7 +41,7 @@ class Client:
     """Whoever asks: the page, with its cookie, unless headers say otherwise."""
 
     def __init__(self, url: str, window: str = "w1") -> None:
-        self.url, self.window, self.cookie = url, window, ""
+        self.url, self.window, self.cookie, self.token = url, window, "", ""
 
     def send(self, method: str, path: str, body: Any = None, **headers: str | None) -> Answer:
         """Send a request as the page does; headers of the page can be replaced, or left out by None."""
@@ -67,6 +67,7 @@ class Client:
 
     def enter(self, token: str) -> None:
         """Exchange the token for the cookie."""
+        self.token = token
         answer = self.send("POST", "/api/enter", {"token": token})
         assert answer.status == 200, answer
         self.cookie = answer.headers["set-cookie"].partition(";")[0]

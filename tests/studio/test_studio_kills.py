@@ -1,0 +1,207 @@
+"""Kills, full disks and Ctrl-C: at no moment is more lost than the edit that is on its way."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from studio_server import ROOT, running
+
+from motionmind.errors import MotionMindError
+from motionmind.studio.edits import Insert
+from motionmind.studio.project import Project
+
+# Appends edits as fast as it can, and says the number of each once it is on disk.
+WRITER = """
+import sys
+from pathlib import Path
+from motionmind.studio.edits import Insert
+from motionmind.studio.project import Project
+project = Project.open(Path(sys.argv[1]))
+print(len(project.state.blocks), flush=True)
+for number in range(len(project.state.used), 100_000):
+    project.edit("w1", Insert(f"b{number}", "ballet/adagio", 0, 9))
+    print(number + 1, flush=True)
+"""
+
+
+def test_a_kill_loses_at_most_the_edit_in_flight(tmp_path: Path) -> None:
+    path, rng = tmp_path / "piece.motionmind", random.Random(1)
+    Project.create(path, "ballet").close()
+    for _ in range(12):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+        assert writer.stdout is not None
+        said = [writer.stdout.readline() for _ in range(4)]  # what was there, and three edits more
+        time.sleep(0.2 * rng.random())
+        writer.kill()
+        said += writer.communicate()[0].splitlines()
+        written = int(said[-1])
+        project = Project.open(path)
+        names = [block.id for block in project.state.blocks]
+        project.close()
+        assert names == [f"b{number}" for number in range(len(names))]
+        assert len(names) in (written, written + 1)
+    assert len(names) > 20
+
+
+def test_a_server_that_is_killed_has_all_that_it_answered(tmp_path: Path) -> None:
+    path, answered = tmp_path / "piece.motionmind", 0
+    for _ in range(3):
+        with running(path, home=tmp_path) as (process, client):
+            assert len(client.project()["piece"]["blocks"]) in (answered, answered + 1)
+            answered = len(client.project()["piece"]["blocks"])
+            threading.Timer(0.3, process.kill).start()
+            with suppress(OSError, http.client.HTTPException):
+                while True:
+                    client.insert(f"b{answered}", "ballet/adagio", 0, 9)
+                    answered += 1
+    project = Project.open(path)
+    assert len(project.state.blocks) in (answered, answered + 1)
+    project.close()
+    assert answered > 5
+
+
+def test_workers_end_with_the_server_that_was_killed(tmp_path: Path) -> None:
+    with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, _):
+        children = _until(lambda: [child for child in _children(process.pid) if b"spawn_main" in _command(child)])
+        assert children
+        process.kill()
+        process.wait()
+        assert _until(lambda: not any(b"spawn_main" in _command(child) for child in children))
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.5])
+def test_ctrl_c_ends_it_at_once_though_windows_listen(tmp_path: Path, pause: float) -> None:
+    with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, client), client.listening() as events:
+        next(events)
+        time.sleep(pause)
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        out, err = process.communicate(timeout=15)
+        assert time.monotonic() - began < 5.0
+        assert process.returncode == 130
+        assert "Traceback" not in out + err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of files' sizes are POSIX")
+def test_on_a_full_disk_an_edit_is_refused_in_a_line_and_the_project_stays_whole(tmp_path: Path) -> None:
+    import resource
+
+    path = tmp_path / "piece.motionmind"
+    project = Project.create(path, "ballet")
+    project.edit("w1", Insert("b0", "ballet/adagio", 0, 9))
+    whole, state = path.read_bytes(), project.state
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for room in (0, 1, 30):  # bytes that are free
+        handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole) + room, hard))
+        try:
+            with pytest.raises(
+                MotionMindError, match=r"this was not done, for piece\.motionmind cannot be written"
+            ) as error:
+                project.edit("w1", Insert("b1", "ballet/adagio", 0, 9))
+            with pytest.raises(MotionMindError, match="this was not done"):
+                project.undo("w1")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+            signal.signal(signal.SIGXFSZ, handler)
+        assert "\n" not in str(error.value)
+        assert (path.read_bytes(), project.state) == (whole, state)
+    project.edit("w1", Insert("b1", "ballet/adagio", 0, 9))
+    project.undo("w1")
+    project.close()
+    again = Project.open(path)
+    assert [block.id for block in again.state.blocks] == ["b0"]
+    again.close()
+
+
+def test_errors_of_the_command_are_one_line(tmp_path: Path) -> None:
+    home, other = tmp_path / "home", tmp_path / "other.motionmind"
+    other.write_text("no project\n")
+    with running(tmp_path / "piece.motionmind", home=home) as (_, client):
+        port = client.url.rpartition(":")[2]
+        for arguments, words in (
+            ((tmp_path / "piece.motionmind",), f"is open at {client.url}"),
+            ((other,), "is no project of the studio"),
+            (
+                (tmp_path / "new.motionmind", "--port", port),
+                f"cannot listen at 127.0.0.1:{port}: address already in use",
+            ),
+            ((tmp_path / "new.motionmind", "--corpus", "nothing"), "no corpus 'nothing'"),
+            ((tmp_path / "nowhere" / "new.motionmind",), "no such file or directory"),
+            ((tmp_path / "missing.bvh",), "there is no such file"),
+        ):
+            code, err = _run(home, *arguments)
+            assert (code, err.count("\n")) == (2, 1), err
+            assert words in err.lower() or words in err
+    assert not (tmp_path / "new.motionmind").exists()
+
+
+def test_it_says_where_the_extra_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "starlette.py").write_text("raise ImportError('no starlette')")
+    code, err = _run(tmp_path, tmp_path / "piece.motionmind", before=str(tmp_path))
+    assert (code, err.count("\n")) == (2, 1)
+    assert 'pip install "motionmind[studio]"' in err
+
+
+def test_a_movement_begins_a_project_beside_it(tmp_path: Path) -> None:
+    score = tmp_path / "bends.score"
+    score.write_text(
+        "title  Two bends\nbody   human23\nlegs\n  stand = stand out 10 turn 8\n  bend = stand out 10 turn 8, bend 30\n"
+        "clip one: Down\n  start | stand\n  1     | bend\nclip two: Up\n  start | bend\n  1     | stand\n"
+    )
+    for _ in range(2):  # the second time it goes on
+        with running(score, home=tmp_path) as (_, client):
+            blocks = client.project()["piece"]["blocks"]
+            assert [block["title"] for block in blocks] == ["one", "two"]
+    assert (tmp_path / "bends.motionmind").is_file()
+
+
+def _run(home: Path, *arguments: object, before: str = "") -> tuple[int, str]:
+    ran = subprocess.run(
+        [sys.executable, "-m", "motionmind", "studio", "--no-browser", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": f"{before}{os.pathsep}{ROOT}", "MOTIONMIND_HOME": str(home)},
+        check=False,
+    )
+    return ran.returncode, ran.stderr
+
+
+def _children(process: int) -> list[int]:
+    try:
+        tasks = Path(f"/proc/{process}/task")
+        return [int(word) for task in tasks.iterdir() for word in (task / "children").read_text().split()]
+    except OSError:
+        return []
+
+
+def _command(process: int) -> bytes:
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def _until(found: Callable[[], object], seconds: float = 15.0) -> object:
+    """Wait until something is found, and return it."""
+    end = time.monotonic() + seconds
+    while not (value := found()) and time.monotonic() < end:
+        time.sleep(0.05)
+    return value
