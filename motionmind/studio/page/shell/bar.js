@@ -1,6 +1,6 @@
 /** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
 import { shownKeys } from "./keys.js";
@@ -90,7 +90,7 @@ function Title({ studio, title }) {
 /** The sheet of keys. @param {{studio: any, close: () => void}} props */
 function Sheet({ studio, close }) {
   const dialog = useRef(/** @type {any} */ (null));
-  useEffect(() => dialog.current.showModal(), []);
+  useLayoutEffect(() => dialog.current.showModal(), []);
   return html`<dialog ref=${dialog} class="sheet" data-testid="keys" aria-label="Keys" onClose=${close}>
     <form method="dialog" class="row">
       <h2 class="grow">Keys</h2>

@@ -4,7 +4,7 @@ import { orbit } from "motionmind/keys";
 
 /**
  * @typedef {object} Row
- * @property {string[]} [keys] what `event.key` is, in lower case where it is one letter; with "Ctrl+" and "Shift+" before
+ * @property {string[]} [keys] what `event.key` is; with "Ctrl+" and "Shift+" before
  * @property {string[]} [shown] how they are shown; as `keys` where left out
  * @property {string} does what they do
  * @property {string} [group] the heading that they stand under
@@ -15,6 +15,8 @@ const SHOWN = /** @type {Record<string, string>} */ ({ " ": "Space", ArrowLeft: 
 // What holds the keys that it needs for itself.
 const WRITING = "input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]";
 const PRESSING = "button, summary, a[href], [role=button], [role=tab], [role=option], input";
+
+const EVERYWHERE = "Everywhere";
 
 export class Keys extends EventTarget {
   constructor() {
@@ -42,9 +44,9 @@ export class Keys extends EventTarget {
   /** The rows by their headings. */
   get groups() {
     /** @type {Map<string, Row[]>} */
-    const groups = new Map();
+    const groups = new Map([[EVERYWHERE, []]]);
     for (const row of this.rows) {
-      const group = row.group ?? "Everywhere";
+      const group = row.group ?? EVERYWHERE;
       groups.set(group, [...(groups.get(group) ?? []), row]);
     }
     return groups;
@@ -52,16 +54,16 @@ export class Keys extends EventTarget {
 
   /** @param {KeyboardEvent} event */
   #press(event) {
-    if (event.defaultPrevented || !(event.target instanceof Element) || event.target.closest("dialog[open]")) return;
-    const name = named(event);
-    if (event.target.closest(WRITING) && !(name.startsWith("Ctrl+") && event.target.matches("select"))) return;
-    if ((name === " " || name === "Enter") && event.target.closest(PRESSING)) return;
-    if (name.startsWith("Arrow") && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
+    if (event.defaultPrevented || !(event.target instanceof Element) || document.querySelector("dialog:modal")) return;
+    const name = named(event).toLowerCase();
+    if (event.target.closest(WRITING) && !(name.startsWith("ctrl+") && event.target.matches("select"))) return;
+    if ((name === " " || name === "enter") && event.target.closest(PRESSING)) return;
+    if (name.startsWith("arrow") && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
     const controls = this.controls();
     if (controls && orbit(event, controls)) return;
     // What came last is on top.
     for (const row of [...this.rows].reverse()) {
-      if (row.act && row.keys?.includes(name) && row.act(event) !== false) {
+      if (row.act && row.keys?.some((key) => key.toLowerCase() === name) && row.act(event) !== false) {
         event.preventDefault();
         return;
       }
