@@ -43,9 +43,11 @@ function Studio({ studio, open }) {
   const Centre = "Centre" in views ? views.Centre : null;
   return html`<${Bar} studio=${studio} />
     <${Rail} name=${name} open=${open} />
-    <section id="panel" class="panel" role="tabpanel" aria-label=${about} data-testid=${`panel-${name}`}>
-      <${views.Panel} key=${name} studio=${studio} />
-    </section>
+    <aside class="panel" aria-label="Panel">
+      <div id="panel" role="tabpanel" aria-label=${about} data-testid=${`panel-${name}`}>
+        <${views.Panel} key=${name} studio=${studio} />
+      </div>
+    </aside>
     <main class="view" aria-label="Viewer">
       <${View} studio=${studio} />
       ${Centre && html`<${Centre} key=${name} studio=${studio} />`}
@@ -65,7 +67,8 @@ function Rail({ name, open }) {
     open.set(next);
     document.getElementById(`open-${next}`)?.focus();
   };
-  return html`<nav class="rail" role="tablist" aria-label="Panels" aria-orientation="vertical" onKeyDown=${move}>
+  return html`<nav class="rail" aria-label="Panels">
+    <div role="tablist" aria-label="Panels" aria-orientation="vertical" onKeyDown=${move}>
     ${PANELS.map(
       (panel) =>
         html`<button
@@ -81,6 +84,7 @@ function Rail({ name, open }) {
           ${icon(panel.name)}${panel.words}
         </button>`,
     )}
+    </div>
   </nav>`;
 }
 

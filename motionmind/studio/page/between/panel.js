@@ -24,6 +24,7 @@ export function Panel({ studio }) {
     { keys: ["b"], does: "set B", group: GROUP, act: () => take(studio, "b") },
   ]);
   return html`<div class="between">
+    <h2 class="aside">From one posture to another</h2>
     <div class="ends">
       <${End} studio=${studio} name="a" place=${ends.a} />
       <button
@@ -77,7 +78,7 @@ function End({ studio, name, place }) {
             <span class="letter" aria-hidden="true">${letter}</span>
             <span class="cut name">${place.title}</span>`
         : html`<span class="letter" aria-hidden="true">${letter}</span>
-            <p>${name === "a" ? "Where it starts: pick a posture below" : "Where it leads"}</p>`
+            <p>${name === "a" ? "Where it starts: pick one below" : "Where it leads"}</p>`
     }
     <button
       class="button"

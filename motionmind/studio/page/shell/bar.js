@@ -21,7 +21,7 @@ export function Bar({ studio }) {
     { keys: ["?"], does: "these keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
-    <div class="brand">${icon("brand")}<span>MotionMind</span></div>
+    <h1 class="brand">${icon("brand")}<span>MotionMind</span></h1>
     <${Title} studio=${studio} title=${state?.title ?? ""} />
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>

@@ -49,6 +49,12 @@ export function View({ studio }) {
           ${viewer.piece && html`<button class="button" onClick=${() => viewer.back()}>${icon("back")} Back to the piece</button>`}
         </div>`
       }
+      <div class="views" role="group" aria-label="View">
+        ${VIEWS.map(
+          ([view, name, words]) =>
+            html`<button class="button quiet" title=${words} onClick=${() => viewer.look(view)}>${name}</button>`,
+        )}
+      </div>
     </div>
     <${Transport} viewer=${viewer} />`;
 }
@@ -85,16 +91,10 @@ export function Transport({ viewer }) {
     <select class="wide" aria-label="Speed" value=${speed} onChange=${(/** @type {any} */ event) => (player.speed = Number(event.target.value))}>
       ${SPEEDS.map((value) => html`<option value=${value}>${value}×</option>`)}
     </select>
-    <span class="row wide" role="group" aria-label="View">
-      ${VIEWS.map(
-        ([view, name, words]) =>
-          html`<button class="button quiet" title=${words} onClick=${() => viewer.look(view)}>${name}</button>`,
-      )}
-    </span>
   </div>`;
 }
 
-/** The time as a line that is dragged; written without a view, for it changes with every picture. */
+/** The time as a line that is dragged; written without a view, for it changes with every picture. @param {any} props */
 function Scrub({ viewer, moving }) {
   const { player } = viewer;
   const line = useRef(/** @type {any} */ (null));
