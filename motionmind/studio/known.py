@@ -11,7 +11,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.motion import Posture
 from motionmind.discretize.states import nearest
 from motionmind.geometry import rotations as rot
-from motionmind.studio.reach import drag, standing_soles
+from motionmind.studio.reach import drag, plant, standing_soles
 
 if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
@@ -53,11 +53,14 @@ class Memory:
         ]
 
     def bring_joints(self, posture: Posture, kept: str | None = None) -> Posture:
-        """Return the posture with each joint that was not seen as it was seen nearest to that; feet stay.
+        """Return the posture with each joint that was not seen turned to where it was seen nearest to that.
+
+        Standing feet are put back where they stood, and `kept` where it was, as long as that leaves no joint further
+        than near to what was seen.
 
         Args:
             posture: the posture.
-            kept: the joint whose place is kept, if no joint becomes one that is not even near.
+            kept: a joint whose place is kept if that can be.
         """
         _, numbers = self._nearest(posture.rotations)
         chains = self.corpus.to_chains(posture.rotations).copy()
@@ -65,11 +68,12 @@ class Memory:
             if known != "seen":
                 chains[joint] = self._orientations[joint][numbers[joint]]
         found = settle(Posture(posture.skeleton, rot.normalise(self.corpus.from_chains(chains)), posture.root), posture)
-        if kept is None:
-            return found
-        place = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index(kept)]
-        held = drag(found, kept, place)
-        return held if "unseen" not in self.known(held) else found
+        planted = plant(found, posture)
+        held = planted
+        if kept is not None:
+            place = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index(kept)]
+            held = drag(planted, kept, place)
+        return next((one for one in (held, planted) if "unseen" not in self.known(one)), found)
 
     def bring_whole(self, posture: Posture) -> tuple[Posture, str, float]:
         """Return the corpus's nearest whole posture, where this one stands and faces; its clip, and seconds into it."""

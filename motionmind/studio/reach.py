@@ -102,6 +102,13 @@ def standing_soles(posture: Posture) -> Ints:
     return _Body(posture).kept(None, None).points[::3]
 
 
+def plant(posture: Posture, before: Posture) -> Posture:
+    """Return the posture with the soles where they stand in another, on the same body."""
+    kept, body = _Body(before).kept(None, None), _Body(posture)
+    nothing = _heights(kept.points[:0], np.zeros(0))
+    return body.solve(posture, kept, nothing, travels=True)
+
+
 def put_on_floor(posture: Posture) -> Posture:
     """Return the posture with its lowest point on the floor, and flat on it the feet that are near it then."""
     lowest = float(contact_points(posture.skeleton, posture.rotations, posture.root)[0][:, 1].min())
@@ -111,8 +118,8 @@ def put_on_floor(posture: Posture) -> Posture:
     if not near:
         return down
     points = np.concatenate(near)
-    flat = Wishes(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), np.zeros(len(points)))
-    nothing = Wishes(points[:0], flat.directions[:0], flat.places[:0])
+    flat = _heights(points, np.zeros(len(points)))
+    nothing = _heights(points[:0], np.zeros(0))
     return body.solve(down, flat, nothing, travels=True)
 
 
@@ -193,8 +200,7 @@ class _Body:
         if place[1] > self.above_sole(dragged, leaf) + SNAPS * self.size:
             return whole
         level = Wishes(whole.points[::2], whole.directions[::2], whole.places[::2])
-        down = Wishes(sole, np.tile([0.0, 1.0, 0.0], (len(sole), 1)), np.zeros(len(sole)))
-        return level.and_also(down)
+        return level.and_also(_heights(sole, np.zeros(len(sole))))
 
     # --- steps ----------------------------------------------------------------------------------------------------
 
@@ -301,6 +307,11 @@ class _Body:
         far = np.abs(missed).max(initial=0.0)
         missed = missed * min(1.0, _STRIDE * self.size / max(far, 1e-12))
         return missed, np.einsum("rx,rxd->rd", wishes.directions, slopes[wishes.points])
+
+
+def _heights(points: Ints, heights: Floats) -> Wishes:
+    """Return the wish that points [R] are as high as said [R]."""
+    return Wishes(points, np.tile([0.0, 1.0, 0.0], (len(points), 1)), heights)
 
 
 def _missed(wishes: Wishes, places: Floats) -> Floats:

@@ -52,7 +52,12 @@ def studio_page(studio_server: Served, browser: Any) -> Iterator[Any]:
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     page = context.new_page()
     errors: list[str] = []
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+
+    def hear(message: Any) -> None:
+        if message.type == "error":
+            errors.append(f"{message.text} {message.location.get('url', '')}")
+
+    page.on("console", hear)
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(studio_server.entry)
     yield page

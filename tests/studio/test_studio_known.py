@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from motionmind import Engine
+from motionmind.body.contact import contact_points
 from motionmind.body.motion import Posture
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -15,7 +16,7 @@ from motionmind.notation.compose import posture as score_posture
 from motionmind.notation.read import read_score
 from motionmind.studio.handles import handles_of, mirror, turned, turns_of
 from motionmind.studio.known import Memory
-from motionmind.studio.reach import standing_feet
+from motionmind.studio.reach import drag, standing_feet, standing_soles
 from motionmind.studio.score_lines import score_lines
 
 
@@ -64,10 +65,21 @@ def test_one_step_brings_a_posture_to_what_is_known(ballet: Engine, memory: Memo
     strange = _strange(_posture(ballet, 0))
     assert "unseen" in memory.known(strange)
     found = memory.bring_joints(strange)
-    assert set(memory.known(found)) == {"seen"}
-    seen = [known == "seen" for known in memory.known(strange)]
-    np.testing.assert_allclose(rot.angle(found.rotations, strange.rotations)[seen], 0.0, atol=1e-6)
+    assert "unseen" not in memory.known(found)
     assert standing_feet(found) == standing_feet(strange)
+    was, now = (contact_points(p.skeleton, p.rotations, p.root)[0][standing_soles(strange)] for p in (strange, found))
+    assert np.abs(now - was).max() < 1e-3
+
+
+def test_the_dragged_hand_stays_where_that_can_be(ballet: Engine, memory: Memory) -> None:
+    posture = _posture(ballet, 0)
+    wrist = posture.skeleton.index("left_wrist")
+    place = posture.skeleton.positions(posture.rotations, posture.root)[wrist] + np.array([0.02, 0.1, 0.05])
+    strange = drag(posture, "left_wrist", place)
+    assert set(memory.known(strange)) != {"seen"}
+    found = memory.bring_joints(strange, "left_wrist")
+    assert "unseen" not in memory.known(found)
+    assert np.linalg.norm(found.skeleton.positions(found.rotations, found.root)[wrist] - place) < 1e-3
 
 
 def test_the_nearest_whole_posture_of_one_of_the_corpus_is_itself(ballet: Engine, memory: Memory) -> None:

@@ -3,6 +3,7 @@
 import { Vector3 } from "three";
 
 const STEP = 0.01; // metres that a key moves a handle, of a body as large as a person; with Shift five times as far
+const PAUSE = 400; // milliseconds without a key after which a step is done
 const WORDS = { seen: "seen", near: "nearly seen", unseen: "never seen" };
 const WAYS = /** @type {Record<string, number[]>} */ ({
   ArrowLeft: [-1, 0, 0],
@@ -27,8 +28,9 @@ export class Handles {
     this.point = new Vector3();
     /** @type {{joint: string, plane: Vector3, away: Vector3, moved: boolean} | null} */
     this.held = null;
-    /** @type {number[] | null} where keys have moved the handle to */
+    /** @type {{joint: string, place: number[]} | null} where keys have moved a handle to */
     this.goal = null;
+    this.pause = 0;
     this.listening = new AbortController();
     const { signal } = this.listening;
     this.viewer.addEventListener("draw", () => this.#follow(), { signal });
@@ -71,19 +73,18 @@ export class Handles {
     handle.append(mark());
     handle.addEventListener("focus", () => this.editor.select(joint));
     handle.addEventListener("pointerdown", (event) => this.#hold(event, handle, joint));
-    handle.addEventListener("pointermove", (event) => this.#move(event));
+    handle.addEventListener("pointermove", (event) => this.#move(event, words));
     for (const over of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      handle.addEventListener(over, () => this.#release(words));
+      handle.addEventListener(over, () => this.#release());
     }
-    handle.addEventListener("keydown", (event) => this.#press(event, joint));
-    handle.addEventListener("keyup", () => this.#let(words));
-    handle.addEventListener("blur", () => this.#let(words));
+    handle.addEventListener("keydown", (event) => this.#press(event, joint, words));
     return handle;
   }
 
   /** Show how well each joint is known. */
   #tell() {
-    const { known, selected, joints } = this.editor;
+    const { known, selected, joints, busy } = this.editor;
+    this.element.ariaBusy = String(busy);
     this.marks.forEach((element, i) => {
       const how = known[i] ?? "seen";
       element.dataset.known = known.length ? how : "";
@@ -121,20 +122,19 @@ export class Handles {
     this.held.away.copy(plane).sub(this.#under(event, plane) ?? plane);
   }
 
-  /** @param {PointerEvent} event */
-  #move(event) {
+  /** @param {PointerEvent} event @param {string} words */
+  #move(event, words) {
     const { held } = this;
     const place = held && this.#under(event, held.plane);
     if (!held || !place) return;
     held.moved = true;
-    this.editor.drag(held.joint, place.add(held.away).toArray());
+    this.editor.drag(held.joint, place.add(held.away).toArray(), words);
   }
 
-  /** @param {string} words */
-  #release(words) {
+  #release() {
     const { held } = this;
     this.held = null;
-    if (held?.moved) this.editor.end(`drag the ${words}`);
+    if (held?.moved) this.editor.end();
   }
 
   /** The place under the pointer in the plane through `place` that faces the camera. @param {PointerEvent} event @param {Vector3} place */
@@ -150,24 +150,21 @@ export class Handles {
     return ray.multiplyScalar(place.clone().sub(camera.position).dot(facing) / along).add(camera.position);
   }
 
-  /** @param {KeyboardEvent} event @param {string} joint */
-  #press(event, joint) {
+  /** @param {KeyboardEvent} event @param {string} joint @param {string} words */
+  #press(event, joint, words) {
     const way = WAYS[event.key];
     if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();
-    const far = STEP * this.editor.motion.body.size * (event.shiftKey ? 5 : 1);
+    const { editor } = this;
+    const far = STEP * editor.motion.body.size * (event.shiftKey ? 5 : 1);
     const towards = new Vector3(...way).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(far);
-    this.goal ??= this.editor.place(joint);
-    this.goal = new Vector3(...this.goal).add(towards).toArray();
-    this.editor.drag(joint, this.goal);
-  }
-
-  /** @param {string} words */
-  #let(words) {
-    if (!this.goal) return;
-    this.goal = null;
-    this.editor.end(`drag the ${words}`);
+    // Keys in quick succession move on from where the last one leads to, and are one step.
+    const from = editor.began && this.goal?.joint === joint ? this.goal.place : editor.place(joint);
+    this.goal = { joint, place: new Vector3(...from).add(towards).toArray() };
+    editor.drag(joint, this.goal.place, words);
+    clearTimeout(this.pause);
+    this.pause = setTimeout(() => editor.end(), PAUSE);
   }
 }
 

@@ -23,7 +23,6 @@ export function Joints({ editor }) {
 /** @param {{editor: import("./session.js").Editor, turn: import("./session.js").Turn}} props */
 function Angle({ editor, turn }) {
   const { joint, words, angle, label, least, most, degrees } = turn;
-  const done = () => editor.end(`turn the ${words}`);
   return html`<label class="turn">
     <span>${label}</span>
     <span class="numbers pale">${Math.round(degrees)}°</span>
@@ -35,8 +34,8 @@ function Angle({ editor, turn }) {
       max=${Math.floor(most)}
       step="1"
       value=${Math.round(degrees)}
-      onInput=${(/** @type {any} */ event) => editor.turn(joint, angle, Number(event.target.value))}
-      onChange=${done}
+      onInput=${(/** @type {any} */ event) => editor.turn(turn, Number(event.target.value))}
+      onChange=${() => editor.end()}
     />
   </label>`;
 }

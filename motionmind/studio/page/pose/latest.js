@@ -1,10 +1,15 @@
 /** Requests of which the latest counts: while one is under way, of those that come only the last waits. */
 
 export class Latest {
-  /** @param {(answer: any) => void} taken called with each answer @param {(error: unknown) => void} failed */
-  constructor(taken, failed) {
+  /**
+   * @param {(answer: any) => void} taken called with each answer
+   * @param {(error: unknown) => void} failed
+   * @param {() => void} rests called when nothing is under way any more
+   */
+  constructor(taken, failed, rests) {
     this.taken = taken;
     this.failed = failed;
+    this.rests = rests;
     /** @type {(() => Promise<any>) | null} */
     this.next = null;
     this.busy = false;
@@ -37,5 +42,6 @@ export class Latest {
     }
     this.busy = false;
     for (const resolve of this.waiting.splice(0)) resolve();
+    this.rests();
   }
 }

@@ -26,7 +26,7 @@ export function Panel({ studio }) {
   }, []);
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: () => editor.undo() },
-    { keys: ["Ctrl+Shift+Z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: () => editor.redo() },
+    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: () => editor.redo() },
     { keys: ["k"], does: "bring it to what is known", group: GROUP, act: () => toKnown(editor) },
     { keys: ["f"], does: "feet on the floor", group: GROUP, act: () => toFloor(editor) },
     { shown: ["Tab"], does: "from handle to handle", group: GROUP },
@@ -66,7 +66,10 @@ function Start({ studio }) {
         onChange=${(/** @type {any} */ event) => event.target.value && open(event.target.value)}
       >
         <option value="">${editor.title || "a posture"}</option>
-        ${postures.map(({ group, of }) => html`<optgroup label=${group}>${of.map(({ key, title }) => html`<option value=${key}>${title}</option>`)}</optgroup>`)}
+        ${postures.map(
+          (one) =>
+            html`<optgroup label=${one.group}>${one.of.map((posture) => html`<option value=${posture.key}>${posture.title}</option>`)}</optgroup>`,
+        )}
       </select>
     </label>
     ${
@@ -101,11 +104,11 @@ function Known({ editor }) {
 /** What changes the whole posture. @param {{editor: import("./session.js").Editor}} props */
 function Whole({ editor }) {
   const { past, future, known, standing, released, joints, mirrors } = editor;
-  const strange = known.some((one) => one !== "seen");
+  const strange = known.includes("unseen");
   const wordsOf = (/** @type {string} */ joint) => joints.find((one) => one.joint === joint)?.words.replace(/ toes$/, " foot") ?? joint;
   return html`<section class="stack" aria-label="The whole posture">
     <div class="row wide">
-      <button class="button ${strange ? "primary" : ""}" data-testid="to-known" disabled=${!strange} onClick=${() => toKnown(editor)}>
+      <button class="button ${strange ? "primary" : ""}" data-testid="to-known" disabled=${known.every((one) => one === "seen")} onClick=${() => toKnown(editor)}>
         Bring to what is known
       </button>
       <button class="button" data-testid="to-whole" disabled=${!known.length} onClick=${() => editor.change("whole", "take the nearest posture")}>

@@ -4,6 +4,7 @@ import { movement } from "../movements.js";
 import { Latest } from "./latest.js";
 import { Posed } from "./posed.js";
 
+const ROOM = 1.25; // how much farther away than the whole body needs: limbs go further
 const STEPS = 200; // that can be taken back
 
 /**
@@ -56,12 +57,13 @@ export class Editor extends EventTarget {
     this.past = [];
     /** @type {{posture: Posture, words: string}[]} */
     this.future = [];
-    /** @type {{posture: Posture, standing: string[]} | null} where a drag or a turn began */
+    /** @type {{posture: Posture, standing: string[], words: string} | null} where a drag or a turn began, and what it is */
     this.began = null;
     this.version = 0; // counts changes, for views
     this.requests = new Latest(
       (told) => this.#take(told),
       (error) => studio.say(error instanceof Error ? error.message : String(error), { kind: "error" }),
+      () => this.#changed(),
     );
   }
 
@@ -83,7 +85,17 @@ export class Editor extends EventTarget {
   /** Have the viewer show it. */
   show() {
     if (!this.motion) return;
-    this.studio.viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
+    const { viewer } = this.studio;
+    viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
+    if (!viewer.stage) return;
+    const { camera, controls } = viewer.stage;
+    camera.position.sub(controls.target).multiplyScalar(ROOM).add(controls.target);
+    controls.update();
+  }
+
+  /** Whether it is being changed. */
+  get busy() {
+    return this.began !== null || this.requests.busy;
   }
 
   /** Whether the viewer shows it. */
@@ -119,9 +131,9 @@ export class Editor extends EventTarget {
     this.#changed();
   }
 
-  /** Drag a joint to a place, until `end`. @param {string} joint @param {number[]} place */
-  drag(joint, place) {
-    this.#begin();
+  /** Drag a joint to a place, until `end`. @param {string} joint @param {number[]} place @param {string} words */
+  drag(joint, place, words) {
+    this.#begin(`drag the ${words}`);
     this.dragged = joint;
     const { began } = this;
     if (!began) return;
@@ -137,23 +149,24 @@ export class Editor extends EventTarget {
     );
   }
 
-  /** Set an angle of a joint, until `end`. @param {string} joint @param {string} angle @param {number} degrees */
-  turn(joint, angle, degrees) {
-    this.#begin();
+  /** Set an angle of a joint, until `end`. @param {Turn} turn @param {number} degrees */
+  turn({ joint, angle, words }, degrees) {
+    this.#begin(`turn the ${words}`);
     this.requests.send(() => this.studio.api.post("/api/pose/turn", { pose: this.#pose(this.posture), joint, angle, degrees }));
   }
 
-  /** What was dragged or turned is one step. @param {string} words of the step */
-  async end(words) {
+  /** What was dragged or turned until now is one step. */
+  async end() {
     await this.requests.settled();
     const { began } = this;
     this.began = null;
-    if (began && differ(began.posture, this.posture)) this.#step(began.posture, words);
+    if (began && differ(began.posture, this.posture)) this.#step(began.posture, began.words);
+    else this.#changed();
   }
 
   /** Make another posture of it. @param {"mirror" | "floor" | "known" | "whole"} to @param {string} words */
   async change(to, words) {
-    await this.requests.settled();
+    await this.end();
     const before = this.posture;
     const kept = to === "known" && this.dragged ? this.dragged : null;
     this.requests.send(() => this.studio.api.post("/api/pose/change", { pose: this.#pose(this.posture), to, kept }));
@@ -161,17 +174,19 @@ export class Editor extends EventTarget {
     if (differ(before, this.posture)) this.#step(before, words);
   }
 
-  undo() {
+  async undo() {
+    await this.end();
     this.#travel(this.past, this.future);
   }
 
-  redo() {
+  async redo() {
+    await this.end();
     this.#travel(this.future, this.past);
   }
 
   /** Keep it in the project: its key. @param {string} name @returns {Promise<string>} */
   async keep(name) {
-    await this.requests.settled();
+    await this.end();
     return (await this.studio.api.post("/api/pose/keep", { pose: this.#pose(this.posture), name })).key;
   }
 
@@ -180,8 +195,9 @@ export class Editor extends EventTarget {
     return (await this.studio.api.post("/api/pose/score", { pose: this.#pose(this.posture), name })).lines;
   }
 
-  #begin() {
-    this.began ??= { posture: this.posture, standing: this.standing };
+  /** @param {string} words */
+  #begin(words) {
+    this.began ??= { posture: this.posture, standing: this.standing, words };
   }
 
   /** @param {Posture} before @param {string} words */
