@@ -34,11 +34,12 @@ from motionmind.realise.feet import (
     pose,
     softness,
 )
-from motionmind.realise.flight import SURELY
+from motionmind.realise.flight import EVER, SURELY
 from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
+TALLER = 0.12  # metres above how walks stand at a given posture from which it may be in the air, though most stand
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 
 
@@ -154,8 +155,11 @@ def _set_down(
 ) -> tuple[Floats, Floats]:
     """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
     half_steps, given = stance.half_steps, 2 * np.array(list(low))
-    hovering = stance.aloft[[0, -1]] > SURELY
-    under = _floor_under(half_steps, stance.clearance, np.array([low[0], low[given[-1] // 2]]), hovering)
+    lows = np.array([low[0], low[given[-1] // 2]])
+    hovering = _hovering(stance, lows)
+    aloft = stance.aloft.copy()
+    aloft[[0, -1]] = np.where(hovering, 1.0, aloft[[0, -1]])
+    under = _floor_under(half_steps, stance.clearance, lows, hovering)
     at_half_steps = stance.clearance + under
     evenly = np.interp(half_steps, half_steps[given], list(low.values()))
     at_half_steps = evenly + stance.trust * (at_half_steps - evenly)
@@ -171,7 +175,7 @@ def _set_down(
     root[0], root[-1] = ends
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
-    aloft, leaps = (np.interp(times, half_steps, one) for one in (stance.aloft, stance.leaps))
+    aloft, leaps = (np.interp(times, half_steps, one) for one in (aloft, stance.leaps))
     frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()
     for number, (start, end) in enumerate(pairwise(frames)):
         # Rounded: a posture that falls on a frame but for rounding errors keeps that frame.
@@ -253,6 +257,21 @@ def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats 
         None if rate is None else level * (rate - step) for rate, step in zip(rates, steps[[0, -1]], strict=True)
     )
     return np.asarray(root + departure(times, first, last))
+
+
+def _hovering(stance: Stance, ends: Floats) -> Bools:
+    """Return whether the first and the last posture are in the air [2], from their lowest points' heights [2], metres.
+
+    They are where most walks are in the air; and where some are, and it is as high as these above the floor under the
+    other end: in the crouch of a jump much of a corpus stands.
+    """
+    aloft, leaps, clearance = stance.aloft[[0, -1]], stance.leaps[[0, -1]], stance.clearance[[0, -1]]
+    surely = aloft > SURELY
+    standing = np.maximum(clearance - aloft * leaps, 0.0) / np.maximum(1.0 - aloft, 1e-9)
+    floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
+    taller = ends - floor - standing
+    as_high = (taller > TALLER) & (taller > np.abs(ends - floor - leaps))
+    return np.asarray(surely | ((aloft > EVER) & as_high))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:

@@ -80,8 +80,8 @@ def grounded(
     places = np.interp(half_steps * fps, np.arange(len(q)), lowest_height(skeleton, q, root))
     low = {move: float(places[2 * move]) for move in (range(moves + 1) if given else (0, moves))}
     stands = np.ones((len(half_steps), len(limbs_of(skeleton)) + 1))
-    clearance = np.where(flies > 0.5, leap, 0.0)
-    stance = Stance(half_steps, clearance, none + 1.0, stands, flies, clearance, np.zeros((2 * moves, 3)), 0.08)
+    clearance, leaps = flies * leap, np.where(flies > 0.0, leap, 0.0)
+    stance = Stance(half_steps, clearance, none + 1.0, stands, flies, leaps, np.zeros((2 * moves, 3)), 0.08)
     loose = np.zeros(len(skeleton), dtype=np.bool_)
     rates = options.pop("rates", (None, None))
     ends = root[0], root[-1]
@@ -369,6 +369,24 @@ def test_an_end_in_the_air_shows_nothing_of_its_floor() -> None:
     q, root, aloft = into_the_air(frames, 0.4)
     found, went = grounded(q, root, aloft=aloft, leap=0.2)
     assert lowest_height(human23(), found, went)[: frames // 2].max() < 0.01
+
+
+@pytest.mark.parametrize(("high", "share"), [(0.4, 0.1), (0.3, 0.3)])
+def test_an_end_as_high_as_some_jump_is_in_the_air_though_most_stand_so(high: float, share: float) -> None:
+    """In a crouch a corpus stands more often than it jumps; a floor so high is less likely than a jump."""
+    frames = 61
+    q, root, aloft = into_the_air(frames, high)
+    found, went = grounded(q, root, aloft=share * aloft, leap=0.3)
+    heights = lowest_height(human23(), found, went)
+    flying = np.flatnonzero(heights > 0.03)
+    assert heights[: frames // 2].max() < 0.01
+    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY, rtol=0.15)
+
+
+def test_an_end_a_little_higher_than_most_stand_shows_a_higher_floor() -> None:
+    """It is nearer to the height at which most stand than to that of the jumps."""
+    q, root, aloft = into_the_air(61, 0.14)
+    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.3), slice(None)).min() > -1.0
 
 
 def test_a_foot_that_wavers_into_the_floor_does_not_lift_the_body() -> None:
