@@ -117,8 +117,8 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
         onPointerUp=${up}
         onPointerCancel=${cancel}
         onKeyDown=${key}
-        onFocusIn=${(event) => focusIn(event, does, piece)}
-        onFocusOut=${({ relatedTarget }) => {
+        onfocusin=${(event) => focusIn(event, does, piece)}
+        onfocusout=${({ relatedTarget }) => {
           // What is taken away while it has the focus leaves it to nobody.
           if (relatedTarget && !relatedTarget.closest("[role=option]")) does.focused = false;
         }}
