@@ -154,7 +154,7 @@ def test_everything_is_done_by_keys_alone(page: Any) -> None:
             page.keyboard.press(key)
 
     page.get_by_test_id("open-between").focus()
-    for _ in range(60):
+    for _ in range(150):
         press("Tab")
         if page.evaluate("document.activeElement.closest('.stretches') !== null"):
             break
@@ -235,7 +235,8 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
     page.keyboard.press("Home")
     page.keyboard.press("PageUp")
     assert page.evaluate("studio.viewer.player.time") == pytest.approx(1.0)
-    assert ruler.get_attribute("aria-valuetext") == "1.00 seconds, eight 1, count 2"
+    said = "document.querySelector('[data-testid=ruler]').getAttribute('aria-valuetext')"
+    wait_for(page, f"{said} === '1.00 seconds, eight 1, count 2'")
     wide = page.locator(".timeline .inner").evaluate("(element) => element.clientWidth")
     page.get_by_test_id("block-b2").hover()
     page.keyboard.down("Control")

@@ -38,7 +38,10 @@ export function Panel({ studio }) {
   useEffect(() => {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
-  useEffect(() => setStopped(false), [piece.blocks]);
+  const smoothing = useStore(studio, ({ jobs }) => [...jobs.values()].some(atSeams));
+  useEffect(() => {
+    if (smoothing) setStopped(false);
+  }, [smoothing]);
   useEffect(() => studio.keys.add(ROWS), [studio]);
   const picture = useThumbnails(studio);
   const seam = selected(piece, selection)?.seam;
@@ -83,6 +86,11 @@ export function Panel({ studio }) {
       }}
     />`}
   </section>`;
+}
+
+/** Whether a job is at a seam, and not over. */
+function atSeams({ kind, state }) {
+  return kind.startsWith("seam") && (state === "waiting" || state === "running");
 }
 
 /** Whether a key is for what has the focus. */
