@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -148,11 +149,18 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
     wait_for(page, "piece.blocks.length === 4 && piece.blocks[0].source === 'ballet/tendus'")
 
 
-def test_everything_is_done_by_keys_alone(page: Any) -> None:
+def press_on(page: Any) -> Callable[..., None]:
+    """A function that presses keys, one after the other."""
+
     def press(*keys: str) -> None:
         for key in keys:
             page.keyboard.press(key)
 
+    return press
+
+
+def test_stretches_are_arranged_by_keys_alone(page: Any) -> None:
+    press = press_on(page)
     page.get_by_test_id("open-between").focus()
     for _ in range(150):
         press("Tab")
@@ -179,11 +187,21 @@ def test_everything_is_done_by_keys_alone(page: Any) -> None:
     wait_for_blocks(page, ["adagio-barre 9-15", "plies 1-11", "tendus 11-18"])
     press("Control+Shift+z")
     wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "tendus 11-18"])
-    wait_for(page, "piece.seams.every(({ state }) => state === 'inserted')")
+    # The playhead, and a split there.
+    page.get_by_test_id("ruler").focus()
+    press("Home", "ArrowRight", "ArrowRight", "ArrowRight", "ArrowRight")
+    assert page.evaluate("studio.viewer.player.time") == pytest.approx(0.4)
+    page.get_by_test_id("block-b2").focus()
+    press("s")
+    wait_for(page, "piece.blocks.length === 4")
+
+
+def test_insertions_are_chosen_by_keys_alone(page: Any) -> None:
+    press = press_on(page)
     # To the insertion before the last stretch: flip, lock, discard, restore, longer, a posture and a hand.
     page.get_by_test_id("block-b3").focus()
     press("ArrowLeft")
-    assert selection(page) == {"seam": ["b1", "b3"]}
+    assert selection(page) == {"seam": ["b2", "b3"]}
     press("ArrowDown")
     wait_for(page, "piece.seams[1].chosen === 2")
     press("ArrowUp")
@@ -208,13 +226,6 @@ def test_everything_is_done_by_keys_alone(page: Any) -> None:
     wait_for(page, "piece.seams[1].ask.pins.length === 1")
     press("Escape")
     assert page.get_by_test_id("wish-sheet").count() == 0
-    # The playhead, and a split there.
-    page.get_by_test_id("ruler").focus()
-    press("Home", "ArrowRight", "ArrowRight", "ArrowRight", "ArrowRight")
-    assert page.evaluate("studio.viewer.player.time") == pytest.approx(0.4)
-    page.get_by_test_id("block-b2").focus()
-    press("s")
-    wait_for(page, "piece.blocks.length === 4")
 
 
 def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:
