@@ -71,6 +71,7 @@ export class Actions {
   /** Send an edit; null does nothing. What the server refuses is said in a line. */
   async edit(edit) {
     if (!edit) return;
+    this.look();
     await this.#sent(() => this.studio.api.edit(edit));
   }
 
@@ -80,6 +81,11 @@ export class Actions {
     } catch (error) {
       this.studio.say(error.message, { kind: "error" });
     }
+  }
+
+  /** Show the piece, if something else is looked at. */
+  look() {
+    if (!this.studio.viewer.isHome) this.studio.viewer.back();
   }
 
   select(item) {
@@ -94,10 +100,10 @@ export class Actions {
 
   /** Show the moment that an item begins with. */
   seek(time) {
-    const { viewer } = this.studio;
-    if (!viewer.isHome) viewer.back();
-    viewer.player.pause();
-    viewer.player.seek(time);
+    this.look();
+    const { player } = this.studio.viewer;
+    player.pause();
+    player.seek(time);
   }
 
   moveBy(by) {

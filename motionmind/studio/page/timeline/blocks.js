@@ -62,7 +62,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
 }
 
 /** The seams: insertions as long as they last, and a mark where there is none. */
-export function Seams({ does, piece, sight, draft, selection }) {
+export function Seams({ does, piece, sight, draft, selection, over }) {
   const [first, stop] = seen(piece.seams, sight);
   const chosen = nameOf(selection);
   const there = piece.seams.slice(first, stop).filter(shown);
@@ -78,7 +78,7 @@ export function Seams({ does, piece, sight, draft, selection }) {
       const locked = seam.decision === "locked";
       return html`<div
         key=${name}
-        class=${`seam ${seam.state.replace(" ", "-")}${locked ? " locked" : ""}`}
+        class=${`seam ${seam.state.replace(" ", "-")}${locked ? " locked" : ""}${over === seam.left ? " target" : ""}`}
         role="option"
         data-testid=${`insertion-${seam.number}`}
         data-state=${seam.state}
@@ -94,7 +94,7 @@ export function Seams({ does, piece, sight, draft, selection }) {
       >
         ${locked && width > 40 && html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M4 7h8v6H4zM6 7V5a2 2 0 0 1 4 0v2" /></svg>`}
         ${inserted
-          ? width > 64 && html`<span class="numbers">${seam.chosen}/${seam.alternatives.length}</span>`
+          ? width > 56 && html`<span class="numbers">${seam.chosen} of ${seam.alternatives.length}</span>`
           : html`<b aria-hidden="true">${sign}</b>`}
         ${inserted && !locked && html`<i class="edge last" data-edge="last"></i>`}
       </div>`;
@@ -148,7 +148,7 @@ function sayOf(seam, word) {
   return said.join(", ");
 }
 
-/** A joint's name in words. */
+/** What a joint's name stands for, in words: a hand hangs from the wrist, a foot from the ankle. */
 export function plain(joint) {
-  return joint.replaceAll("_", " ");
+  return joint.replace(/wrist$/, "hand").replace(/ankle$/, "foot").replaceAll("_", " ");
 }

@@ -14,6 +14,7 @@ import { WishSheet } from "./wishes.js";
 
 const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
 const TEMPO = "motionmind-tempo"; // where this browser keeps it
+const REST = 1000; // milliseconds
 const HEIGHT = 48; // pixels of a thumbnail
 /** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
 const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
@@ -30,7 +31,6 @@ export function Panel({ studio }) {
     sheet: false,
   }));
   const [tempo, setTempo] = useState(() => Number(localStorage.getItem(TEMPO)) || 120);
-  const [stopped, setStopped] = useState(false);
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
   does.piece = piece;
@@ -38,7 +38,7 @@ export function Panel({ studio }) {
   useEffect(() => {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
-  useEffect(() => setStopped(false), [piece.blocks]);
+  const stopped = useRested(useStore(studio, ({ jobs }) => [...jobs.values()].some(atSeams)));
   useEffect(() => studio.keys.add(ROWS), [studio]);
   const picture = useThumbnails(studio);
   const seam = selected(piece, selection)?.seam;
@@ -61,10 +61,7 @@ export function Panel({ studio }) {
         setTempo(next);
       }}
       stopped=${stopped}
-      onStop=${(stop) => {
-        setStopped(stop);
-        does.smooth(!stop);
-      }}
+      onStop=${(stop) => does.smooth(!stop)}
       sheet=${sight.sheet}
     />
     <${Tracks} does=${does} piece=${piece} sight=${sight} selection=${selection} tempo=${tempo} thumbnail=${picture} />
@@ -83,6 +80,22 @@ export function Panel({ studio }) {
       }}
     />`}
   </section>`;
+}
+
+/** Whether nothing has been going on for a while: from one job to the next it takes a moment. */
+function useRested(active) {
+  const [rested, setRested] = useState(false);
+  useEffect(() => {
+    if (active) setRested(false);
+    const timer = active ? 0 : setTimeout(() => setRested(true), REST);
+    return () => clearTimeout(timer);
+  }, [active]);
+  return rested && !active;
+}
+
+/** Whether a job is at a seam, and not over. */
+function atSeams({ kind, state }) {
+  return kind.startsWith("seam") && (state === "waiting" || state === "running");
 }
 
 /** Whether a key is for what has the focus. */

@@ -31,7 +31,7 @@ export function secondTicks(from, to, scale) {
 /** Ticks of counts at so many beats a minute: [{at, label, strong}]; each eight begins with a strong one. */
 export function countTicks(from, to, scale, tempo) {
   const beat = 60 / tempo;
-  const every = [1, 2, 4, 8, 16, 32, 64, 128].find((each) => each * beat * scale >= 26) ?? 256;
+  const every = [1, 2, 4, 8, 16, 32, 64, 128].find((each) => each * beat * scale >= (each < BAR / 2 ? 26 : 40)) ?? 256;
   const ticks = [];
   for (let i = Math.max(Math.floor(from / (beat * every)), 0) * every; i * beat <= to; i += every) {
     const eight = Math.floor(i / BAR) + 1;

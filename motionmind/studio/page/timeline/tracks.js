@@ -8,6 +8,7 @@ import { act, KEYS } from "./keys.js";
 import { Playhead, Ruler } from "./ruler.js";
 
 const POSTURE = "application/x-motionmind-posture";
+const LEAD = 16; // pixels before the piece, as in timeline.css: a posture that it begins with is drawn on both sides of 0
 const END = 160; // pixels after the piece, where a posture may be dropped
 
 export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
@@ -25,7 +26,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     const wheel = (event) => {
       if (!event.ctrlKey && !event.metaKey) return;
       event.preventDefault();
-      does.zoom(Math.exp(-event.deltaY / 240), event.clientX - current.getBoundingClientRect().left);
+      does.zoom(Math.exp(-event.deltaY / 240), event.clientX - edgeOf(current));
     };
     current.addEventListener("wheel", wheel, { passive: false });
     return () => {
@@ -57,6 +58,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     const held = heldBy(event, piece);
     if (!held) return;
     does.focused = true;
+    does.look();
     does.select(held.block ? { block: held.block } : { seam: held.seam });
     if (held.kind !== "select" && !(event.pointerType === "touch" && held.kind === "move" && !held.chosen)) {
       event.currentTarget.setPointerCapture(event.pointerId);
@@ -64,7 +66,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     }
   };
   const moved = (event) => {
-    if (drag.current) setDraft(drag.current.take(event, scroller.current.getBoundingClientRect().left));
+    if (drag.current) setDraft(drag.current.take(event, edgeOf(scroller.current)));
   };
   const up = async () => {
     const ending = drag.current;
@@ -97,7 +99,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
       const { left, width } = event.target.closest("[data-left]").getBoundingClientRect();
       does.pass(onto, { posture: posture.key, frame: posture.frame }, (event.clientX - left) / width);
     } else {
-      const x = event.clientX - scroller.current.getBoundingClientRect().left + sight.left;
+      const x = event.clientX - edgeOf(scroller.current) + sight.left;
       does.insert(posture, placeAt(piece, x / sight.scale));
     }
   };
@@ -117,15 +119,15 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
         onPointerUp=${up}
         onPointerCancel=${cancel}
         onKeyDown=${key}
-        onFocusIn=${(event) => focusIn(event, does, piece)}
-        onFocusOut=${({ relatedTarget }) => {
+        onfocusin=${(event) => focusIn(event, does, piece)}
+        onfocusout=${({ relatedTarget }) => {
           // What is taken away while it has the focus leaves it to nobody.
           if (relatedTarget && !relatedTarget.closest("[role=option]")) does.focused = false;
         }}
         onDblClick=${(event) => openAt(event, does, piece)}
       >
         <${Wishes} piece=${piece} sight=${sight} thumbnail=${thumbnail} />
-        <${Seams} does=${does} piece=${piece} sight=${sight} draft=${draft} selection=${selection} />
+        <${Seams} does=${does} piece=${piece} sight=${sight} draft=${draft} selection=${selection} over=${over} />
         <${Stretches}
           does=${does}
           piece=${piece}
@@ -138,6 +140,11 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
       <${Playhead} does=${does} scale=${sight.scale} />
     </div>
   </div>`;
+}
+
+/** Where time begins when nothing is scrolled, in pixels from the window's left edge. */
+function edgeOf(scroller) {
+  return scroller.getBoundingClientRect().left + LEAD;
 }
 
 /** What a pointer takes hold of: a stretch, its edge, or an insertion; null for nothing. */

@@ -160,5 +160,6 @@ function named({ own = [], corpora = [] }) {
 }
 
 function nameOf({ posture, frame }) {
-  return frame > 0 ? `${posture}, frame ${frame}` : posture;
+  const name = posture.split("/").at(-1);
+  return frame > 0 ? `${name}, frame ${frame}` : name;
 }

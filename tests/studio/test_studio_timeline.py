@@ -1,0 +1,315 @@
+"""The line of time, used as a choreographer does: by mouse, by keys alone, by touch."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+BEGIN = [("b1", "plies", 0, 12), ("b2", "adagio-barre", 9, 15), ("b3", "tendus", 11, 18)]
+POSTURE = "application/x-motionmind-posture"
+
+
+@pytest.fixture
+def page(studio_server: Any, studio_page: Any) -> Any:
+    """A page with a piece of three stretches, two insertions found between them."""
+    for name, clip, first, last in BEGIN:
+        studio_server.insert(name, f"ballet/{clip}", first, last)
+    wait_for_states(studio_page, ["inserted", "inserted"])
+    studio_page.get_by_test_id("zoom-fit").click()
+    return studio_page
+
+
+def piece(page: Any) -> Any:
+    return page.evaluate("studio.store.state.piece")
+
+
+def blocks(page: Any) -> list[str]:
+    """What stands where, the new blocks under their sources' names."""
+    return [
+        ("~" if one["mirrored"] else "") + f"{one['title']} {one['first']}-{one['last']}"
+        for one in piece(page)["blocks"]
+    ]
+
+
+def wait_for(page: Any, expression: str, seconds: float = 120.0) -> None:
+    """Wait until an expression of JavaScript, in which `piece` is the piece, is true; the page's policy lets no page
+    evaluate one, but the debugger may."""
+    wanted = f"(() => {{ const {{ piece }} = studio.store.state ?? {{}}; return Boolean(piece && ({expression})); }})()"
+    end = time.monotonic() + seconds
+    while not page.evaluate(wanted):
+        assert time.monotonic() < end, (expression, blocks(page), [seam["state"] for seam in piece(page)["seams"]])
+        page.wait_for_timeout(30)
+
+
+def wait_for_states(page: Any, states: list[str]) -> None:
+    wait_for(page, f"piece.seams.map(({{ state }}) => state).join() === '{','.join(states)}'")
+
+
+def wait_for_blocks(page: Any, wanted: list[str]) -> None:
+    name = "(block.mirrored ? '~' : '') + `${block.title} ${block.first}-${block.last}`"
+    wait_for(page, f"piece.blocks.map((block) => {name}).join() === '{','.join(wanted)}'", 10.0)
+
+
+def drag(page: Any, test: str, share: float, by: float) -> None:
+    """Drag something by its place a share of the way along it."""
+    box = page.get_by_test_id(test).bounding_box()
+    x, y = box["x"] + share * box["width"], box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + by, y, steps=6)
+    page.mouse.up()
+
+
+def selection(page: Any) -> Any:
+    return page.evaluate("studio.store.selection")
+
+
+def test_a_piece_is_made_by_mouse(page: Any) -> None:
+    width = page.get_by_test_id("block-b1").bounding_box()["width"]
+    # Reorder, trim by an edge, split, duplicate, mirror, delete.
+    drag(page, "block-b1", 0.5, 600.0)
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 0-12", "tendus 11-18"])
+    assert selection(page) == {"block": "b1"}
+    drag(page, "block-b1", 0.99, -0.5 * width)
+    wait_for(page, "piece.blocks[1].last < 9 && piece.blocks[1].last > 3")
+    last = piece(page)["blocks"][1]["last"]
+    ruler, block = (page.get_by_test_id(name).bounding_box() for name in ("ruler", "block-b1"))
+    page.mouse.click(block["x"] + 0.5 * block["width"], ruler["y"] + 8)
+    page.get_by_test_id("split").click()
+    wait_for(page, "piece.blocks.length === 4")
+    first, second = piece(page)["blocks"][1:3]
+    assert (first["first"], second["last"]) == (0, last)
+    assert first["last"] + 1 == second["first"]
+    page.get_by_test_id("block-b2").click()
+    page.get_by_test_id("duplicate").click()
+    wait_for(page, "piece.blocks.length === 5 && piece.blocks[1].source === 'ballet/adagio-barre'")
+    page.get_by_test_id("mirror").click()
+    wait_for(page, "piece.blocks[1].mirrored")
+    page.get_by_test_id("delete").click()
+    wait_for(page, "piece.blocks.length === 4 && !piece.blocks.some(({ mirrored }) => mirrored)")
+    for _ in range(6):  # split, duplicate, mirror, delete, trim, move
+        page.get_by_test_id("undo").click()
+    wait_for_blocks(page, ["plies 0-12", "adagio-barre 9-15", "tendus 11-18"])
+    page.get_by_test_id("redo").click()
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 0-12", "tendus 11-18"])
+
+
+def test_an_insertion_is_flipped_locked_discarded_and_made_longer_by_mouse(page: Any) -> None:
+    mark = page.get_by_test_id("insertion-1")
+    mark.click(position={"x": 20, "y": 12})
+    page.get_by_test_id("next").click()
+    wait_for(page, "piece.seams[0].chosen === 2")
+    assert piece(page)["parts"][1]["key"] == piece(page)["seams"][0]["alternatives"][1]["key"]
+    page.get_by_test_id("lock").click()
+    wait_for(page, "piece.seams[0].decision === 'locked'")
+    assert page.get_by_test_id("next").is_disabled()
+    page.get_by_test_id("lock").click()
+    wait_for(page, "piece.seams[0].decision === 'open'")
+    page.get_by_test_id("discard").click()
+    wait_for(page, "piece.seams[0].state === 'discarded'")
+    page.get_by_test_id("discard").click()
+    wait_for(page, "piece.seams[0].state === 'inserted'")
+    before = piece(page)["seams"][0]["seconds"]
+    drag(page, "insertion-1", 0.99, 40.0)
+    wait_for(page, f"piece.seams[0].state === 'inserted' && piece.seams[0].seconds > {before + 0.1}")
+    seam = piece(page)["seams"][0]
+    assert seam["seconds"] == pytest.approx(seam["ask"]["seconds"])
+    assert mark.get_attribute("data-state") == "inserted"
+
+
+def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) -> None:
+    target = page.get_by_test_id("insertion-2")
+    data = page.evaluate_handle(
+        f"() => {{ const data = new DataTransfer(); data.setData('{POSTURE}', JSON.stringify({{ key: 'ballet/tendus', "
+        "frame: 12 })); return data; }"
+    )
+    target.dispatch_event("dragover", {"dataTransfer": data})
+    target.dispatch_event("drop", {"dataTransfer": data})
+    wait_for(page, "piece.seams[1].ask.passing.length === 1 && piece.seams[1].state === 'inserted'")
+    assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
+    target.click()
+    page.get_by_test_id("wishes").click()
+    page.get_by_role("button", name="Do not pass posture 1").click()
+    wait_for(page, "piece.seams[1].ask.passing.length === 0")
+    page.get_by_test_id("wish-joint").select_option("left_wrist")
+    page.get_by_test_id("wish-hold").select_option("end")
+    page.get_by_test_id("wish-pin-add").click()
+    wait_for(page, "piece.seams[1].ask.pins.length === 1 && !['waiting', 'abrupt'].includes(piece.seams[1].state)")
+    assert piece(page)["seams"][1]["ask"]["pins"] == [{"joint": "left_wrist", "hold": "end"}]
+    page.get_by_test_id("wishes-close").click()
+    # A posture that is dropped beside the insertions becomes a stretch of its own.
+    tracks = page.locator(".stretches")
+    box = tracks.bounding_box()
+    place = {"clientX": box["x"] + 2, "clientY": box["y"] + 5}
+    tracks.dispatch_event("drop", {"dataTransfer": data, **place})
+    wait_for(page, "piece.blocks.length === 4 && piece.blocks[0].source === 'ballet/tendus'")
+
+
+def press_on(page: Any) -> Callable[..., None]:
+    """A function that presses keys, one after the other."""
+
+    def press(*keys: str) -> None:
+        for key in keys:
+            page.keyboard.press(key)
+
+    return press
+
+
+def test_stretches_are_arranged_by_keys_alone(page: Any) -> None:
+    press = press_on(page)
+    page.get_by_test_id("open-between").focus()
+    for _ in range(150):
+        press("Tab")
+        if page.evaluate("document.activeElement.closest('.stretches') !== null"):
+            break
+    assert selection(page) == {"block": "b1"}
+    press("Alt+ArrowRight")
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 0-12", "tendus 11-18"])
+    assert page.evaluate("document.activeElement.dataset.testid") == "block-b1"
+    press("Shift+ArrowLeft")
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 0-11", "tendus 11-18"])
+    press("Alt+Shift+ArrowRight")
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 1-11", "tendus 11-18"])
+    press("m")
+    wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "tendus 11-18"])
+    press("d")
+    wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "~plies 1-11", "tendus 11-18"])
+    wait_for(page, "document.activeElement.dataset.testid !== 'block-b1'")
+    press("Delete")
+    wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "tendus 11-18"])
+    press("Control+z", "Control+z")
+    wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "tendus 11-18"])
+    press("Control+z")
+    wait_for_blocks(page, ["adagio-barre 9-15", "plies 1-11", "tendus 11-18"])
+    press("Control+Shift+z")
+    wait_for_blocks(page, ["adagio-barre 9-15", "~plies 1-11", "tendus 11-18"])
+    # The playhead, and a split there.
+    page.get_by_test_id("ruler").focus()
+    press("Home", "ArrowRight", "ArrowRight", "ArrowRight", "ArrowRight")
+    assert page.evaluate("studio.viewer.player.time") == pytest.approx(0.4)
+    page.get_by_test_id("block-b2").focus()
+    press("s")
+    wait_for(page, "piece.blocks.length === 4")
+
+
+def test_insertions_are_chosen_by_keys_alone(page: Any) -> None:
+    press = press_on(page)
+    # To the insertion before the last stretch: flip, lock, discard, restore, longer, a posture and a hand.
+    page.get_by_test_id("block-b3").focus()
+    press("ArrowLeft")
+    assert selection(page) == {"seam": ["b2", "b3"]}
+    press("ArrowDown")
+    wait_for(page, "piece.seams[1].chosen === 2")
+    press("ArrowUp")
+    wait_for(page, "piece.seams[1].chosen === 1")
+    press("l")
+    wait_for(page, "piece.seams[1].decision === 'locked'")
+    press("l", "Delete")
+    wait_for(page, "piece.seams[1].state === 'discarded'")
+    press("Delete")
+    wait_for(page, "piece.seams[1].state === 'inserted'")
+    before = piece(page)["seams"][1]["seconds"]
+    press("Shift+ArrowRight")
+    wait_for(page, f"piece.seams[1].state === 'inserted' && piece.seams[1].seconds > {before + 0.05}")
+    press("w")
+    page.get_by_test_id("wish-sheet").wait_for()
+    for _ in range(20):
+        press("Tab")
+        if page.evaluate("document.activeElement.dataset.testid") == "wish-joint":
+            break
+    page.keyboard.type("left h")
+    press("Tab", "Tab", "Enter")
+    wait_for(page, "piece.seams[1].ask.pins.length === 1")
+    press("Escape")
+    assert page.get_by_test_id("wish-sheet").count() == 0
+
+
+def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:
+    page.evaluate("studio.api.edit({ edit: 'mirror', block: 'b2' })")
+    page.get_by_test_id("smoothing-stop").click()
+    page.get_by_text(re.compile(r"not smoothed: [12] of 2 seams")).wait_for()
+    page.get_by_test_id("smoothing-stop").click()
+    wait_for_states(page, ["inserted", "inserted"])
+    assert page.get_by_test_id("smoothing").count() == 0
+
+
+def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
+    page.get_by_test_id("tempo").fill("60")
+    page.get_by_test_id("tempo").press("Enter")
+    ruler = page.get_by_test_id("ruler")
+    ruler.focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("PageUp")
+    assert page.evaluate("studio.viewer.player.time") == pytest.approx(1.0)
+    said = "document.querySelector('[data-testid=ruler]').getAttribute('aria-valuetext')"
+    wait_for(page, f"{said} === '1.00 seconds, eight 1, count 2'")
+    wide = page.locator(".timeline .inner").evaluate("(element) => element.clientWidth")
+    page.get_by_test_id("block-b2").hover()
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -400)
+    page.keyboard.up("Control")
+    wait_for(page, f"document.querySelector('.timeline .inner').clientWidth > {2 * wide}")
+
+
+def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, page: Any, browser: Any) -> None:
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+    touched = context.new_page()
+    try:
+        touched.goto(studio_server.entry)
+        wait_for_states(touched, ["inserted", "inserted"])
+        box = touched.get_by_test_id("block-b3").bounding_box()
+        touched.touchscreen.tap(box["x"] + box["width"] / 2, box["y"] + 20)
+        assert selection(touched) == {"block": "b3"}
+        x, y = box["x"] + box["width"] / 2, box["y"] + 20
+        session = context.new_cdp_session(touched)
+
+        def touch(kind: str, *points: float) -> None:
+            places = [{"x": points[0], "y": points[1]}] if points else []
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+        touch("touchStart", x, y)
+        for part in range(1, 9):
+            touch("touchMove", x - part * x / 9, y)
+        touch("touchEnd")
+        wait_for_blocks(touched, ["tendus 11-18", "plies 0-12", "adagio-barre 9-15"])
+    finally:
+        context.close()
+
+
+def test_long_pieces_stay_fluent(studio_server: Any, studio_page: Any) -> None:
+    """A piece of 5,000 postures in 1,000 stretches: own script takes at most 4 ms a frame where it plays."""
+    made = [
+        {"id": f"n{n}", "source": f"ballet/{clip}", "first": 2 * (n % 5), "last": 2 * (n % 5) + 4}
+        for n, clip in enumerate(["plies", "adagio-barre", "tendus", "fondus", "frappes"] * 200)
+    ]
+    studio_server.send("DELETE", "/api/seams")
+    studio_server.edit(edit="arrange", blocks=made, about={"words": "a long piece"})
+    studio_server.send("DELETE", "/api/seams")
+    wait_for(studio_page, "piece.blocks.length === 1000")
+    studio_page.get_by_test_id("ruler").click(position={"x": 5, "y": 5})  # shows the piece
+    wait_for(studio_page, "studio.viewer.player.motion.length === 5000")
+    assert studio_page.locator(".timeline [role=option]").count() < 800
+    studio_page.wait_for_timeout(2000)
+    taken = studio_page.evaluate(
+        """async () => {
+          const { viewer } = studio;
+          const spent = [];
+          viewer.player.play();
+          for (let frame = 0; frame < 200; frame++) {
+            await new Promise((next) => requestAnimationFrame(next));
+            const begin = performance.now();
+            viewer.player.advance(1 / 60);
+            viewer.stage.show(viewer.player.time, { ends: true, onion: 0 });
+            spent.push(performance.now() - begin);
+          }
+          viewer.player.pause();
+          return spent.sort((one, other) => one - other);
+        }"""
+    )
+    assert taken[100] < 4.0, taken[::20]
+    nodes = studio_page.locator(".timeline *").count()
+    assert nodes < 4000
