@@ -110,16 +110,17 @@ def sheet_of(corpus: Corpus) -> dict[str, Any]:
     clips = []
     for clip in corpus.clips:
         count = len(clip)
-        frames = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int)).tolist()
+        step = corpus.detail.shape[1] + 1 if count > 1 else 1  # frames of the recording from one posture to the next
+        postures = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int))
         times = corpus.times[clip.start : clip.stop]
         clips.append(
             {
                 "key": f"{corpus.name}/{clip.label}",
                 "name": displayed(clip.label),
                 "about": displayed(clip.about, _LINE),
-                "frames": count,
+                "frames": (count - 1) * step + 1,
                 "seconds": round(float(times[-1] - times[0]), 2),
-                "pictures": frames,
+                "pictures": (postures * step).tolist(),
                 "mended": len(clip.repairs),
             }
         )

@@ -23,7 +23,8 @@ const MOST = 40; // clips that are listed
 export function FileCard({ imports, file, onLook, onPut, onFail }) {
   const { facts, error, kind } = file;
   const choose = (/** @type {object} */ change) => imports.choose(file, change).catch(onFail);
-  return html`<li class="card file" data-testid="file">
+  const again = imports.reading.has(file.id);
+  return html`<li class="card file" data-testid="file" aria-busy=${again}>
     <header class="row">
       <strong class="grow cut" title=${file.name}>${file.name}</strong>
       <span class="pale numbers">${sizeOf(file.size)}</span>
@@ -37,12 +38,13 @@ export function FileCard({ imports, file, onLook, onPut, onFail }) {
       ${doubtsOf(file).map(
         ([words, serious]) => html`<p class=${serious ? "said warning" : "hint"}>${serious ? "⚠ " : ""}${words}</p>`,
       )}
+      ${again && html`<p class="hint" aria-live="polite">is being read again …</p>`}
       <${Questions} file=${file} choose=${choose} />
       <ul class="clips">${facts.clips.slice(0, MOST).map(
         (clip, number) => html`<li class="row" key=${number}>
           ${facts.clips.length > 1 && html`<span class="grow cut" title=${lengthOf(clip)}>${clip.name}</span>`}
-          <button class="button" data-testid="look" onClick=${() => onLook(number)}>Look</button>
-          <button class="button" data-testid="put" onClick=${() => onPut(number)}>Put on the time line</button>
+          <button class="button" data-testid="look" disabled=${again} onClick=${() => onLook(number)}>Look</button>
+          <button class="button" data-testid="put" disabled=${again} onClick=${() => onPut(number)}>Put on the time line</button>
         </li>`,
       )}</ul>
       <label class="check"><input type="checkbox" data-testid="learn-from" checked=${!imports.left.has(file.id)}

@@ -3,6 +3,13 @@
 const AT_ONCE = 2; // files that are sent
 const LARGEST = 64 * 2 ** 20; // bytes; the server has the same limit
 const READABLE = [".bvh", ".glb", ".vrm", ".vrma", ".amc", ".asf", ".npz", ".json", ".score"];
+/** @type {Record<string, string>} */
+const REFUSED = {
+  ".fbx": "FBX is not read: open it in Blender (File, Import, FBX) and export glTF (.glb), or BVH",
+  ".c3d": "C3D holds markers on the skin, not joints: solve a skeleton from them, and export that as BVH",
+  ".gltf": "a .gltf takes in other files: export it as one .glb",
+};
+const NAME = /^[\p{L}\p{N}_][\p{L}\p{N}_.-]{0,63}$/u;
 
 export const ACCEPT = READABLE.join(",");
 
@@ -32,6 +39,8 @@ export class Imports extends EventTarget {
     this.corpora = [];
     /** @type {Set<string>} ids of files that are not to be learned from */
     this.left = new Set();
+    /** @type {Set<string>} ids of files that are read again */
+    this.reading = new Set();
     this.version = 0;
     this.count = 0;
     /** @type {Promise<void>[]} */
@@ -80,7 +89,14 @@ export class Imports extends EventTarget {
 
   /** Read a file again with other answers to what it leaves open. @param {Upload} file @param {Partial<Choices>} change */
   async choose(file, change) {
-    this.#put(await this.api.post(`/api/imports/${file.id}`, { ...file.choices, ...change }));
+    this.reading.add(file.id);
+    this.#changed();
+    try {
+      this.#put(await this.api.post(`/api/imports/${file.id}`, { ...file.choices, ...change }));
+    } finally {
+      this.reading.delete(file.id);
+      this.#changed();
+    }
   }
 
   /** @param {Upload} file */
@@ -128,6 +144,14 @@ export class Imports extends EventTarget {
     return (await this.api.post("/api/corpora", { ...wish, parts: this.parts })).job;
   }
 
+  /** Why a corpus cannot have a name; "" if it can. @param {string} name */
+  refusal(name) {
+    if (!NAME.test(name)) return "a name is of letters, digits, -, _ and ., without spaces, 64 at most";
+    const other = this.corpora.find((corpus) => corpus.name === name);
+    if (!other) return "";
+    return `there is a corpus ${name} already: choose another name${other.own ? ", or delete that one first" : ""}`;
+  }
+
   /** @param {string} name */
   sheet(name) {
     return this.api.get(`/api/corpora/${encodeURIComponent(name)}`);
@@ -158,6 +182,9 @@ function suffix(name) {
 
 /** Why a file is not worth sending; "" if it is. @param {File} file */
 function refused(file) {
+  const end = suffix(file.name);
+  if (REFUSED[end]) return `${file.name}: ${REFUSED[end]}`;
+  if (!READABLE.includes(end)) return `${file.name}: files that can be read end in ${READABLE.join(", ")}`;
   if (file.size > LARGEST) return `${file.name}: is larger than ${LARGEST / 2 ** 20} MB; bring a part of it`;
   return "";
 }

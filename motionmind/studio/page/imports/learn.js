@@ -25,7 +25,9 @@ export function Learn({ studio, imports }) {
   const ready = name.trim() && (count > 0 || mixed.length > 0) && !busy;
   const learn = async (/** @type {Event} */ event) => {
     event.preventDefault();
-    setError("");
+    const refusal = imports.refusal(name.trim());
+    setError(refusal);
+    if (refusal) return;
     try {
       setId(await imports.learn({ name: name.trim(), title, mix: mixed, mirror }));
     } catch (failed) {

@@ -1,6 +1,6 @@
 /** One's own movement: files are dropped, looked at, put on the time line and learned from; corpora are looked through. */
 
-import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { playable } from "../movements.js";
 import { useChange } from "../shell/hooks.js";
 import { newId } from "../timeline/items.js";
@@ -23,6 +23,7 @@ function importsOf(studio) {
 export function Panel({ studio }) {
   const imports = useMemo(() => importsOf(studio), [studio]);
   useChange(imports, () => imports.version);
+  const chooser = useRef(/** @type {HTMLInputElement | null} */ (null));
   const [over, setOver] = useState(false);
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
   const learning = useChange(studio.store, () => [...studio.store.jobs.values()].filter((job) => job.kind === "learn" && job.state === "done").length);
@@ -57,15 +58,15 @@ export function Panel({ studio }) {
     onDrop=${drop}
   >
     <h2>Movement</h2>
-    <label class="empty drop">
-      <input type="file" class="aside" data-testid="choose-files" multiple accept=${ACCEPT}
+    <div class="empty drop">
+      <input ref=${chooser} type="file" hidden data-testid="choose-files" aria-label="Files" multiple accept=${ACCEPT}
         onChange=${(/** @type {any} */ event) => {
           imports.bring(event.target.files);
           event.target.value = "";
         }} />
-      <span class="button">Choose files</span>
+      <button class="button" data-testid="choose" onClick=${() => chooser.current?.click()}>Choose files</button>
       <span>or drop them here: BVH, GLB, AMC with its ASF, npz, or a score</span>
-    </label>
+    </div>
     <ul class="stack files" aria-label="Files">
       ${imports.coming.map(
         (coming) => html`<li class="card file" key=${coming.number} data-testid="coming">

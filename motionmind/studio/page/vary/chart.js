@@ -1,6 +1,12 @@
 /** The attractor as a map in numbers: points to pixels and back, and what is drawn. Nothing here listens. */
 
 const MARGIN = 14; // pixels around the attractor
+const CROSS = [
+  [1, 0],
+  [-1, 0],
+  [0, 1],
+  [0, -1],
+];
 const SITES_APART = 5; // pixels between the piece's postures, at least, or they are not dots
 
 /** Points that the server wrote: float32 [N][3] in base64. @param {string} text */
@@ -20,7 +26,12 @@ export class Chart {
       for (let i = axis; i < all.length; i += 3) [low, high] = [Math.min(low, all[i]), Math.max(high, all[i])];
       return [low, high];
     });
-    this.resize(300, 240);
+    this.width = 300;
+    this.height = 240;
+    this.scale = 1;
+    this.x0 = 0;
+    this.y0 = 0;
+    this.resize(this.width, this.height);
   }
 
   /** @param {number} width @param {number} height */
@@ -29,10 +40,11 @@ export class Chart {
     this.scale = Math.min((width - 2 * MARGIN) / (right - left), (height - 2 * MARGIN) / (high - low));
     this.x0 = width / 2 - (this.scale * (left + right)) / 2;
     this.y0 = height / 2 + (this.scale * (low + high)) / 2;
-    [this.width, this.height] = [width, height];
+    this.width = width;
+    this.height = height;
   }
 
-  /** Pixels of the point at `i` of some points. @param {ArrayLike<number>} some @param {number} i */
+  /** Pixels of the point at `i` of some points. @param {ArrayLike<number>} some @param {number} i @returns {[number, number]} */
   at(some, i) {
     return [this.x0 + this.scale * some[i * 3 + this.across], this.y0 - this.scale * some[i * 3 + this.up]];
   }
@@ -148,7 +160,7 @@ function start(pen, [x, y], inks) {
 function ring(pen, x, y) {
   pen.beginPath();
   pen.arc(x, y, 8, 0, 2 * Math.PI);
-  for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+  for (const [dx, dy] of CROSS) {
     pen.moveTo(x + 4 * dx, y + 4 * dy);
     pen.lineTo(x + 12 * dx, y + 12 * dy);
   }

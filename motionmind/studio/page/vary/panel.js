@@ -9,6 +9,7 @@ import { Tiles } from "./tiles.js";
 import { alike, departure, Varying } from "./varying.js";
 
 const FARTHEST = 0.4; // share of the steps: no attractor departs farther
+const OWN_KEYS = ["Home", "End", "PageUp", "PageDown"]; // of a dial, not of the page
 const STRETCHES = [1, 2, 4, 8]; // postures
 const FLOWS = [
   ["lorenz", "Lorenz"],
@@ -30,16 +31,19 @@ export function Panel({ studio }) {
   useChange(varying, () => varying.version);
   const piece = useChange(studio.store, () => studio.store.state?.piece);
   const view = useView(studio, varying, piece);
-  const blocks = piece?.blocks.length ?? 0;
+  const frames = piece?.blocks.reduce((/** @type {number} */ sum, /** @type {any} */ block) => sum + block.last - block.first + 1, 0) ?? 0;
+  const isLong = frames > 2;
   useEffect(() => {
-    if (blocks) varying.ask(); // the piece is another: its variation is, too
+    if (isLong) varying.ask(); // the piece is another: its variation is, too
   }, [piece]);
-  if (!blocks) {
+  if (!isLong) {
     return html`<section class="stack vary">
       <h2>Variations</h2>
-      <p class="empty">There is no piece to vary yet. Put a clip on the time line, or take a way from A to B.</p>
-      <div class="row"><button class="button" onClick=${() => studio.open("between")}>Go from A to B</button>
-      <button class="button" onClick=${() => studio.open("movement")}>Bring movement</button></div>
+      <p class="empty">There is nothing to vary yet. Put a clip on the time line, or take a way from A to B.</p>
+      <div class="row">
+        <button class="button" onClick=${() => studio.open("between")}>Go from A to B</button>
+        <button class="button" onClick=${() => studio.open("movement")}>Bring movement</button>
+      </div>
     </section>`;
   }
   const { wish, proposal, error } = varying;
@@ -57,18 +61,14 @@ export function Panel({ studio }) {
       <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
       <input type="range" data-testid="depart" min="0" max=${FARTHEST * 100} step="1" value=${Math.round(wish.depart * 100)}
         aria-valuetext=${proposal ? departure(proposal.departs) : ""}
+        onKeyDown=${(/** @type {KeyboardEvent} */ event) => OWN_KEYS.includes(event.key) && event.stopPropagation()}
         onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
     </label>
-    <label class="row"><span class="grow">Shortest stretch</span>
-      <select data-testid="stretch" value=${wish.stretch}
-        onChange=${(/** @type {any} */ event) => varying.want({ stretch: Number(event.target.value) })}>
-        ${STRETCHES.map((count) => html`<option value=${count}>${count} posture${count > 1 ? "s" : ""}</option>`)}
-      </select>
-    </label>
     <div class="row">
-      <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} onClick=${vary}>Vary the piece</button>
+      <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} title="Make this order the piece" onClick=${vary}>Vary</button>
       <button class="button" data-testid="another" disabled=${!proposal} title="Begin elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>
-      <button class="button" data-testid="beside" aria-pressed=${view.beside} onClick=${view.toggle}>Beside the original</button>
+      <button class="button" data-testid="beside" aria-pressed=${view.beside} title="Show the original and the variation beside each other"
+        onClick=${view.toggle}>Beside</button>
     </div>
     ${error && html`<p class="said error" role="alert" data-testid="vary-error">${error}</p>`}
     ${shown && html`<${Order} studio=${studio} varying=${varying} shown=${shown} isPiece=${isPiece} view=${view} />`}
@@ -90,9 +90,9 @@ function Order({ studio, varying, shown, isPiece, view }) {
       ${wish.kept.length > 0 &&
       html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.want({ kept: [] })}>Let all go</button>`}
     </div>
-    <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
     <${Tiles} studio=${studio} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
+    <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
   </div>`;
 }
 
@@ -102,6 +102,12 @@ function Details({ varying }) {
   return html`<details class="details">
     <summary>Details</summary>
     <div class="stack">
+      <label class="row"><span class="grow">Shortest stretch</span>
+        <select data-testid="stretch" value=${wish.stretch}
+          onChange=${(/** @type {any} */ event) => varying.want({ stretch: Number(event.target.value) })}>
+          ${STRETCHES.map((count) => html`<option value=${count}>${count} posture${count > 1 ? "s" : ""}</option>`)}
+        </select>
+      </label>
       <label class="row"><span class="grow">Attractor</span>
         <select data-testid="flow" value=${wish.flow}
           onChange=${(/** @type {any} */ event) => varying.want({ flow: event.target.value, start: null })}>

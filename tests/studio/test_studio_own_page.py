@@ -1,0 +1,313 @@
+"""Variations and one's own movement on the page, by mouse and by keyboard alone."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studio_server import Served, serving
+
+from motionmind.studio.project import Project
+
+SCORE = """body   human23
+legs
+  stand = stand out 10 turn 8
+  bend = stand out 10 turn 8, bend 30
+clip bends: Down and up
+  start | stand
+  1     | bend
+  1     | stand
+"""
+SIZES = {"large, light": (1440, 900, "light"), "small, dark": (1024, 768, "dark")}
+LONG = 60_000  # milliseconds: the machine may be busy
+
+Open = Callable[..., Any]
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    """A studio with an empty piece, and a home of its own."""
+    home = tmp_path / "home"
+    with serving(Project.create(tmp_path / "piece.motionmind", "ballet", home), home) as found:
+        yield found
+
+
+@pytest.fixture
+def open_page(served: Served, browser: Any) -> Iterator[Open]:
+    """Open the page at a size; whatever its console calls an error fails the test."""
+    errors: list[str] = []
+    contexts = []
+
+    def visit(width: int = 1440, height: int = 900, scheme: str = "light") -> Any:
+        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(LONG)
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(served.entry)
+        until(page, "window.studio?.store.state")
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert not errors
+
+
+def until(page: Any, expression: str, arg: Any = None) -> None:
+    """Wait until an expression, or a function of an argument, is true: the page's policy lets nothing be evaluated."""
+    end = time.monotonic() + LONG / 1000
+    while not page.evaluate(expression, arg):
+        assert time.monotonic() < end, expression
+        page.wait_for_timeout(50)
+
+
+def piece(served: Served) -> list[str]:
+    """The stretches of the piece, by their ids."""
+    return [block["id"] for block in served.project()["piece"]["blocks"]]
+
+
+def two_clips(served: Served) -> None:
+    served.insert("b1", "ballet/adagio", 0, 40)
+    served.insert("b2", "ballet/petit-allegro", 0, 25)
+
+
+def tab_to(page: Any, name: str) -> None:
+    """Press Tab until what has a test id has the focus, as whoever has no mouse does."""
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement?.dataset?.testid") == name:
+            return
+    raise AssertionError(f"Tab does not lead to {name}")
+
+
+def to_panel(page: Any, name: str) -> None:
+    """Open a panel by keyboard: the rail is one stop, arrows lead on."""
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement?.getAttribute('role')") == "tab":
+            break
+    for _ in range(5):
+        if page.get_by_test_id(f"open-{name}").get_attribute("aria-selected") == "true":
+            return
+        page.keyboard.press("ArrowDown")
+    raise AssertionError(f"the arrows do not lead to {name}")
+
+
+def order(page: Any) -> list[str]:
+    """The pictures of the order that is shown."""
+    found: list[str] = page.get_by_test_id("order").locator("img").evaluate_all("all => all.map(one => one.src)")
+    return found
+
+
+# --- variations -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_piece_is_varied_by_mouse(served: Served, open_page: Open, size: str) -> None:
+    two_clips(served)
+    page = open_page(*SIZES[size])
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    first = order(page)
+    # The start, dragged by hand, gives another order while it is dragged.
+    box = page.get_by_test_id("map").bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.35 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.62 * box["width"], box["y"] + 0.4 * box["height"], steps=6)
+    page.mouse.up()
+    until(
+        page, "was => [...document.querySelectorAll('.tiles img')].map(i => i.src).join() !== was", arg=",".join(first)
+    )
+    assert page.get_by_test_id("map").get_attribute("aria-valuetext") != "its usual start"
+    # What is kept stays while the rest is varied anew.
+    keep = page.get_by_test_id("tile-2").get_by_role("button", name=re.compile("^Keep"))
+    name = keep.get_attribute("aria-label").partition(": ")[2]
+    keep.click()
+    page.locator(".tiles li.kept").wait_for()
+    page.get_by_test_id("another").click()
+    until(page, "studio.store && document.querySelectorAll('.tiles li.kept').length === 1")
+    assert name in page.locator(".tiles li.kept .keep").get_attribute("aria-label")
+    # Both beside each other, then the variation becomes the piece, one undo.
+    page.get_by_test_id("beside").click()
+    until(page, "document.querySelectorAll('.stage.two canvas').length === 2")
+    assert piece(served) == ["b1", "b2"]
+    page.get_by_test_id("vary").click()
+    until(page, "studio.store.state.piece.blocks.length > 2")
+    varied = piece(served)
+    assert len(varied) == page.locator(".tiles > li").count()
+    # Insertions come as they are found.
+    until(page, "studio.store.state.piece.seams.some(seam => seam.state === 'inserted')")
+    page.locator(".tiles .seam.inserted").first.wait_for()
+    page.get_by_test_id("undo").click()
+    until(page, "studio.store.state.piece.blocks.length === 2")
+    assert piece(served) == ["b1", "b2"]
+
+
+def test_a_piece_is_varied_by_keyboard(served: Served, open_page: Open) -> None:
+    two_clips(served)
+    page = open_page(1024, 768)
+    to_panel(page, "vary")
+    page.get_by_test_id("tile-3").wait_for()
+    tab_to(page, "map")
+    page.keyboard.press("PageUp")
+    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') !== 'its usual start'")
+    page.keyboard.press("Home")
+    until(page, "document.querySelector('[data-testid=map]').getAttribute('aria-valuetext') === 'its usual start'")
+    tab_to(page, "depart")
+    page.keyboard.press("Home")
+    until(page, "document.querySelector('[data-testid=departs]').textContent === 'as it is'")
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    page.get_by_test_id("tile-4").wait_for()
+    tab_to(page, "vary")
+    page.keyboard.press("Enter")
+    until(page, "studio.store.state.piece.blocks.length > 2")
+    assert page.evaluate("studio.store.state.undo") == "vary the piece"
+    page.keyboard.press("Control+z")
+    until(page, "studio.store.state.piece.blocks.length === 2")
+
+
+def test_the_dial_answers_while_it_is_turned(served: Served, open_page: Open) -> None:
+    two_clips(served)
+    page = open_page()
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    seen = set()
+    for share in (0, 5, 10, 15, 20, 25, 30, 35, 40, 10):
+        page.get_by_test_id("depart").fill(str(share))
+        until(page, "!document.querySelector('[data-testid=vary-error]')")
+        seen.add(page.get_by_test_id("departs").inner_text())
+    page.wait_for_timeout(300)
+    seen.add(page.get_by_test_id("departs").inner_text())
+    assert "as it is" in seen
+    assert len(seen) > 2
+
+
+def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
+    page = open_page()
+    page.get_by_test_id("open-vary").click()
+    page.get_by_text("There is nothing to vary yet").wait_for()
+    page.get_by_role("button", name="Bring movement").click()
+    page.get_by_test_id("choose-files").wait_for(state="attached")
+
+
+# --- one's own movement -----------------------------------------------------------------------------------------------
+
+
+def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) -> None:
+    (tmp_path / "bends.score").write_text(SCORE)
+    (tmp_path / "broken.bvh").write_text("HIERARCHY\nROOT Hips\n{\n")
+    (tmp_path / "dance.fbx").write_bytes(b"anything")
+    page = open_page()
+    page.get_by_test_id("open-movement").click()
+    page.get_by_test_id("choose-files").set_input_files(
+        [tmp_path / name for name in ("bends.score", "broken.bvh", "dance.fbx")]
+    )
+    page.get_by_test_id("understood").wait_for()
+    until(page, "document.querySelectorAll('[data-testid=file-error]').length === 2")
+    errors = sorted(page.get_by_test_id("file-error").all_inner_texts())
+    assert errors[0].startswith("broken.bvh:")
+    assert errors[1].startswith("dance.fbx: FBX is not read")
+    assert "a person of 23 joints" in page.get_by_test_id("understood").inner_text()
+    page.get_by_test_id("look").click()
+    until(page, "studio.viewer.title.includes('bends.score')")
+    page.get_by_test_id("put").click()
+    until(page, "studio.store.state.piece.blocks.length === 1")
+    # A corpus of it and of another, looked through, and deleted, which it asks about.
+    page.get_by_test_id("corpus-name").fill("ballet")
+    page.get_by_test_id("learn").click()
+    assert "already" in page.get_by_test_id("learn-error").inner_text()
+    page.get_by_test_id("corpus-name").fill("mine")
+    page.get_by_text("Mix with other corpora").click()
+    page.get_by_test_id("mix-ballet").select_option("0.3")
+    page.get_by_test_id("learn").click()
+    page.get_by_test_id("learned").wait_for()
+    page.get_by_test_id("sheet-mine").click()
+    page.get_by_test_id("sheet").locator("img").first.wait_for()
+    until(page, "[...document.querySelectorAll('.sheet-clips img')].some(one => one.complete && one.naturalWidth)")
+    page.get_by_test_id("close-sheet").click()
+    assert page.get_by_test_id("delete-ballet").count() == 0
+    page.get_by_test_id("delete-mine").click()
+    page.get_by_test_id("delete-not").click()
+    assert "mine" in [one["name"] for one in served.get("/api/corpora")]
+    page.get_by_test_id("delete-mine").click()
+    page.get_by_test_id("delete-sure").click()
+    page.get_by_test_id("corpus-mine").wait_for(state="detached")
+    assert "mine" not in [one["name"] for one in served.get("/api/corpora")]
+
+
+def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Path) -> None:
+    (tmp_path / "bends.score").write_text(SCORE)
+    page = open_page(1024, 768, "dark")
+    to_panel(page, "movement")
+    tab_to(page, "choose")
+    with page.expect_file_chooser() as chooser:
+        page.keyboard.press("Enter")
+    chooser.value.set_files(tmp_path / "bends.score")
+    page.get_by_test_id("understood").wait_for()
+    tab_to(page, "put")
+    page.keyboard.press("Enter")
+    until(page, "studio.store.state.piece.blocks.length === 1")
+    tab_to(page, "corpus-name")
+    page.keyboard.type("mine")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("learned").or_(page.get_by_test_id("learn-ended")).wait_for()
+    assert page.get_by_test_id("learned").count() == 1
+    tab_to(page, "sheet-mine")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("sheet").wait_for()
+    page.keyboard.press("Escape")
+    page.get_by_test_id("sheet").wait_for(state="detached")
+    tab_to(page, "delete-mine")
+    page.keyboard.press("Enter")
+    tab_to(page, "delete-sure")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("corpus-mine").wait_for(state="detached")
+
+
+def test_learning_is_cancelled(served: Served, open_page: Open, tmp_path: Path) -> None:
+    (tmp_path / "bends.score").write_text(SCORE)
+    page = open_page()
+    page.get_by_test_id("open-movement").click()
+    page.get_by_test_id("choose-files").set_input_files(tmp_path / "bends.score")
+    page.get_by_test_id("understood").wait_for()
+    page.get_by_test_id("corpus-name").fill("mine")
+    page.get_by_text("Mix with other corpora").click()
+    page.get_by_test_id("mix-ballet").select_option("1")
+    page.get_by_test_id("learn").click()
+    page.get_by_test_id("cancel-learning").click()
+    page.get_by_test_id("learn-ended").wait_for()
+    assert "mine" not in [one["name"] for one in served.get("/api/corpora")]
+
+
+def test_a_recording_leaves_questions(served: Served, open_page: Open, shared_data: Path) -> None:
+    page = open_page()
+    page.get_by_test_id("open-movement").click()
+    page.get_by_test_id("choose-files").set_input_files(
+        [
+            shared_data / "cmu-05" / "05_06.bvh",
+            shared_data / "cmu-135" / "135_04.amc",
+            shared_data / "cmu-135" / "135.asf",
+        ]
+    )
+    until(page, "document.querySelectorAll('[data-testid=understood]').length === 2")
+    card = page.get_by_test_id("file").filter(has_text="05_06.bvh")
+    assert "right hip 10×" in card.inner_text()
+    assert card.get_by_test_id("skip").is_checked()
+    card.get_by_test_id("unit").select_option("m")
+    card.get_by_text("no person is so tall").wait_for()
+    card.get_by_test_id("unit").select_option("")
+    card.get_by_text("no person is so tall").wait_for(state="detached")
+    card.get_by_test_id("skip").click()
+    card.get_by_text("is being read again").wait_for()
+    card.get_by_text("is being read again").wait_for(state="detached")
+    card.get_by_test_id("put").click()
+    until(page, "studio.store.state.piece.blocks[0]?.frames === 886")
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()  # at five postures a second
