@@ -126,6 +126,16 @@ def test_any_moment_of_a_clip_is_an_end(studio_page: Any) -> None:
     page.wait_for_selector(FOUND, timeout=LONG)
 
 
+def test_a_whole_clip_goes_onto_the_line_of_time(studio_page: Any) -> None:
+    page = studio_page
+    page.get_by_placeholder("Search postures and clips").fill("adagio")
+    page.get_by_test_id("clip-adagio").click()
+    page.get_by_test_id("insert-clip").click()
+    until(page, "studio.store.state.piece.blocks.length === 1")
+    assert page.evaluate("studio.store.state.piece.blocks[0].source") == "ballet/adagio"
+    until(page, "studio.viewer.isHome && studio.viewer.player.motion.end > 10")
+
+
 def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
     page = studio_page
     page.wait_for_selector("[data-testid=posture-arabesque]")

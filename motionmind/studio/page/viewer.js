@@ -126,20 +126,17 @@ export class Viewer extends EventTarget {
 
   /** @param {HTMLElement} half @param {any} motion */
   #stage(half, motion) {
-    /** @type {any} */
-    let stage; // which tells of changes before it is there
-    const changed = () => {
-      this.#follow(stage);
+    const stage = stageIn(half, motion, () => {
+      this.#follow(half);
       this.stale();
-    };
-    stage = stageIn(half, motion, changed);
+    });
     stage.dark = this.theme.dark;
     return stage;
   }
 
-  /** Let both cameras be one. @param {any} stage the one that was turned */
-  #follow(stage) {
-    const other = stage === this.stage ? this.other : this.stage;
+  /** Let both cameras be one. @param {HTMLElement} half the one that was turned */
+  #follow(half) {
+    const [stage, other] = half === this.halves[0] ? [this.stage, this.other] : [this.other, this.stage];
     if (!this.beside || !other || !stage?.dragged) return;
     other.view = undefined;
     other.camera.position.copy(stage.camera.position);

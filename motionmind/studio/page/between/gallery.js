@@ -107,9 +107,11 @@ function Clips({ studio, clips }) {
             data-testid="clip-${clip.title}"
             aria-expanded=${String(clip.key === open)}
             title=${clip.about}
+            draggable="true"
+            onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(whole(clip)))}
             onClick=${() => setOpen(clip.key === open ? "" : clip.key)}
           >
-            <img src=${thumbnail(clip.key, clip.frames >> 1, dark, 64)} alt="" loading="lazy" />
+            <img src=${thumbnail(clip.key, clip.frames >> 1, dark, 64)} alt="" loading="lazy" draggable="false" />
             <span class="grow"><span class="cut">${clip.title}</span><span class="hint cut">${clip.about}</span></span>
             <span class="hint numbers">${clip.seconds.toFixed(0)} s</span>
           </button>
@@ -122,6 +124,18 @@ function Clips({ studio, clips }) {
       clips.length > FEW &&
       html`<button class="button" onClick=${() => setAll(true)}>All ${clips.length} clips</button>`
     }`;
+}
+
+/** What is dragged of a clip: all its frames. @param {any} clip */
+function whole({ key, frames, title }) {
+  return { key, frame: 0, last: frames - 1, title };
+}
+
+/** Put a clip at the end of the line of time. @param {any} studio @param {any} clip */
+async function insert(studio, clip) {
+  const id = `b-${crypto.randomUUID().slice(0, 13)}`;
+  const edit = { edit: "insert", id, source: clip.key, first: 0, last: clip.frames - 1, mirrored: false, before: null };
+  if (await studio.act(() => studio.api.edit(edit))) studio.viewer.back();
 }
 
 /** A clip's moments: the viewer shows the one that is scrubbed to. @param {{studio: any, clip: any}} props */
@@ -178,5 +192,6 @@ function Frames({ studio, clip }) {
       <button class="button" onClick=${() => set("a")}>As A</button>
       <button class="button" onClick=${() => set("b")}>As B</button>
     </div>
+    <button class="button" data-testid="insert-clip" onClick=${() => insert(studio, clip)}>All of it, onto the time line</button>
   </div>`;
 }

@@ -22,7 +22,7 @@ export function Panel({ studio }) {
     <h2>Take it away</h2>
     ${
       empty
-        ? html`<p class="empty">The piece is empty. Go from A to B, or drag a clip onto the line of time; then take it away from here.</p>`
+        ? html`<p class="empty">The piece is empty. Go from A to B, or put a clip onto the line of time; then take it away from here.</p>`
         : html`${FILES.map(
             ({ format, testid, name, words }) => html`<${Way} key=${format} name=${name} words=${words}>
               <${Save} studio=${studio} format=${format} testid=${testid} />

@@ -62,8 +62,9 @@ function button(name, label, what, act) {
 /** @param {{studio: any, title: string}} props */
 function Title({ studio, title }) {
   const [written, write] = useState(title);
+  const field = useRef(/** @type {any} */ (null));
   useEffect(() => {
-    write(title);
+    if (document.activeElement !== field.current) write(title); // nobody's words are taken from under their fingers
     document.title = title ? `${title} · MotionMind studio` : "MotionMind studio";
   }, [title]);
   const save = () => {
@@ -71,6 +72,7 @@ function Title({ studio, title }) {
     else write(title);
   };
   return html`<input
+    ref=${field}
     class="field title"
     data-testid="title"
     aria-label="Title of the piece"
