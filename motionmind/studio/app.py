@@ -7,7 +7,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from itertools import chain
 
-import msgspec
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, Router
@@ -15,14 +14,11 @@ from starlette.routing import BaseRoute, Route, Router
 from motionmind.studio import api, between, export, imports, posing, seams, varied
 from motionmind.studio.guard import ENTER, Application, Guard, Message, Receive, Send, policy
 from motionmind.studio.pages import read_page
+from motionmind.studio.schema import Entering, document
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
 _PARTS = (api, seams, between, export, varied, imports, posing)
-
-
-class _Entering(msgspec.Struct, forbid_unknown_fields=True):
-    token: str
 
 
 def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
@@ -57,7 +53,7 @@ def app(studio: Studio, keys: Keys, host: str, port: int) -> Application:
 
 
 def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
-    """Return the routes that need no cookie."""
+    """Return the routes that tell nothing of the project."""
     page = read_page()
     headers = {"cache-control": "no-cache", "content-security-policy": policy(page.script)}
 
@@ -73,12 +69,15 @@ def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
         return api.json({"ready": True})
 
     async def enter(request: Request) -> Response:
-        given = await api.body_of(request, _Entering)
+        given = await api.body_of(request, Entering)
         if not keys.admits(given.token):
             return api.error("this address is of another studio: open the one that the terminal shows", 403)
         answer = api.json({})
         answer.headers["set-cookie"] = keys.cookie(port)
         return answer
+
+    async def schema(_: Request) -> Response:
+        return api.json(document())
 
     return [
         Route("/", file),
@@ -86,4 +85,5 @@ def _open_routes(keys: Keys, port: int) -> list[BaseRoute]:
         Route("/player/{path:path}", file),
         Route("/health", health),
         Route(ENTER, enter, methods=["POST"]),
+        Route("/api/schema", schema),
     ]

@@ -16,7 +16,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote, urlsplit
 
+import msgspec
+
 from motionmind.studio.project import Project
+from motionmind.studio.schema import CALLS, Failure
 from motionmind.studio.serving import Server
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
@@ -61,9 +64,11 @@ class Client:
                     connection.putheader(name, value)
             connection.endheaders(data)
             answer = connection.getresponse()
-            return Answer(answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read())
+            found = Answer(answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read())
         finally:
             connection.close()
+        check_answer(method, path, found)
+        return found
 
     def enter(self, token: str) -> None:
         """Exchange the token for the cookie."""
@@ -120,6 +125,34 @@ class Client:
                 if kind == "job" and data["id"] == job:
                     found = data
             return found
+
+
+def check_answer(method: str, path: str, answer: Answer) -> None:
+    """Check an answer of the API against its schema: every field that it has, and that it has them all."""
+    bare = path.partition("?")[0]
+    if answer.status >= 400 and bare.startswith("/api/"):
+        assert answer.headers["content-type"] == "application/json"
+        msgspec.json.decode(answer.body, type=Failure)
+    elif answer.status == 200:
+        for pattern, call in PATTERNS:
+            if call.method == method and pattern.fullmatch(bare):
+                kind = answer.headers["content-type"]
+                if not isinstance(call.answers, str):
+                    assert kind == "application/json"
+                    msgspec.json.decode(answer.body, type=call.answers)
+                elif call.answers != "application/octet-stream":
+                    assert kind.startswith(call.answers)
+                return
+        assert not bare.startswith("/api/"), f"{method} {bare} is not in the schema"
+
+
+def _pattern(path: str) -> re.Pattern[str]:
+    parts = re.split(r"\{\w+\}", path)
+    within = ".+" if "{key}" in path else "[^/]+"
+    return re.compile(within.join(map(re.escape, parts)))
+
+
+PATTERNS = [(_pattern(call.path), call) for call in sorted(CALLS, key=lambda call: "{" in call.path)]
 
 
 def _events(answer: http.client.HTTPResponse) -> Iterator[tuple[str, Any]]:
