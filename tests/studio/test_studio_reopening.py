@@ -1,0 +1,94 @@
+"""Projects that are opened again: with the corpora that they were made with, with others, and without them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from bundled_clips import ballet_clip
+
+from motionmind.corpus import store
+from motionmind.errors import MotionMindError
+from motionmind.studio.edits import Insert, SetCorpus
+from motionmind.studio.piece import Finding
+from motionmind.studio.project import Project, RefusedError
+from motionmind.tween.engine import Engine
+
+
+def learn(home: Path, *clips: str) -> None:
+    """Learn the corpus `mine` anew."""
+    Engine.fit([ballet_clip(clip) for clip in clips], name="mine").save(store.place_for("mine", home))
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A home with a corpus."""
+    learn(tmp_path, "plies", "tendus")
+    return tmp_path
+
+
+@pytest.fixture
+def path(home: Path) -> Path:
+    """A project of that corpus, with two stretches and what is known of their seam."""
+    project = Project.create(home / "piece.motionmind", "mine", home)
+    last = len(project.movements.get("mine/tendus")) - 1
+    for name in ("b1", "b2"):
+        project.edit("w1", Insert(name, "mine/tendus", 0, last))
+    (seam,) = project.state.seams
+    project.keep_finding(Finding(project.question(seam), abrupt=False, words="it knows this", insertions=None))
+    project.close()
+    return project.path
+
+
+def test_with_the_same_corpus_there_is_nothing_to_say(home: Path, path: Path) -> None:
+    project = Project.open(path, home)
+    assert project.words == []
+    assert project.finding(project.state.seams[0]) is not None
+    project.close()
+
+
+def test_a_corpus_that_was_built_again_alike_is_the_same(home: Path, path: Path) -> None:
+    learn(home, "plies", "tendus")
+    project = Project.open(path, home)
+    assert project.words == []
+    project.close()
+
+
+def test_a_corpus_that_has_changed_is_said_once_and_its_seams_are_judged_anew(home: Path, path: Path) -> None:
+    learn(home, "plies", "tendus", "jump")
+    project = Project.open(path, home)
+    assert project.words == ["mine has changed since this piece was made: its seams are judged anew"]
+    assert project.finding(project.state.seams[0]) is None
+    project.close()
+    again = Project.open(path, home)
+    assert again.words == []
+    again.close()
+
+
+def test_a_corpus_that_is_missing_is_named(home: Path, path: Path) -> None:
+    data = path.read_bytes()
+    store.delete("mine", home)
+    with pytest.raises(MotionMindError, match="corpus mine is missing that it was made with"):
+        Project.open(path, home)
+    assert path.read_bytes() == data
+    learn(home, "plies", "tendus")
+    Project.open(path, home).close()
+
+
+def test_a_stretch_that_its_corpus_lacks_now_is_named(home: Path, path: Path) -> None:
+    learn(home, "plies")
+    with pytest.raises(MotionMindError, match="which the piece needs"):
+        Project.open(path, home)
+
+
+def test_a_corpus_that_there_is_not_is_refused(home: Path, path: Path) -> None:
+    project = Project.open(path, home)
+    before = path.read_bytes()
+    with pytest.raises(MotionMindError, match="no corpus 'nothing'"):
+        project.edit("w1", SetCorpus("nothing"))
+    with pytest.raises(RefusedError):
+        project.edit("w1", Insert("b3", "nothing/clip", 0, 0))
+    assert path.read_bytes() == before
+    project.edit("w1", SetCorpus("ballet"))
+    assert set(project.versions) == {"ballet", "mine"}
+    project.close()
