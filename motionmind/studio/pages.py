@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import posixpath
+import re
 from base64 import b64encode
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -18,6 +21,7 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".png": "image/png",
 }
+_IMPORT = re.compile(r'\b(?:from|import)\s*"([^"]+)"')
 _THREE = {"three": "three.module.min.js", "three/OrbitControls": "OrbitControls.js"}
 
 
@@ -59,10 +63,26 @@ def read_page() -> Page:
                 if prefix == "/player" and path.suffix == ".js" and not relative.startswith("vendor/"):
                     names[f"motionmind/{relative.removesuffix('.js')}"] = f"/player/{relative}"
     modules = msgspec.json.encode({"imports": names}).decode().replace("<", "\\u003c")
-    index = Template((_PAGE / "index.html").read_text("utf-8")).substitute(modules=modules)
+    preloads = "\n".join(f'<link rel="modulepreload" href="{path}">' for path in _loaded(files, names))
+    index = Template((_PAGE / "index.html").read_text("utf-8")).substitute(modules=modules, preloads=preloads)
     files["/"] = _file(index.encode(), "text/html; charset=utf-8")
     digest = b64encode(hashlib.sha256(modules.encode()).digest()).decode("ascii")
     return Page(files, f"sha256-{digest}")
+
+
+def _loaded(files: Mapping[str, File], names: Mapping[str, str]) -> list[str]:
+    """Return the paths of the modules that the page starts with, so that it loads them all at once, not in turn."""
+    text = {path: file.data.decode() for path, file in files.items() if path.endswith(".js")}
+    found, new = set[str](), {"/page/main.js"}
+    while new:
+        found |= new
+        new = {
+            named
+            for path in new
+            for name in _IMPORT.findall(text[path])
+            if (named := names.get(name) or posixpath.normpath(f"{posixpath.dirname(path)}/{name}")) in text
+        } - found
+    return sorted(found)
 
 
 def _file(data: bytes, kind: str) -> File:

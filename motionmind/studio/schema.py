@@ -263,7 +263,7 @@ class UploadView(_Answer):
     skips: list[int] = []
 
 
-class Kept(_Answer):
+class KeptView(_Answer):
     """A movement that the project keeps now."""
 
     key: str
@@ -390,7 +390,7 @@ CALLS = (
     Call("POST", "/api/imports/{upload}", Choices, UploadView),
     Call("DELETE", "/api/imports/{upload}", None, Nothing),
     Call("GET", "/api/imports/{upload}/{clip}/movement", None, MovementData),
-    Call("POST", "/api/imports/{upload}/{clip}/keep", None, Kept),
+    Call("POST", "/api/imports/{upload}/{clip}/keep", None, KeptView),
     Call("GET", "/api/corpora", None, list[CorpusView]),
     Call("POST", "/api/corpora", Lesson, Begun),
     Call("GET", "/api/corpora/{name}", None, Sheet),
@@ -400,7 +400,7 @@ CALLS = (
     Call("POST", "/api/pose/drag", Dragging, Posed),
     Call("POST", "/api/pose/turn", Turning, Posed),
     Call("POST", "/api/pose/change", Changing, Posed),
-    Call("POST", "/api/pose/keep", Keeping, Kept),
+    Call("POST", "/api/pose/keep", Keeping, KeptView),
     Call("POST", "/api/pose/score", Keeping, Lines),
     Call("GET", "/api/export/{format}", None, "application/octet-stream"),
 )

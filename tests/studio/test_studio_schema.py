@@ -32,7 +32,7 @@ def test_the_document_resolves(studio_server: Served) -> None:
     told = studio_server.get("/api/schema")
     assert told == msgspec.json.decode(msgspec.json.encode(document()))
     text = msgspec.json.encode(told).decode()
-    names = set(re.findall(r'"\$ref":"#/components/schemas/(\w+)"', text))
+    names = set(re.findall(r'"\$ref":"#/components/schemas/([\w.]+)"', text))
     assert names == set(told["components"]["schemas"])
     assert {"ProjectView", "Edited", "Failure"} <= names
 
