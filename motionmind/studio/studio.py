@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionmind.errors import MotionMindError
+from motionmind.names.finding import open_collection
+from motionmind.names.spelling import Source
+from motionmind.render.page import player_data
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
 from motionmind.studio.project import Project
-from motionmind.studio.thumbnails import Thumbnails
+from motionmind.studio.thumbnails import SMALLEST, Thumbnails, thumbnail
 from motionmind.studio.view import view_of
 from motionmind.studio.workers import Job, Report, Workers
 
@@ -62,6 +68,7 @@ class Studio:
     def start(self) -> None:
         """Start the workers, in the event loop."""
         self.workers = Workers(self.home, self._tell_of_job, self.project.state.corpus, self._processes)
+        threading.Thread(target=_warm, args=(self.project.state.corpus, self.home), daemon=True).start()
         if self._first is not None:
             self.workers.submit("getting ready", self._first)
 
@@ -112,3 +119,13 @@ class Studio:
 
     def _tell_of_job(self, job: Job) -> None:
         self.events.send("job", job.view(), job.id)
+
+
+def _warm(corpus: str, home: Path | None) -> None:
+    """Draw a small picture beforehand: what it takes is loaded while the browser is yet to open the page."""
+    with suppress(MotionMindError):
+        collection = open_collection(Source(corpus, "corpus", corpus), home)
+        name = next(iter([*collection.postures, *collection.clips]))
+        motion = collection.find(name, as_clip=False)
+        player_data(motion)
+        thumbnail(motion, 0, SMALLEST)
