@@ -222,7 +222,7 @@ class Workers:
             job.end("failed", words="the engine does not start; the terminal says why")
             self._tell(job)
         for worker in self._workers:
-            if worker.job is None and self._waiting:
+            if worker.has_begun and worker.job is None and self._waiting:
                 job = self._waiting.popleft()
                 worker.run(job)
                 self._tell(job)
@@ -283,6 +283,7 @@ class _Worker:
     def run(self, job: Job) -> None:
         """Begin a job."""
         self.job, job.state = job, "running"
+        # In a thread: large arguments wait until the worker takes them.
         threading.Thread(target=self._send, args=(job.task,), daemon=True).start()
 
     def kill(self) -> None:

@@ -1,0 +1,206 @@
+"""Workers: jobs are told of, cancelled at once, and fail in a line; events reach every window."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import working
+from studio_server import Served
+
+from motionmind.errors import MotionMindError
+from motionmind.studio import events as events_module
+from motionmind.studio import workers as workers_module
+from motionmind.studio.events import Events
+from motionmind.studio.workers import Job, JobCancelledError, Workers
+
+
+def run(check: Callable[[Workers, list[dict[str, Any]]], Any], home: Path | None = None, number: int = 1) -> None:
+    """Run a check with workers, and all that was told of jobs."""
+    told: list[dict[str, Any]] = []
+
+    async def checked() -> None:
+        workers = Workers(home, lambda job: told.append(job.view()), "", number)
+        try:
+            async with asyncio.timeout(60):
+                await check(workers, told)
+        finally:
+            workers.close()
+
+    asyncio.run(checked())
+
+
+async def until(job: Job, state: str) -> None:
+    """Wait for a job to come to a state."""
+    while job.state != state:
+        await asyncio.sleep(0.01)
+
+
+def test_a_job_is_told_of_from_its_beginning_to_its_end() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        job = workers.submit(
+            "sum", working.add, 2, 3, finish=lambda sum_: {"sum": sum_}, collect=lambda part: 10 * part
+        )
+        assert await job.result() == 5
+        await asyncio.sleep(0)
+        assert [one["state"] for one in told] == ["waiting", "running", "running", "running", "done"]
+        assert [one["done"] for one in told] == [0, 0, 1, 2, 2]
+        assert told[-1] == {
+            **{"id": job.id, "kind": "sum", "state": "done", "done": 2, "of": 2, "words": "the second"},
+            **{"partial": [20, 30], "result": {"sum": 5}},
+        }
+        assert workers.find(job.id) is job
+
+    run(check)
+
+
+def test_a_job_that_runs_is_cancelled_at_once_and_the_next_one_runs() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        long, waiting = workers.submit("long", working.sleep, 1000.0), workers.submit("waits", working.sleep, 1000.0)
+        last = workers.submit("sum", working.add, 2, 3)
+        await until(long, "running")
+        while not long.words:
+            await asyncio.sleep(0.01)
+        began = time.monotonic()
+        waiting.cancel()
+        long.cancel()
+        assert (long.state, waiting.state) == ("cancelled", "cancelled")
+        for job in (long, waiting):
+            with pytest.raises(JobCancelledError):
+                await job.result()
+        assert time.monotonic() - began < 1.0
+        assert await last.result() == 5
+        long.cancel()  # which is over
+        assert long.state == "cancelled"
+
+    run(check)
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (working.refuse, "this cannot be"),
+        (working.crash, "this went wrong; the terminal says how"),
+        (working.die, "this took more than this computer has, and was ended"),
+    ],
+)
+def test_a_job_that_fails_says_so_in_a_line_and_the_next_one_runs(function: Any, words: str) -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        job, after = workers.submit("fails", function), workers.submit("sum", working.add, 2, 3)
+        with pytest.raises(MotionMindError, match=words):
+            await job.result()
+        assert (job.state, job.words) == ("failed", words)
+        assert await after.result() == 5
+
+    run(check)
+
+
+def test_what_cannot_be_finished_fails() -> None:
+    def full(_: int) -> None:
+        raise MotionMindError("no space left on device")
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        job = workers.submit("sum", working.add, 2, 3, finish=full)
+        with pytest.raises(MotionMindError, match="no space left"):
+            await job.result()
+        assert told[-1]["state"] == "failed"
+
+    run(check)
+
+
+def test_a_worker_keeps_its_corpus() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        first = await workers.submit("know", working.know, "ballet").result()
+        began = time.monotonic()
+        assert await workers.submit("know", working.know, "ballet").result() == first
+        assert time.monotonic() - began < 0.5
+        with pytest.raises(MotionMindError, match="no corpus"):
+            await workers.submit("know", working.know, "nothing").result()
+
+    run(check)
+
+
+def test_workers_that_do_not_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    began: list[object] = []
+
+    class Broken(workers_module._Worker):
+        def _listen(self) -> None:
+            began.append(self)
+            self._workers.post(self, None)
+
+    monkeypatch.setattr(workers_module, "_Worker", Broken)
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        for _ in range(2):
+            with pytest.raises(MotionMindError, match="the engine does not start"):
+                await workers.submit("sum", working.add, 2, 3).result()
+
+    run(check)
+    assert len(began) == 3
+
+
+def test_two_workers_work_side_by_side() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        jobs = [workers.submit("long", working.sleep, 0.2) for _ in range(4)]
+        assert len({await job.result() for job in jobs}) == 2
+
+    run(check, number=2)
+
+
+def test_cancelling_leaves_the_project_whole(studio_server: Served) -> None:
+    studio_server.insert("b1", "ballet/adagio", 0, 9)
+    studio_server.insert("b2", "ballet/jetes", 0, 9)  # whose seam is judged and smoothed in the background
+    before = studio_server.project()
+    begun = studio_server.post("/api/between", {"a": {"key": "ballet/arabesque"}, "b": {"key": "ballet/fifth"}})
+    cancelled = studio_server.send("DELETE", f"/api/jobs/{begun['job']}").value
+    assert cancelled["state"] == "cancelled"
+    after = studio_server.project()
+    assert after["piece"]["blocks"] == before["piece"]["blocks"]
+    assert studio_server.edit(edit="delete", block="b2")["undo"] == "delete a stretch"
+    assert studio_server.send("GET", "/api/jobs/j999").status == 404
+
+
+def test_a_window_that_reads_slowly_is_told_the_latest_of_each_thing() -> None:
+    async def check() -> None:
+        hub = Events()
+        stream = hub.open({("project", ""): {"sequence": 0}})
+        assert await anext(stream) == b"retry: 1000\n\n"
+        for number in range(10_000):
+            hub.send("project", {"sequence": number})
+            hub.send("job", {"id": "j1", "done": number}, "j1")
+            hub.send("job", {"id": "j2", "done": -number}, "j2")
+        text = await anext(stream)
+        assert text.count(b"\n\n") == 3
+        assert b'{"sequence":9999}' in text
+        assert b'{"id":"j1","done":9999}' in text
+        hub.close()
+        assert [one async for one in stream] == []
+
+    asyncio.run(check())
+
+
+def test_a_stream_says_that_it_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events_module, "_BEAT", 0.01)
+
+    async def check() -> None:
+        stream = Events().open({})
+        assert [await anext(stream) for _ in range(3)] == [b"retry: 1000\n\n", b": here\n\n", b": here\n\n"]
+
+    asyncio.run(check())
+
+
+def test_streams_are_limited_and_those_that_end_make_room() -> None:
+    async def check() -> None:
+        hub = Events()
+        streams: list[AsyncIterator[bytes]] = [hub.open({}) for _ in range(events_module._MOST)]
+        with pytest.raises(MotionMindError, match="windows are open"):
+            hub.open({})
+        await anext(streams[0])
+        await streams[0].aclose()  # type: ignore[attr-defined]
+        hub.open({})
+
+    asyncio.run(check())
