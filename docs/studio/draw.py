@@ -1,0 +1,183 @@
+"""Draw the pictures of the studio in these pages, and the film in README: use it in a browser, and look.
+
+    python docs/studio/draw.py
+
+It needs Chromium, Playwright and the extra `studio`; it takes about a minute.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+HERE = Path(__file__).parent
+SIZE = {"width": 1200, "height": 750}  # pixels of the page
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+FILM_WIDTH = 800  # pixels
+PAUSE = 125  # milliseconds of the film between two pictures
+LONG = 120_000  # milliseconds: the first search compiles
+COLOURS = 160  # in a picture
+
+
+def main() -> None:
+    """Draw all of them."""
+    with tempfile.TemporaryDirectory() as folder, studio(Path(folder)) as address, browser() as chromium:
+        page = chromium.new_context(viewport=SIZE, color_scheme="light").new_page()
+        page.goto(address)
+        film = Film(page)
+        a_to_b(page, film)
+        time_line(page, film)
+        film.write(HERE.parent / "studio.gif")
+        variations(page)
+        pose(page)
+        movement(page, Path(folder))
+        take_away(page)
+
+
+@contextmanager
+def studio(folder: Path) -> Iterator[str]:
+    """A studio with a project of its own; gives its address, token and all."""
+    command = [sys.executable, "-m", "motionmind", "studio", str(folder / "dance.motionmind"), "--no-browser"]
+    process = subprocess.Popen([*command, "--port", "0"], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield next(match[0] for line in process.stdout if (match := re.search(r"http://\S+", line)))
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Chromium, which draws without a screen."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+class Film:
+    """Pictures of a page, one after the other."""
+
+    def __init__(self, page: Any) -> None:
+        self._page = page
+        self._pictures: list[Image.Image] = []
+
+    def look(self, times: int) -> None:
+        """Look so many times, while the page goes on."""
+        for _ in range(times):
+            picture = seen(self._page)
+            height = picture.height * FILM_WIDTH // picture.width
+            self._pictures.append(picture.resize((FILM_WIDTH, height), Image.Resampling.LANCZOS))
+            self._page.wait_for_timeout(20)
+
+    def write(self, path: Path) -> None:
+        """Write them as a GIF that goes round."""
+        palette = self._pictures[len(self._pictures) // 2].quantize(COLOURS)
+        first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in self._pictures]
+        first.save(path, save_all=True, append_images=others, duration=PAUSE, loop=0, optimize=True)
+
+
+def seen(page: Any) -> Image.Image:
+    """Return the page as it looks now."""
+    return Image.open(BytesIO(page.screenshot())).convert("RGB")
+
+
+def draw(page: Any, name: str) -> None:
+    """Draw the page as it looks now."""
+    seen(page).quantize(COLOURS, dither=Image.Dither.NONE).save(HERE / f"{name}.png", optimize=True)
+
+
+def click(page: Any, name: str) -> None:
+    """Click what has this test id."""
+    page.get_by_test_id(name).first.click()
+
+
+def a_to_b(page: Any, film: Film) -> None:
+    """Find movement from one posture to another, and accept one of four."""
+    page.get_by_test_id("posture-arabesque").wait_for()
+    page.wait_for_timeout(2000)
+    film.look(4)
+    click(page, "posture-arabesque")
+    film.look(3)
+    click(page, "posture-fifth")
+    film.look(2)
+    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=LONG)
+    film.look(16)
+    draw(page, "a-to-b")
+    click(page, "alternative-2")
+    film.look(3)
+    click(page, "accept")
+    page.get_by_test_id("insertion-1").wait_for()
+
+
+def time_line(page: Any, film: Film) -> None:
+    """Let the piece grow, and look at what was inserted."""
+    for posture in ("attitude", "bow"):
+        page.evaluate(
+            "posture => studio.api.edit({ edit: 'insert', id: `drawn-${posture}`, source: `ballet/${posture}`, first: 0,"
+            " last: 0, mirrored: false, before: null })",
+            posture,
+        )
+    page.wait_for_timeout(500)
+    page.get_by_test_id("insertion-3").wait_for(timeout=LONG)
+    page.wait_for_timeout(6000)
+    click(page, "play")
+    film.look(28)
+    click(page, "insertion-2")
+    page.wait_for_timeout(500)
+    film.look(4)
+    draw(page, "time-line")
+
+
+def variations(page: Any) -> None:
+    """Vary the piece."""
+    click(page, "open-vary")
+    page.wait_for_timeout(3000)
+    draw(page, "variations")
+
+
+def pose(page: Any) -> None:
+    """Move a body by its hand."""
+    click(page, "open-pose")
+    page.wait_for_timeout(2000)
+    handle = page.get_by_test_id("handle-left_wrist")
+    handle.focus()
+    for _ in range(6):
+        page.keyboard.press("ArrowUp")
+    page.wait_for_timeout(1500)
+    draw(page, "pose")
+
+
+def movement(page: Any, folder: Path) -> None:
+    """Bring a recording."""
+    file = folder / "my dance.bvh"
+    score = ["ballet/centre.score", "--clip", "adagio"]
+    subprocess.run([sys.executable, "-m", "motionmind", "compose", *score, "-o", str(file)], check=True)
+    click(page, "open-movement")
+    page.locator("input[type=file]").first.set_input_files(str(file))
+    page.get_by_test_id("understood").wait_for(timeout=LONG)
+    page.wait_for_timeout(1500)
+    draw(page, "movement")
+
+
+def take_away(page: Any) -> None:
+    """Look at what can be taken away."""
+    click(page, "open-take")
+    page.wait_for_timeout(1500)
+    draw(page, "take-away")
+
+
+if __name__ == "__main__":
+    main()
