@@ -126,8 +126,8 @@ def time_line(page: Any, film: Film) -> None:
     """Let the piece grow, and look at what was inserted."""
     for posture in ("attitude", "bow"):
         page.evaluate(
-            "posture => studio.api.edit({ edit: 'insert', id: `drawn-${posture}`, source: `ballet/${posture}`, first: 0,"
-            " last: 0, mirrored: false, before: null })",
+            "posture => studio.api.edit({ edit: 'insert', id: `drawn-${posture}`, source: `ballet/${posture}`,"
+            " first: 0, last: 0, mirrored: false, before: null })",
             posture,
         )
     page.wait_for_timeout(500)

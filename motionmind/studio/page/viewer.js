@@ -5,6 +5,7 @@ import { Stage } from "motionmind/stage";
 import { Theme } from "motionmind/theme";
 
 const LONGEST = 0.25; // seconds between pictures; a page that was hidden goes on where it was
+const STRAYED = 0.1; // share of its reach by which a movement may lead elsewhere before the camera follows
 const STILL = { length: 1, start: 0, end: 0, times: [0], frameAt: () => 0 }; // as long as there is nothing to show
 
 /** A stage on a canvas of its own in `half`. @param {HTMLElement} half @param {any} motion @param {() => void} changed */
@@ -42,6 +43,8 @@ export class Viewer extends EventTarget {
     this.stage = undefined;
     /** @type {any} */
     this.other = undefined;
+    /** @type {{middle: any, reach: number} | undefined} where the movement led when the camera was set up */
+    this.framed = undefined;
     this.fresh = false;
     this.player.addEventListener("change", () => this.stale());
     this.theme.addEventListener("change", () => this.#colour());
@@ -56,8 +59,7 @@ export class Viewer extends EventTarget {
    */
   home(motion, { time } = {}) {
     this.piece = motion;
-    // As long as nobody has turned the camera, all of it is in the picture.
-    if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: Boolean(this.stage?.view) });
+    if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: false });
   }
 
   /** Show the piece again. */
@@ -86,6 +88,7 @@ export class Viewer extends EventTarget {
   look(from) {
     this.stage?.look(from);
     this.other?.look(from);
+    this.framed = this.stage && { middle: this.stage.middle, reach: this.stage.reach };
     this.stale();
   }
 
@@ -121,7 +124,14 @@ export class Viewer extends EventTarget {
     else this.stage.take(motion, motion.body, motion.colours);
     if (beside && !this.other) this.other = this.#stage(this.halves[1], beside);
     else if (beside) this.other.take(beside, beside.body, beside.colours);
-    if (look) this.look(this.stage.view ?? "quarter");
+    if (look || this.#strays()) this.look(this.stage.view ?? "quarter");
+  }
+
+  /** Whether a movement leads elsewhere than the one that the camera was set up for, and nobody has turned it since. */
+  #strays() {
+    const { middle, reach, view } = this.stage;
+    const before = this.framed;
+    return Boolean(view) && (!before || before.middle.distanceTo(middle) + Math.abs(before.reach - reach) > STRAYED * reach);
   }
 
   /** @param {HTMLElement} half @param {any} motion */
