@@ -93,6 +93,14 @@ export class Editor extends EventTarget {
     controls.update();
   }
 
+  /** Have the viewer show the piece again, if there is one. */
+  leave() {
+    const { viewer } = this.studio;
+    if (!this.shown) return;
+    if (viewer.piece) viewer.back();
+    else viewer.show(this.motion, { time: 0, title: this.title, look: false });
+  }
+
   /** Whether it is being changed. */
   get busy() {
     return this.began !== null || this.requests.busy;
