@@ -162,7 +162,7 @@ def test_a_finger_drags_a_handle(studio_server: Served, browser: Any) -> None:
     page = context.new_page()
     page.goto(studio_server.entry)
     _open(page)
-    x, y = _middle(page, "left_wrist")
+    x, y = _middle(page, "pelvis")
     finger = context.new_cdp_session(page)
 
     def touch(kind: str, points: list[dict[str, float]]) -> None:
@@ -170,8 +170,8 @@ def test_a_finger_drags_a_handle(studio_server: Served, browser: Any) -> None:
 
     touch("touchStart", [{"x": x, "y": y}])
     for step in range(1, 7):
-        touch("touchMove", [{"x": x, "y": y - 10 * step}])
+        touch("touchMove", [{"x": x, "y": y + 10 * step}])
     touch("touchEnd", [])
     _settled(page)
-    assert y - _middle(page, "left_wrist")[1] > 30
+    assert _middle(page, "pelvis")[1] - y > 30
     context.close()

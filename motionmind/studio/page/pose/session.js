@@ -89,6 +89,7 @@ export class Editor extends EventTarget {
     viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
     if (!viewer.stage) return;
     const { camera, controls } = viewer.stage;
+    viewer.stage.view = undefined; // else it would come back where that is when the picture's size changes
     camera.position.sub(controls.target).multiplyScalar(ROOM).add(controls.target);
     controls.update();
   }
