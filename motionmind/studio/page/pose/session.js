@@ -206,7 +206,9 @@ export class Editor extends EventTarget {
 
   /** @param {string} words */
   #begin(words) {
-    this.began ??= { posture: this.posture, standing: this.standing, words };
+    if (this.began) return;
+    this.began = { posture: this.posture, standing: this.standing, words };
+    this.#changed();
   }
 
   /** @param {Posture} before @param {string} words */
