@@ -23,16 +23,19 @@ def _open(page: Any, posture: str = "ballet/arabesque") -> None:
 
 def _settled(page: Any) -> None:
     """Wait until the posture rests, and the handles with it."""
-    page.wait_for_function(
+    rests = page.evaluate(
         """async () => {
           const handles = document.querySelector('.pose-handles');
-          const places = () => [...handles.children].map((handle) => handle.style.transform).join();
-          if (handles.ariaBusy !== 'false') return false;
-          const before = places();
-          await new Promise((done) => setTimeout(done, 200));
-          return handles.ariaBusy === 'false' && before.includes('translate') && before === places();
+          const places = () => handles.ariaBusy + [...handles.children].map((handle) => handle.style.transform).join();
+          for (let tries = 0; tries < 100; tries++) {
+            const before = places();
+            await new Promise((done) => setTimeout(done, 200));
+            if (before.startsWith('false') && before.includes('translate') && before === places()) return true;
+          }
+          return false;
         }"""
     )
+    assert rests
 
 
 def _middle(page: Any, joint: str) -> tuple[float, float]:
