@@ -76,7 +76,7 @@ export class Player extends EventTarget {
     const { start, end } = this.motion;
     const time = this.time + seconds * this.speed;
     if (time < end) this.time = time;
-    else if (this.loop) this.time = start + ((time - start) % (end - start));
+    else if (this.loop && end > start) this.time = start + ((time - start) % (end - start));
     else [this.time, this.playing] = [end, false];
     this.#changed();
   }

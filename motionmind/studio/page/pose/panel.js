@@ -22,7 +22,10 @@ export function Panel({ studio }) {
     if (editor.motion) editor.show();
     else studio.act(() => start(studio));
     const handles = new Handles(editor);
-    return () => handles.remove();
+    return () => {
+      handles.remove();
+      editor.leave();
+    };
   }, []);
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: () => editor.undo() },

@@ -89,8 +89,17 @@ export class Editor extends EventTarget {
     viewer.show(this.motion, { time: 0, title: `${this.title}, being changed` });
     if (!viewer.stage) return;
     const { camera, controls } = viewer.stage;
+    viewer.stage.view = undefined; // else it would come back where that is when the picture's size changes
     camera.position.sub(controls.target).multiplyScalar(ROOM).add(controls.target);
     controls.update();
+  }
+
+  /** Have the viewer show the piece again, if there is one. */
+  leave() {
+    const { viewer } = this.studio;
+    if (!this.shown) return;
+    if (viewer.piece) viewer.back();
+    else viewer.show(this.motion, { time: 0, title: this.title, look: false });
   }
 
   /** Whether it is being changed. */
@@ -197,7 +206,9 @@ export class Editor extends EventTarget {
 
   /** @param {string} words */
   #begin(words) {
-    this.began ??= { posture: this.posture, standing: this.standing, words };
+    if (this.began) return;
+    this.began = { posture: this.posture, standing: this.standing, words };
+    this.#changed();
   }
 
   /** @param {Posture} before @param {string} words */

@@ -1,0 +1,110 @@
+"""The whole page, panel by panel, on light and on dark paper: who can use it, and the words that it uses.
+
+axe-core is installed for node, as `.ci/run` does; without it what it finds is not looked for.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import pytest
+
+if TYPE_CHECKING:
+    from studio_server import Served
+
+PANELS = ("between", "vary", "pose", "movement", "take")
+# The engine's words, not a choreographer's.
+FORBIDDEN = re.compile(r"\b(nats?|states?|lyapunov|quaternions?|entropy|likelihoods?|posteriors?)\b", re.IGNORECASE)
+_FAULTS = """async () => {
+  const { violations } = await axe.run(document, { resultTypes: ['violations'] });
+  return violations
+    .filter(({ impact }) => impact === 'serious' || impact === 'critical')
+    .flatMap(({ id, nodes }) => nodes.map((node) => `${id}: ${node.html.slice(0, 200)} ${node.failureSummary}`));
+}"""
+_WORDS = """() => {
+  const shown = (element) => element.checkVisibility() && !element.closest('details:not([open]) > :not(summary)');
+  const told = ['aria-label', 'title', 'placeholder', 'alt'];
+  const attributes = [...document.body.querySelectorAll('*')]
+    .filter(shown)
+    .flatMap((element) => told.map((name) => element.getAttribute(name) ?? ''));
+  return [document.body.innerText, ...attributes].join('\\n');
+}"""
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """The source of axe-core."""
+    asked = 'require.resolve("axe-core/axe.min.js")'
+    node = shutil.which("node")
+    found = node and subprocess.run([node, "-p", asked], capture_output=True, text=True, check=False)
+    if not found or found.returncode:
+        pytest.skip("axe-core is not here (install it for node, and set NODE_PATH)")
+    return Path(found.stdout.strip()).read_text(encoding="utf-8")
+
+
+@pytest.fixture(params=["light", "dark"])
+def scheme(request: pytest.FixtureRequest) -> Any:
+    return request.param
+
+
+def _piece(server: Served) -> None:
+    """Two stretches that join, a posture, and a saved one."""
+    server.insert("a", "ballet/adagio", 0, 20)
+    server.insert("b", "ballet/adagio", 21, 40)
+    server.insert("c", "ballet/arabesque")
+    opened = server.post("/api/pose/open", {"key": "ballet/arabesque"})
+    pose = {"key": "ballet/arabesque", "rotations": opened["rotations"], "root": opened["root"]}
+    server.edit(
+        edit="posture", name="mine", posture=server.post("/api/pose/keep", {"pose": pose, "name": "mine"})["key"]
+    )
+
+
+def _enter(server: Served, browser: Any, scheme: Literal["light", "dark"], width: int) -> tuple[Any, list[str]]:
+    context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page, errors = context.new_page(), []
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(server.entry)
+    page.get_by_test_id("open-between").wait_for()
+    page.wait_for_function("() => window.studio?.store.state")
+    return page, errors
+
+
+def _panels(page: Any) -> Any:
+    for name in PANELS:
+        page.get_by_test_id(f"open-{name}").click()
+        page.get_by_test_id(f"panel-{name}").wait_for()
+        page.wait_for_timeout(700)  # what it fetches
+        yield name
+
+
+def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme: Any, axe: str) -> None:
+    _piece(studio_server)
+    page, errors = _enter(studio_server, browser, scheme, 1440)
+    page.evaluate(f"{axe};0")
+    faults = {name: found for name in _panels(page) if (found := page.evaluate(_FAULTS))}
+    page.keyboard.press("?")
+    page.wait_for_timeout(300)
+    if found := page.evaluate(_FAULTS):
+        faults["keys"] = found
+    page.context.close()
+    assert faults == {}, json.dumps(faults, indent=1)
+    assert errors == []
+
+
+def test_the_page_speaks_a_choreographers_words(studio_server: Served, browser: Any) -> None:
+    _piece(studio_server)
+    page, errors = _enter(studio_server, browser, "light", 1024)
+    found = {}
+    for name in _panels(page):
+        words = page.evaluate(_WORDS)
+        assert len(words) > 200
+        found[name] = sorted({match[0] for match in FORBIDDEN.finditer(words)})
+    page.context.close()
+    assert {name: words for name, words in found.items() if words} == {}
+    assert errors == []
