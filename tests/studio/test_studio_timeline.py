@@ -133,7 +133,7 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
     assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
     target.click()
     page.get_by_test_id("wishes").click()
-    page.get_by_role("button", name="Do not pass posture 1").click()
+    page.get_by_role("button", name="Remove posture 1").click()
     wait_for(page, "piece.seams[1].ask.passing.length === 0")
     page.get_by_test_id("wish-joint").select_option("left_wrist")
     page.get_by_test_id("wish-hold").select_option("end")

@@ -70,7 +70,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
             <span class="grow cut">${postures.find(({ key }) => key === one.posture)?.name ?? nameOf(one)}</span>
             <button
               class="button"
-              aria-label=${`Do not pass posture ${i + 1}`}
+              aria-label=${`Remove posture ${i + 1}`}
               disabled=${locked}
               onClick=${() => does.edit(wish(seam, { passing: without(ask.passing, i) }))}
             >
@@ -102,7 +102,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
             <span class="grow cut">${plain(pin.joint)} ${HOLDS[pin.hold]}</span>
             <button
               class="button"
-              aria-label=${`Let go of ${plain(pin.joint)}`}
+              aria-label=${`Let go of the ${plain(pin.joint)}`}
               disabled=${locked}
               onClick=${() => does.edit(wish(seam, { pins: without(ask.pins, i) }))}
             >
