@@ -16,7 +16,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   const [hold, setHold] = useState("start");
   useEffect(() => element.current.querySelector("input").focus(), []);
   const locked = seam.decision === "locked";
-  const key = (event) => {
+  const escape = (event) => {
     if (event.key !== "Escape") return;
     event.stopPropagation();
     onClose();
@@ -36,7 +36,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     role="dialog"
     aria-label="Wishes for this insertion"
     data-testid="wish-sheet"
-    onKeyDown=${key}
+    onKeyDown=${escape}
   >
     <div class="row">
       <h3 class="grow">Wishes for this insertion</h3>
