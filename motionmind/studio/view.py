@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from motionmind.studio.edits import Ask
 from motionmind.studio.piece import Finding, Found, Seam, State, key_of
 from motionmind.studio.placement import Layout, Marks, Part, lay_out
 
@@ -26,7 +27,7 @@ def state_of(seam: Seam, finding: Finding | None) -> SeamState:
         return "discarded" if seam.verdict.decision == "discarded" else "inserted"
     if finding.insertions is None:
         return "abrupt" if finding.abrupt else "waiting"
-    return "none found" if finding.abrupt else "smooth"
+    return "none found" if finding.abrupt or seam.verdict.ask != Ask() else "smooth"
 
 
 def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:

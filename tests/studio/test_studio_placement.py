@@ -136,6 +136,8 @@ def test_states_of_a_seam():
     assert state_of(seam, Finding("q", False, "", None)) == "waiting"
     assert state_of(seam, Finding("q", True, "", ())) == "none found"
     assert state_of(seam, Finding("q", True, "", found)) == "inserted"
+    wished = seam._replace(verdict=type(seam.verdict)(e.Ask(2.0)))
+    assert state_of(wished, Finding("q", False, "no way found", ())) == "none found"
     discarded = seam._replace(verdict=type(seam.verdict)(decision="discarded"))
     assert state_of(discarded, Finding("q", True, "", found)) == "discarded"
     assert state_of(piece_of(("c/one", 0, 5), ("c/one", 6, 9)).seams[0], None) == "smooth"

@@ -7,7 +7,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
+
+from motionmind.geometry import rotations as rot
+from motionmind.studio.placement import performance
+from motionmind.studio.view import layout_of
 
 BEGIN = [("b1", "plies", 0, 12), ("b2", "adagio-barre", 9, 15), ("b3", "tendus", 11, 18)]
 POSTURE = "application/x-motionmind-posture"
@@ -133,7 +138,7 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
     assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
     target.click()
     page.get_by_test_id("wishes").click()
-    page.get_by_role("button", name="Do not pass posture 1").click()
+    page.get_by_role("button", name="Remove posture 1").click()
     wait_for(page, "piece.seams[1].ask.passing.length === 0")
     page.get_by_test_id("wish-joint").select_option("left_wrist")
     page.get_by_test_id("wish-hold").select_option("end")
@@ -313,3 +318,31 @@ def test_long_pieces_stay_fluent(studio_server: Any, studio_page: Any) -> None:
     assert taken[100] < 4.0, taken[::20]
     nodes = studio_page.locator(".timeline *").count()
     assert nodes < 4000
+
+
+def test_the_page_plays_what_is_taken_away(studio_server: Any, page: Any) -> None:
+    """The parts that the page plays and the whole movement of the piece are one movement, also between the parts."""
+    studio_server.edit(edit="mirror", block="b2")
+    studio_server.edit(edit="split", block="b3", at=14, id="b4")
+    studio_server.edit(edit="decide", left="b1", right="b2", decision="discarded")
+    wait_for(page, "piece.blocks.length === 4 && piece.seams[0].state === 'discarded'")
+    project = studio_server.studio.project
+    layout = layout_of(project.state, project.finding, project.marks)
+    whole = performance(list(layout.parts), project.movements.get)
+    times = np.linspace(0.0, layout.seconds, 300)
+    expected = whole.at(times)
+    wait_for(page, f"Math.abs(studio.viewer.piece.end - {layout.seconds}) < 1e-6")
+    page.wait_for_timeout(1000)
+    shown = page.evaluate(
+        """(times) => times.map((time) => {
+          const { piece } = studio.viewer;
+          const [rotations, root] = [new Float64Array(piece.joints.length * 4), new Float64Array(3)];
+          piece.sample(time, rotations, root);
+          return [[...rotations], [...root], piece.insertedAt(time)];
+        })""",
+        times.tolist(),
+    )
+    rotations = np.array([one[0] for one in shown]).reshape(len(times), -1, 4)
+    assert rot.angle(rotations, expected.rotations).max() < 1e-4
+    assert np.abs(np.array([one[1] for one in shown]) - expected.root).max() < 1e-4
+    assert (np.array([one[2] for one in shown]) == expected.inserted()).mean() > 0.99

@@ -34,6 +34,7 @@ export class Actions {
     this.show = show;
     /** What is in sight: pixels a second, pixels to the left of it, and its width. */
     this.sight = { scale: 60, left: 0, width: 800, fits: true };
+    /** @type {import("./items.js").Piece} */
     this.piece = { blocks: [], seams: [], parts: [], seconds: 0 };
     /** Whether the keys' focus is on the tracks. */
     this.focused = false;
@@ -79,7 +80,7 @@ export class Actions {
     try {
       await send();
     } catch (error) {
-      this.studio.say(error.message, { kind: "error" });
+      this.studio.say(error instanceof Error ? error.message : String(error), { kind: "error" });
     }
   }
 
@@ -168,15 +169,15 @@ export class Actions {
     return seam && seam.alternatives.length > 0 && this.edit(lock(seam));
   }
 
-  pass(seam, posture, share) {
+  pass(seam, posture, share = 1) {
     return this.edit(pass(seam, posture, share));
   }
 
-  /** Put a posture into the piece, before a place among the stretches. */
-  insert({ key, frame }, place) {
+  /** Put a posture, or a stretch from `frame` to `last`, into the piece, before a place among the stretches. */
+  insert({ key, frame, last = frame }, place) {
     const before = this.piece.blocks[place]?.id ?? null;
     const id = newId(this.studio.window);
-    return this.edit({ edit: "insert", id, source: key, first: frame, last: frame, mirrored: false, before });
+    return this.edit({ edit: "insert", id, source: key, first: frame, last, mirrored: false, before });
   }
 
   /** Times of a stretch's movement, if it has come. */

@@ -62,7 +62,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
 }
 
 /** The seams: insertions as long as they last, and a mark where there is none. */
-export function Seams({ does, piece, sight, draft, selection, over }) {
+export function Seams({ piece, sight, draft, selection, over }) {
   const [first, stop] = seen(piece.seams, sight);
   const chosen = nameOf(selection);
   const there = piece.seams.slice(first, stop).filter(shown);

@@ -49,10 +49,21 @@ export class Composed {
     this.movements = movements;
     this.name = name;
     this.first = 0;
-    ({ joints: this.joints, body: this.body, colours: this.colours } = movements.at(parts[0].key));
+    const { joints, body, colours } = movements.at(parts[0].key);
+    Object.assign(this, { body, colours });
+    /** @type {string[]} */
+    this.joints = joints;
+    this.times = new Float64Array();
+    /** @type {number[]} when each part begins */
+    this.starts = [];
+    /** @type {{times: number[], bridged: {joint: number, move: number}[]}[]} */
+    this.insertions = [];
+    /** @type {number[]} */
+    this.farthest = [];
     this.#count();
-    const size = this.joints.length * 4;
-    this.beside = [0, 1].map(() => ({ rotations: new Float64Array(size), root: new Float64Array(3) }));
+    const size = joints.length * 4;
+    const both = new Float64Array(2 * size);
+    this.beside = { both, from: both.subarray(0, size), to: both.subarray(size) };
   }
 
   get length() {
@@ -94,7 +105,6 @@ export class Composed {
       for (const mark of marks) this.insertions.push({ ...mark, times: mark.times.map((time) => time + own) });
     }
     this.times = Float64Array.from(times);
-    this.farthest = [];
   }
 
   /** The last part that begins no later than `time`; the first if none does. @param {number} time */
@@ -118,12 +128,13 @@ export class Composed {
       return;
     }
     // Between two parts nothing is inserted: straight from one posture to the other.
-    const [from, to] = this.beside;
-    this.#sampleWithin(part, part.at + part.seconds, from.rotations, from.root);
-    this.#sampleWithin(next, next.at, to.rotations, to.root);
+    const { both, from, to } = this.beside;
+    this.#sampleWithin(part, part.at + part.seconds, from, root);
+    const [x, y, z] = root;
+    this.#sampleWithin(next, next.at, to, root);
     const share = Math.min(over / (next.at - part.at - part.seconds), 1);
-    for (let i = 0; i < 3; i++) root[i] = from.root[i] * (1 - share) + to.root[i] * share;
-    for (let i = 0; i < rotations.length; i += 4) slerp(rotations, i, from.rotations, i, to.rotations, i, share);
+    [x, y, z].forEach((begin, i) => (root[i] = begin * (1 - share) + root[i] * share));
+    for (let i = 0; i < from.length; i += 4) slerp(rotations, i, both, i, from.length + i, share);
   }
 
   #sampleWithin(part, time, rotations, root) {
@@ -150,7 +161,7 @@ export class Composed {
   insertionAt(time) {
     const index = lastBefore(this.insertions, time, ({ times }) => times[0]);
     const mark = this.insertions[index];
-    return mark && mark.times[0] - MOMENT <= time && time <= mark.times.at(-1) + MOMENT ? mark : undefined;
+    return mark && mark.times[0] - MOMENT <= time && time <= lastOf(mark.times) + MOMENT ? mark : undefined;
   }
 
   /** When those of an insertion's A and B are that the piece holds. */
@@ -161,7 +172,7 @@ export class Composed {
   /** Whether the engine made the posture at `time`. */
   insertedAt(time) {
     const times = this.insertionAt(time)?.times;
-    return Boolean(times) && times[0] + MOMENT < time && time < times.at(-1) - MOMENT;
+    return times !== undefined && times[0] + MOMENT < time && time < lastOf(times) - MOMENT;
   }
 
   /** The joints that are, at `time`, amid a move that no corpus attests. */
@@ -186,6 +197,10 @@ function place({ turn, place: [dx, dz] }, rotations, root) {
   rotations[1] = cy * qy + sy * qw;
   rotations[2] = cy * qz - sy * qx;
   rotations[3] = cy * qw - sy * qy;
+}
+
+function lastOf(times) {
+  return times[times.length - 1];
 }
 
 /** The index of the last of ordered `values` that is no more than `time`; 0 if none is. */

@@ -12,7 +12,7 @@ const STILL = 4; // pixels that a click may slip
 export class Drag {
   /**
    * @param {import("./actions.js").Actions} does
-   * @param {{kind: string, block?: object, seam?: object, side?: string}} held
+   * @param {any} held {kind, block or seam, side}
    * @param {PointerEvent} event
    */
   constructor(does, held, event) {
@@ -20,6 +20,7 @@ export class Drag {
     this.held = held;
     this.from = event.clientX + does.sight.left;
     this.moved = false;
+    /** @type {any} */
     this.draft = null;
   }
 

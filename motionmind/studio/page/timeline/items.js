@@ -31,7 +31,7 @@ export function selected(piece, selection) {
 
 /** The selection that names an item. @param {Item} item */
 export function selectionOf({ block, seam }) {
-  return block ? { block: block.id } : { seam: [seam.left, seam.right] };
+  return seam ? { seam: [seam.left, seam.right] } : { block: block?.id };
 }
 
 /** A text that names a selection; the same for the same. */
@@ -94,7 +94,7 @@ export function move(piece, block, to) {
 }
 
 /** The place among the others where a block that is dropped at `time` comes. @param {Piece} piece */
-export function placeAt(piece, time, without) {
+export function placeAt(piece, time, without = "") {
   return piece.blocks.filter(({ id, at, seconds }) => id !== without && at + seconds / 2 < time).length;
 }
 

@@ -20,7 +20,7 @@ export function bounded(scale, seconds, width, stretches) {
 
 /** Ticks of seconds from `from` to `to`: [{at, label}], labels where there is room. */
 export function secondTicks(from, to, scale) {
-  const step = STEPS.find((each) => each * scale >= APART) ?? STEPS.at(-1);
+  const step = STEPS.find((each) => each * scale >= APART) ?? 3600;
   const ticks = [];
   for (let i = Math.max(Math.floor(from / step), 0); i * step <= to; i++) {
     ticks.push({ at: i * step, label: clock(i * step, step) });

@@ -127,7 +127,7 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
         onDblClick=${(event) => openAt(event, does, piece)}
       >
         <${Wishes} piece=${piece} sight=${sight} thumbnail=${thumbnail} />
-        <${Seams} does=${does} piece=${piece} sight=${sight} draft=${draft} selection=${selection} over=${over} />
+        <${Seams} piece=${piece} sight=${sight} draft=${draft} selection=${selection} over=${over} />
         <${Stretches}
           does=${does}
           piece=${piece}

@@ -16,7 +16,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   const [hold, setHold] = useState("start");
   useEffect(() => element.current.querySelector("input").focus(), []);
   const locked = seam.decision === "locked";
-  const key = (event) => {
+  const escape = (event) => {
     if (event.key !== "Escape") return;
     event.stopPropagation();
     onClose();
@@ -36,7 +36,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     role="dialog"
     aria-label="Wishes for this insertion"
     data-testid="wish-sheet"
-    onKeyDown=${key}
+    onKeyDown=${escape}
   >
     <div class="row">
       <h3 class="grow">Wishes for this insertion</h3>
@@ -70,7 +70,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
             <span class="grow cut">${postures.find(({ key }) => key === one.posture)?.name ?? nameOf(one)}</span>
             <button
               class="button"
-              aria-label=${`Do not pass posture ${i + 1}`}
+              aria-label=${`Remove posture ${i + 1}`}
               disabled=${locked}
               onClick=${() => does.edit(wish(seam, { passing: without(ask.passing, i) }))}
             >
@@ -102,7 +102,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
             <span class="grow cut">${plain(pin.joint)} ${HOLDS[pin.hold]}</span>
             <button
               class="button"
-              aria-label=${`Let go of ${plain(pin.joint)}`}
+              aria-label=${`Let go of the ${plain(pin.joint)}`}
               disabled=${locked}
               onClick=${() => does.edit(wish(seam, { pins: without(ask.pins, i) }))}
             >
