@@ -118,6 +118,11 @@ class Project:
         """A number that grows with whatever the project comes to hold."""
         return self._journal.count
 
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All edits in order, those that are undone too."""
+        return tuple(self._changes)
+
     def tell(self, address: str) -> None:
         """Note the address at which the project is open."""
         self._journal.tell(address)

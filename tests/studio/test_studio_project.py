@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,7 +8,8 @@ import pytest
 from studio_server import Served
 
 from motionmind.errors import MotionMindError
-from motionmind.studio.edits import Delete, Insert, Mirror, Move, Trim
+from motionmind.studio import piece
+from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, Trim
 from motionmind.studio.project import Project, RefusedError
 
 Make = Callable[..., Project]
@@ -33,6 +35,14 @@ def test_a_project_opens_as_it_was_closed(make_project: Make) -> None:
     again = make_project()
     assert (again.state, again.sequence, again.undoable("w1")) == (state, sequence, undo)
     assert again.redoable("w1") == "insert a stretch"
+    for _ in range(4):
+        again.redo("w1")
+    assert len(again.state.blocks) == 40
+    for _ in range(3):
+        again.undo("w1")
+    for _ in range(3):
+        again.redo("w1")
+    assert len(again.state.blocks) == 40
 
 
 def test_undo_takes_back_this_windows_edit_and_no_other(make_project: Make) -> None:
@@ -82,6 +92,41 @@ def test_after_reopening_a_new_window_takes_back_what_closed_ones_did(make_proje
     again = make_project()
     again.undo("w9")
     assert order(again) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_state_is_that_of_the_edits_that_are_not_undone(make_project: Make, seed: int) -> None:
+    rng, project = random.Random(seed), make_project()
+    start, refused, made = project.state, 0, 0
+    for _ in range(150):
+        window = rng.choice(["w1", "w2", "w3"])
+        names = order(project)
+        try:
+            match rng.randrange(8):
+                case 0 | 1:
+                    made += 1
+                    project.edit(window, Insert(f"b{made}", "ballet/adagio", 0, 9, before=rng.choice([None, *names])))
+                case 2 if names:
+                    project.edit(window, rng.choice([Mirror, Move, Delete])(rng.choice(names)))
+                case 3 if len(names) > 1:
+                    place = rng.randrange(len(names) - 1)
+                    project.edit(window, Decide(names[place], names[place + 1], rng.choice(["locked", "open"])))
+                case 4 | 5 | 6:
+                    project.undo(window)
+                case 7:
+                    project.redo(window)
+        except RefusedError:
+            refused += 1
+        assert project.state == piece.apply_all((one.edit for one in project.changes if not one.undone), start)
+    assert refused > 5
+    assert made > 20
+    state, said = project.state, [(project.undoable(name), project.redoable(name)) for name in ("w1", "w2", "w3")]
+    project.close()
+    again = make_project()
+    for name in ("w1", "w2", "w3"):
+        again.greet(name)
+    assert again.state == state
+    assert [(again.undoable(name), again.redoable(name)) for name in ("w1", "w2", "w3")] == said
 
 
 def test_what_cannot_be_applied_changes_nothing(make_project: Make) -> None:

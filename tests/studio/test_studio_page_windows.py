@@ -1,0 +1,121 @@
+"""The page and its server in a browser: who is let in, what is asked for, and windows that share a project."""
+
+from __future__ import annotations
+
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from studio_server import Client, Served
+
+
+class Elsewhere(BaseHTTPRequestHandler):
+    """An empty page of another server."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:  # type: ignore[override]
+        pass
+
+
+@pytest.fixture
+def expect() -> Any:
+    return pytest.importorskip("playwright.sync_api").expect
+
+
+def test_the_address_forgets_the_token_and_a_reload_keeps_the_window(
+    studio_server: Served, studio_page: Any, expect: Any
+) -> None:
+    expect(studio_page.get_by_test_id("posture-arabesque")).to_be_visible()
+    assert studio_server.keys.token not in studio_page.url
+    window = studio_page.evaluate("studio.window")
+    studio_page.reload()
+    expect(studio_page.get_by_test_id("posture-arabesque")).to_be_visible()
+    assert studio_page.evaluate("studio.window") == window
+
+
+def test_no_request_leaves_this_machine(studio_server: Served, browser: Any, expect: Any) -> None:
+    context = browser.new_context(viewport={"width": 1024, "height": 768})
+    page, asked = context.new_page(), set[str]()
+    page.on("request", lambda request: asked.add(urlsplit(request.url).netloc))
+    page.goto(studio_server.entry)
+    expect(page.get_by_test_id("posture-arabesque")).to_be_visible()
+    for name in ("vary", "pose", "movement", "take"):
+        page.get_by_test_id(f"open-{name}").click()
+        expect(page.get_by_test_id(f"panel-{name}")).to_be_visible()
+    context.close()
+    assert asked - {""} == {urlsplit(studio_server.url).netloc}  # "" of data: and blob:
+
+
+def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
+    studio_server: Served, studio_page: Any, expect: Any
+) -> None:
+    expect(studio_page.get_by_test_id("posture-arabesque")).to_be_visible()
+    other = studio_page.context.new_page()
+    other.goto(studio_server.url)  # the cookie lets it in
+    expect(other.get_by_test_id("posture-arabesque")).to_be_visible()
+    mine = Client(studio_server.url, studio_page.evaluate("studio.window"))
+    mine.cookie = studio_server.cookie
+    mine.insert("b1", "ballet/adagio", 0, 20)
+    for page in (studio_page, other):
+        expect(page.get_by_test_id("block-b1")).to_be_visible()
+    expect(other.get_by_test_id("undo")).to_be_disabled()
+    studio_page.get_by_test_id("undo").click()
+    for page in (studio_page, other):
+        expect(page.get_by_test_id("block-b1")).to_have_count(0)
+
+
+@pytest.mark.parametrize("end", ["", "/#token=wrong"])
+def test_a_browser_without_the_token_is_told_where_to_look(
+    studio_server: Served, browser: Any, expect: Any, end: str
+) -> None:
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(studio_server.url + end)
+    expect(page.get_by_text("that the terminal shows")).to_be_visible()
+    context.close()
+
+
+def test_a_page_elsewhere_can_neither_read_nor_write(studio_server: Served, studio_page: Any) -> None:
+    attack = """async (url) => {
+      const tried = {};
+      for (const [name, path, options] of [
+        ["read", "/api/project", {}],
+        ["form", "/api/edits", {method: "POST", body: '{"window": "w1", "edit": {"edit": "title", "title": "mine"}}'}],
+        ["json", "/api/edits", {method: "POST", body: "{}", headers: {"X-MotionMind": "studio"}}],
+      ]) {
+        const asked = fetch(url + path, {credentials: "include", ...options});
+        tried[name] = await asked.then((answer) => answer.status, () => "refused");
+      }
+      tried.stream = await new Promise((resolve) => {
+        const stream = new EventSource(url + "/api/events", {withCredentials: true});
+        stream.onopen = () => resolve("open");
+        stream.onerror = () => resolve("refused");
+      });
+      tried.image = await new Promise((resolve) => {
+        const image = new Image();
+        image.onload = () => resolve("shown");
+        image.onerror = () => resolve("refused");
+        image.src = url + "/api/thumbnails/ballet/first/0.png";
+      });
+      return tried;
+    }"""
+    # Another port of this computer is another origin, but the same site: the cookie is sent.
+    before = studio_server.project()
+    elsewhere = ThreadingHTTPServer(("127.0.0.1", 0), Elsewhere)
+    threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+    try:
+        page = studio_page.context.new_page()
+        page.goto(f"http://127.0.0.1:{elsewhere.server_address[1]}/")
+        tried = page.evaluate(attack, studio_server.url)
+    finally:
+        elsewhere.shutdown()
+        elsewhere.server_close()
+    assert tried == dict.fromkeys(tried, "refused")
+    assert len(tried) == 5
+    assert studio_server.project() == before
