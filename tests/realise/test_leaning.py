@@ -55,6 +55,20 @@ def test_weight_comes_over_the_standing_foot_which_stays(degrees: float) -> None
     np.testing.assert_array_equal(went[ENDS], root[ENDS])
 
 
+def test_a_leg_that_is_too_fast_anyhow_does_not_keep_the_weight_where_it_is() -> None:
+    """Its joints may turn a tenth faster than they did, and no more."""
+    skeleton, (q, root) = human23(), leg_lifted_aside(25.0)
+    left = [skeleton.index(f"left_{joint}") for joint in ("hip", "knee", "ankle", "toes")]
+    fastest = np.full(23, np.inf)
+    fastest[skeleton.index("left_hip")] = 0.0
+    found, went = shift_weight(skeleton, q, root, ALLOWED, ENDS, FREE, FREE, 30.0, fastest)
+    assert np.abs(went - root).max() > 0.01
+    before, after = (rot.angle(each[:-1], each[1:])[:, left[0]].max() for each in (q, found))
+    assert before < after < 1.1 * before
+    fastest[left] = 0.0  # a knee and an ankle that do not move at all may not begin to
+    assert shift_weight(skeleton, q, root, ALLOWED, ENDS, FREE, FREE, 30.0, fastest)[0] is q
+
+
 def test_it_shifts_alike_whatever_the_size() -> None:
     skeleton, (q, root) = human23(), leg_lifted_aside(30.0)
     large = Skeleton("large", skeleton.names, skeleton.parents, 2.0 * skeleton.offsets, 2.0 * skeleton.tips)
