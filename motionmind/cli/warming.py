@@ -198,6 +198,7 @@ def realise() -> None:
         30.0,
         leaving=Velocity.at_start(clip),
         fastest=engine.pace.fastest,
+        peaks=engine.pace.peaks_in,
     )
     likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()

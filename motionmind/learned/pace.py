@@ -22,7 +22,9 @@ knows the lull: it is that of the corpus's postures most like it.
 
 The fastest speeds are 99th percentiles of the corpus's frames at 30 a second, joint by joint. What hardly moves in the
 corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, and neither the body's
-turning nor its travel as slower than everyday movement.
+turning nor its travel as slower than everyday movement. A movement of many seconds that is nowhere faster than that may
+still show more than any of the corpus that is as long, for quick clips are short: so the *peaks* are what the greatest
+speeds of all windows of 1 to 6 s, but a hundredth, keep to; none is less than the fastest speeds, or everyday movement.
 """
 
 from __future__ import annotations
@@ -54,6 +56,9 @@ FPS = 30.0
 SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
 OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
 EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turning, rad/s, and of travel, heights/s
+LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # seconds of the windows whose peaks are known
+STRIDE = 6  # frames from window to window
+FEW = 10  # windows; where there are fewer, peaks are those of shorter ones
 _NO_WINDOWS = (np.zeros(0),) * 3
 
 
@@ -108,6 +113,8 @@ class Pace:
         fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel [J + 2].
         greatest: greatest speeds of the same in any frame [J + 2].
         slowest: the speed of the mean joint over a second, rad/s, that only a hundredth of all seconds is below [1].
+        peaks: greatest speeds of the same, and of the root's rise or fall, heights/s, in all windows of each of LENGTHS
+            but a hundredth [6, J + 3].
         lulls: of the corpus's N postures, usual speeds of the mean joint [N].
         law: level, slope, pull and spread of the logarithm of durations [4].
     """
@@ -116,6 +123,7 @@ class Pace:
     fastest: Floats
     greatest: Floats
     slowest: Floats
+    peaks: Floats
     lulls: Floats
     law: Floats
 
@@ -128,6 +136,10 @@ class Pace:
         """Return the median duration of movements of such ways [...], seconds, between such lulls [...]."""
         level, slope, pull, _ = self.law
         return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*lulls)))
+
+    def peaks_in(self, seconds: float) -> Floats:
+        """Return the peaks of windows so long [J + 3]."""
+        return np.array([np.interp(seconds, LENGTHS, part) for part in self.peaks.T])
 
     def lulls_of(self, postures: Floats, shown: Floats) -> Floats:
         """Return the lulls of postures [n]: means of those of the corpus's postures that are most like each.
@@ -147,13 +159,15 @@ def learn_pace(corpus: Corpus) -> Pace:
     """Learn the pace of a corpus."""
     recordings = [Sampled(corpus, clip, FPS) for clip in corpus.clips if len(clip) > 1]
     clips = [recording for recording in recordings if len(recording) > 1]
-    steps = [np.concatenate([way_of(block).parts for block in clip.blocks(BLOCK, overlap=1)]) for clip in clips]
+    steps = [np.concatenate([steps_of(block) for block in clip.blocks(BLOCK, overlap=1)]) for clip in clips]
     joints = len(corpus.skeleton)
     usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
-    greatest, slowest = fastest, np.zeros(1)
+    greatest, slowest, rises = fastest, np.zeros(1), EVERYDAY[2]
     if steps:
         speeds = np.concatenate(steps)
         speeds *= FPS
+        rises = max(float(speeds[:, -1].max()), rises)
+        speeds = speeds[:, :-1]
         each = np.stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]], axis=1)
         usual = np.maximum(each.mean(axis=0), usual)
         rare = np.percentile(speeds, RARE, axis=0)
@@ -170,7 +184,49 @@ def learn_pace(corpus: Corpus) -> Pace:
         windows.append(_windows(clip, *found, usual))
         here = slice(clip.clip.start, clip.clip.stop)
         lulls[here] = np.interp(corpus.times[here], clip.times[found[0]], found[1])
-    return Pace(usual, fastest, greatest, slowest, lulls, _fit(*map(np.concatenate, zip(*windows, strict=True))))
+    danced = [part for clip, step in zip(clips, steps, strict=True) for part in _danced(clip, step)]
+    peaks = _peaks(danced, np.append(fastest, EVERYDAY[2]), np.append(greatest, rises))
+    return Pace(usual, fastest, greatest, slowest, peaks, lulls, _fit(*map(np.concatenate, zip(*windows, strict=True))))
+
+
+def steps_of(motion: Motion) -> Floats:
+    """Return all parts of the ways from each frame to the next, and how far the root rises or falls [T - 1, J + 3]."""
+    height = motion.skeleton.height if motion.skeleton.height > 0.0 else 1.0
+    return np.column_stack([way_of(motion).parts, np.abs(np.diff(motion.root[:, 1])) / height])
+
+
+def _danced(clip: Sampled, steps: Floats) -> list[Floats]:
+    """Return the stretches of a clip's steps [T - 1, ...] of which nothing was reconstructed."""
+    known = np.ones(len(steps) + 2, dtype=np.bool_)
+    known[[0, -1]] = False
+    for repair in clip.clip.repairs:
+        if not repair.exact:
+            first, last = repair.seconds
+            known[1:-1] &= (clip.times[1:] < first) | (clip.times[:-1] > last)
+    edges = np.flatnonzero(np.diff(known))
+    return [steps[start:stop] for start, stop in edges.reshape(-1, 2)]
+
+
+def _peaks(steps: list[Floats], least: Floats, greatest: Floats) -> Floats:
+    """Return the greatest speeds in all windows of each of LENGTHS but a hundredth [6, J + 3].
+
+    Args:
+        steps: of the clips, from each frame to the next [T - 1, J + 3].
+        least: what no peak is less than [J + 3].
+        greatest: peaks where there are no windows [J + 3].
+    """
+    # Each STRIDE frames are one, for the greatest is the same.
+    parts = [FPS * np.maximum.reduceat(step, np.arange(0, len(step), STRIDE)) for step in steps]
+    peaks = []
+    for seconds in LENGTHS:
+        size = round(seconds * FPS / STRIDE)
+        windows = [
+            np.lib.stride_tricks.sliding_window_view(p, size, axis=0).max(axis=-1) for p in parts if len(p) >= size
+        ]
+        if sum(map(len, windows)) >= FEW:
+            greatest = np.maximum(np.percentile(np.concatenate(windows), RARE, axis=0), least)
+        peaks.append(greatest)
+    return np.stack(peaks)
 
 
 def over_seconds(speeds: Floats, fps: float) -> Floats:

@@ -19,6 +19,7 @@ from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.discretize import StateSpace
+from motionmind.learned.pace import LENGTHS
 from motionmind.learned.plausibility import MEASURES
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
@@ -79,6 +80,7 @@ FORMS = {
     "pace.fastest": _Form("f8", "J+2", _SMALL),
     "pace.greatest": _Form("f8", "J+2", _SMALL),
     "pace.slowest": _Form("f8", "1", 0.0),
+    "pace.peaks": _Form("f8", f"{len(LENGTHS)} J+3", 0.0),
     "pace.lulls": _Form("f8", "N", 0.0),
     "pace.law": _Form("f8", "4", -100.0, 100.0),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),

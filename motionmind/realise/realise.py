@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -11,6 +12,7 @@ from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
+from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
@@ -26,7 +28,7 @@ from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import HEADROOM, keep_pace
+from motionmind.realise.retime import ENDS_AT, HEADROOM, LONGER, keep_pace, slow_down
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
 
@@ -57,6 +59,7 @@ def realise(
     without: Collection[Correction] = (),
     pace: float = 1.0,
     fastest: Floats | None = None,
+    peaks: Callable[[float], Floats] | None = None,
 ) -> tuple[Motion, Ints]:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -92,6 +95,7 @@ def realise(
         pace: how many times as fast as the corpus to move, where there is no `length`.
         fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
             `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
+        peaks: what the greatest speeds in so many seconds keep to, and that of the root's rise [J + 3]; as `fastest`.
 
     Returns:
         The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
@@ -119,8 +123,8 @@ def realise(
             longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk = walk._replace(half_steps=half_steps)
-    smooth, most = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
-    detail, detailed = _detail(walk, clock, corpus, carriage, smooth, most)
+    smooth, quick = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
+    detail, detailed = _detail(walk, clock, corpus, carriage, smooth, quick)
     rotations = rot.mul(smooth, rot.exp(detail))
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     # Once so that feet find places to stand at, and once for where they have been put.
@@ -133,6 +137,11 @@ def realise(
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     given = [0, *(2 * move for move in through), -1]
     flies = trusted * aloft
+    leaps = size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9)
+    most = None
+    if peaks is not None:
+        most = ENDS_AT * pace * peaks(pace * LONGER * float(clock.frames[-1]))
+        flies[np.sqrt(2.0 * GRAVITY * leaps) > most[-1] * a.skeleton.height] = 0.0
     flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
@@ -140,7 +149,7 @@ def realise(
         trusted,
         walk.moments @ carriage.stands,
         flies,
-        size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9),
+        leaps,
         size * travel,
         size * float(carriage.overhang[0]),
     )
@@ -173,7 +182,10 @@ def realise(
             fps,
             None if fastest is None else pace * fastest[: len(a.skeleton)],
         )
-    return Motion(a.skeleton, rotations, root, clock.frames, "tween", (Insertion(clock.moves),)), detailed
+    motion = Motion(a.skeleton, rotations, root, clock.frames)
+    if most is not None:
+        motion, clock = slow_down(motion, clock, most, (leaving is not None, arriving is not None))
+    return replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed
 
 
 def _times(factor: float, velocity: Velocity | None) -> Velocity | None:

@@ -3,6 +3,10 @@
 How long a movement takes on the whole is settled before its path is known, and by the way from end to end alone. On the
 way a joint may go there and back. Where that would be faster than all but the corpus's fastest hundredth of moments,
 the clock slows down: all of the body, so that joints stay together, and smoothly, over a few half steps.
+
+Then feet, knees and the weight take what they need, and some of it is quick. So the clock slows down once more where
+the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), but
+not in the air, where the body falls as it does.
 """
 
 from __future__ import annotations
@@ -11,12 +15,20 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.body.plausibility import GRAVITY
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import way_of
+from motionmind.geometry.splines import natural_spline, rotation_spline
+from motionmind.learned.pace import steps_of, way_of
 from motionmind.realise.expectation import Expectation
+from motionmind.realise.timeline import Timeline, stretch
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
+FALLS = 0.5  # of gravity: what falls faster is in the air
+ENDS_AT = 0.95  # share of the peaks that is kept to in the end
+AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
+LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
+SLIGHT = 1e-3  # by which a clock is not worth slowing
 SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
 
 
@@ -55,3 +67,38 @@ def keep_pace(
         if is_moving:
             slower = 1.0 + (slower - 1.0) * np.clip(since / SETTLES, 0.0, 1.0)
     return np.asarray(slower)
+
+
+def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:
+    """Return a movement and its clock, slower where a part of the body is faster than the most.
+
+    Args:
+        motion: the movement, at the clock's frames.
+        clock: its clock.
+        most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s [J + 3].
+        moving: whether the first and the last posture are passed at a given velocity, which is not to change.
+    """
+    times = motion.times
+    middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
+    falls = fps**2 * np.diff(motion.root[:, 1], 2) < -FALLS * GRAVITY
+    since = np.full(len(middles), np.inf)
+    for fixed, time in ((moving[0], times[0]), (moving[1], times[-1]), *((True, time) for time in times[1:-1][falls])):
+        if fixed:
+            since = np.minimum(since, np.abs(middles - time))
+    free = np.clip((since - 0.5 / fps) / SETTLES, 0.0, 1.0)
+    slower = np.maximum((fps * steps_of(motion) / most).max(axis=1), 1.0)
+    slower[free < SLIGHT] = 1.0
+    reach = max(1, round(AROUND * fps))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)
+    weights = np.hanning(2 * reach + 3)[1:-1]
+    slower = 1.0 + free * (np.convolve(np.pad(around, reach, mode="edge"), weights / weights.sum(), "valid") - 1.0)
+    if slower.max() < 1.0 + SLIGHT:
+        return motion, clock
+    later, at = stretch(clock, times, slower, fps)
+    was = np.interp(later.frames, at, times)
+    rotations, root = (
+        rot.normalise(rotation_spline(times, motion.rotations, was)),
+        natural_spline(times, motion.root, was),
+    )
+    rotations[[0, -1]], root[[0, -1]] = motion.rotations[[0, -1]], motion.root[[0, -1]]
+    return Motion(motion.skeleton, rotations, root, later.frames), later

@@ -217,6 +217,7 @@ class Engine(LearnedCorpus):
     def _realise(self, formulation: Formulation, certificate: Certificate) -> tuple[Motion, Ints]:
         """Return the motion of a path, and the corpus's moves whose fine detail it has."""
         request = formulation.request
+        paced = request.paced and not request.fixes_length
         return realise(
             places(formulation.searched.model, certificate.path),
             formulation.a,
@@ -234,7 +235,8 @@ class Engine(LearnedCorpus):
             formulation.arriving,
             request.without,
             request.pace,
-            self.pace.fastest if request.paced and not request.fixes_length else None,
+            self.pace.fastest if paced else None,
+            self.pace.peaks_in if paced else None,
         )
 
     def _account_for(

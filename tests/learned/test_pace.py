@@ -194,6 +194,34 @@ def test_the_fastest_speeds_are_those_of_the_rarest_frames() -> None:
     assert pace.fastest[-1] == pytest.approx(np.percentile(speeds[:, -1], 99.0), rel=0.05)
 
 
+def test_long_movement_shows_no_more_than_the_clips_that_are_as_long() -> None:
+    quick, calm = (
+        reaches(human23(), [2.0 * length] * count, [1.5] * count, 1.0) for length, count in ((0.3, 4), (1, 9))
+    )
+    pace = learned(*[quick] * 20, calm, rate=30.0)
+    assert quick.times[-1] < 3.0
+    assert calm.times[-1] > 6.0
+    tops = [FPS * way_of(clip).parts[:, -1].max() for clip in (quick, calm)]
+    assert pace.peaks_in(1.0)[-2] == pytest.approx(tops[0], rel=0.05)
+    assert pace.peaks_in(9.0)[-2] == pytest.approx(max(tops[1], pace.fastest[-1]), rel=0.05)
+    assert np.all(np.diff([pace.peaks_in(seconds)[-2] for seconds in np.linspace(0.5, 7.0, 9)]) <= 0.0)
+    assert np.all(pace.peaks[:, :-1] >= pace.fastest)
+    assert np.all(pace.peaks[:, -1] > 0.0)  # also where nothing ever rises
+
+
+def test_what_was_reconstructed_is_no_peak() -> None:
+    calm, quick = (reaches(human23(), [length] * 9, [1.5] * 9) for length in (2.0, 0.4))
+    times = np.concatenate([calm.times, calm.times[-1] + 1 / FPS + quick.times])
+    both = {name: np.concatenate([getattr(calm, name), getattr(quick, name)]) for name in ("rotations", "root")}
+    corpus = gather("mended", [replace(calm, times=times, **both)], rate=10.0)
+    (clip,) = corpus.clips
+    repairs = (JointRepair("left_knee", 0, 0, (float(calm.times[-1]), float(times[-1])), exact=False),)
+    mended = replace(corpus, clips=(replace(clip, repairs=repairs),))
+    one, other = learn_pace(corpus), learn_pace(mended)
+    assert other.peaks_in(2.0)[ARM] == pytest.approx(other.fastest[ARM], rel=1e-9)
+    assert one.peaks_in(2.0)[ARM] > 1.05 * other.peaks_in(2.0)[ARM]
+
+
 def test_what_never_moves_in_a_corpus_may_move() -> None:
     pace = learned(reaches(human23(), [1.0, 1.0], [1.0, 1.0]))
     assert np.all(pace.fastest > 0.0)

@@ -455,6 +455,13 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     assert 0.8 < heights.argmax() / 30.0 < 1.6
     assert 0.12 < heights.max() < 0.35
     assert heights[[*range(6), *range(-6, 0)]].max() < 0.03
+    # Nobody jumps higher on the way than dancers do in movement of that length.
+    for rise, jumps in ((3.0, True), (0.8, False)):  # heights a second
+        peaks = np.append(np.full(25, 50.0), rise)
+        ends = grounded.posture(5), grounded.posture(17)
+        found = realised(known, rows, *ends, 30.0, 1e-6, peaks=lambda seconds, peaks=peaks: peaks)
+        heights = lowest_height(human23(), found.rotations, found.root)
+        assert (heights.max() > 0.12) == jumps
 
 
 def test_no_frame_jumps(walking: Learned) -> None:

@@ -131,7 +131,8 @@ def test_each_segment_between_vias_has_its_time(ballet: Engine) -> None:
 def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> None:
     own, other = (engine.tween(*ends(engine), pace=one) for one in (1.0, pace))
     assert other.moves == own.moves
-    assert seconds(other) == pytest.approx(seconds(own) / pace, abs=1.0 / 30.0)
+    # Feet and knees need something else at another pace, and the clock waits for them.
+    assert seconds(other) == pytest.approx(seconds(own) / pace, rel=0.06, abs=1.0 / 30.0)
     for end, frame in (("a", 0), ("b", -1)):
         np.testing.assert_array_equal(other.motion.rotations[frame], own.motion.rotations[frame], err_msg=end)
     given = engine.tween(*ends(engine), pace=pace, moves=4)

@@ -1,0 +1,88 @@
+"""A clock that slows down where a movement as it is made is too fast."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motionmind._typing import Floats
+from motionmind.body.human import human23
+from motionmind.body.motion import Motion
+from motionmind.geometry import rotations as rot
+from motionmind.learned.pace import steps_of
+from motionmind.realise.retime import AROUND, SETTLES, slow_down
+from motionmind.realise.timeline import Timeline
+
+FPS, BODY = 30.0, human23()
+ELBOW = BODY.index("left_elbow")
+STILL = (False, False)
+
+
+def bent(angles: Floats, heights: Floats | None = None) -> tuple[Motion, Timeline]:
+    """A body that bends an elbow by such angles [N], and whose root is so high [N], with a clock of five moves."""
+    times = np.arange(len(angles)) / FPS
+    rotations = np.tile(rot.IDENTITY, (len(times), len(BODY), 1))
+    rotations[:, ELBOW] = rot.from_axis_angle([1.0, 0.0, 0.0], angles)
+    root = np.zeros((len(times), 3))
+    root[:, 1] = 1.0 if heights is None else heights
+    return Motion(BODY, rotations, root, times), Timeline(np.linspace(0.0, times[-1], 6), times, 5)
+
+
+def quick(top: float, count: int = 91) -> Floats:
+    """Angles of an elbow that bends slowly, but for its fastest moment, in the middle."""
+    speeds = 0.5 + top * np.exp(-(((np.arange(count - 1) - 0.5 * count) / 4.0) ** 2))
+    return np.concatenate([[0.0], np.cumsum(speeds) / FPS])
+
+
+def most(joints: float) -> Floats:
+    return np.concatenate([np.full(len(BODY), joints), [9.0, 9.0, 9.0]])
+
+
+def speeds(motion: Motion) -> Floats:
+    return steps_of(motion)[:, ELBOW] / np.diff(motion.times)
+
+
+@pytest.mark.parametrize("top", [2.5, 4.0, 7.0])
+def test_what_is_too_fast_is_slowed_as_much_as_it_needs(top: float) -> None:
+    motion, clock = bent(quick(top))
+    slower, later = slow_down(motion, clock, most(2.0), STILL)
+    assert speeds(motion).max() > 2.0
+    assert 1.8 < speeds(slower).max() < 2.0 * 1.03
+    np.testing.assert_array_equal(slower.rotations[[0, -1]], motion.rotations[[0, -1]])
+    np.testing.assert_allclose(np.diff(slower.times), 1.0 / FPS, rtol=0.02)
+    np.testing.assert_array_equal(slower.times, later.frames)
+    assert later.moves[-1] == slower.times[-1] > motion.times[-1]
+    # The same movement: at each move it is where it was, and nothing else is longer than it need be.
+    was, now = (
+        np.interp(c.moves, m.times, np.cumsum(np.append(0.0, steps_of(m)[:, ELBOW])))
+        for c, m in ((clock, motion), (later, slower))
+    )
+    np.testing.assert_allclose(now, was, atol=0.02)
+    far = np.abs(motion.times[:-1] - 1.5) > 0.5 + 2.0 * AROUND
+    assert slower.times[-1] - motion.times[-1] < (top / 2.0 - 0.5) * (~far).sum() / FPS
+
+
+def test_what_is_slow_enough_is_left_as_it_is() -> None:
+    motion, clock = bent(quick(1.0))
+    assert slow_down(motion, clock, most(2.0), STILL) == (motion, clock)
+
+
+def test_what_falls_falls_as_it_did() -> None:
+    since = (np.arange(91) - 45.0) / FPS
+    heights = np.maximum(1.0 + 4.905 * (0.2**2 - since**2), 1.0)
+    motion, clock = bent(quick(7.0), heights)
+    slower, _ = slow_down(motion, clock, most(2.0), STILL)
+    falls = np.diff(slower.root[:, 1], 2) * FPS**2
+    assert np.sum(np.abs(falls + 9.81) < 0.3) >= 10  # of the 0.4 s that it flies
+    assert slower.root[:, 1].max() == pytest.approx(heights.max(), abs=1e-3)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_an_end_that_is_passed_at_a_velocity_keeps_it(end: int) -> None:
+    angles = np.concatenate([[0.0], np.cumsum(np.linspace(6.0, 0.5, 90)) / FPS])
+    motion, clock = bent(angles if end == 0 else angles[-1] - angles[::-1])
+    first, last = ((0, -1), (-1, 0))[end]
+    slower, _ = slow_down(motion, clock, most(2.0), (end == 0, end == 1))
+    assert speeds(slower)[first] == pytest.approx(speeds(motion)[first], rel=0.1)
+    assert slower.times[-1] > motion.times[-1] + SETTLES
+    assert speeds(slower)[last] == pytest.approx(speeds(motion)[last], rel=0.1)
