@@ -226,7 +226,7 @@ class Smoother:
 
     def _asked(self, name: str, seam: Seam) -> Question:
         movement, ask = self._studio.movements.get, seam.verdict.ask
-        sides = sides_of(seam.ends, movement)
+        sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.state.corpus))
         return Question(name, sides, options_of(ask, sides.a.skeleton, movement), ask != Ask())
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
