@@ -26,7 +26,7 @@ _OPTIONS = {"start": "A", "end": "B"}
 
 
 class Sides(NamedTuple):
-    """What is asked of the engine at a seam.
+    """A question to the engine at a seam, as it is asked.
 
     Attributes:
         a: the posture that the seam leads from.
