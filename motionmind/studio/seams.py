@@ -230,7 +230,7 @@ class Smoother:
         return Question(name, sides, options_of(ask, sides.a.skeleton, movement), ask != Ask())
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a job returns; JobCancelledError if it was cancelled, MotionMindError if it failed."""
+        """The result of a job; JobCancelledError if it was cancelled, MotionMindError if it failed."""
         self._job = self._studio.workers.submit(kind, function, *arguments)
         try:
             return await self._job.result()
