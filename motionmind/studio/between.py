@@ -124,7 +124,7 @@ class _Desk:
         ends = End(a.key, a.frame, moves=False), End(b.key, b.frame, moves=False)
         for place in (a, b):
             movements.get(place.key).posture(place.frame)  # or says that there is none
-        sides = sides_of(ends, movements.get)
+        sides = sides_of(ends, movements.get, movements.facing(project.state.corpus))
         options = options_of(asked.options, sides.a.skeleton, movements.get)
         corpus = project.state.corpus
         question = question_of(ends, asked.options, corpus, project.versions)

@@ -25,7 +25,7 @@ from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, suggestion
 from motionmind.names.finding import Collection, open_collection
@@ -194,6 +194,10 @@ class Movements:
         """Return a corpus's clips and postures by name; MotionMindError if there is no such corpus."""
         return self._corpus(corpus).collection
 
+    def facing(self, corpus: str) -> Facing:
+        """Return which way a corpus's dancers may face; MotionMindError if there is no such corpus."""
+        return self._corpus(corpus).facing
+
     def forget(self, corpus: str) -> None:
         """Forget what is known of a corpus, which has changed."""
         self._collections.pop(corpus, None)
@@ -241,6 +245,12 @@ class _Corpus:
         from motionmind.learned import persistence  # numba is slow to import
 
         return persistence.load(self._name, self._home).corpus
+
+    @cached_property
+    def facing(self) -> Facing:
+        """Which way the dancers may face."""
+        found: Facing = store.read_manifest(store.locate(self._name, self._home)).get("facing", "free")
+        return found
 
     def motion(self, name: str) -> Motion:
         """Return a clip as it was recorded, else a posture."""

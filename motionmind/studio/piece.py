@@ -90,7 +90,7 @@ class Found(msgspec.Struct, frozen=True):
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """What the engine found at a seam: a fact, which no undo takes back.
+    """The engine's answer at a seam: a fact, which no undo takes back.
 
     Attributes:
         finding: the question that it answers (`question_of`).

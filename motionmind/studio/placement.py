@@ -1,8 +1,9 @@
 """The piece in time and on the floor: when each of its parts begins, where it is set down and which way it faces.
 
 A part is a stretch of a movement: a block, or the insertion at a seam. Each is set down where the one before it ends,
-level place and heading; a block that goes on as recorded stays where the recording has it. The page plays the parts so,
-and `performance` makes them one movement.
+level place and heading; a block that goes on as recorded stays where the recording has it. Where the corpus's dancers
+face the audience, facing "stage", nothing is turned. The page plays the parts so, and `performance` makes them one
+movement.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import msgspec
 import numpy as np
 
 from motionmind.body.motion import Motion
+from motionmind.corpus.corpus import Facing
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
@@ -73,11 +75,18 @@ class Mark(NamedTuple):
 class Marks:
     """Marks of movements' frames, each remembered: a piece asks for the same ones at every edit.
 
-    Args:
-        movement: returns movements by key.
+    Attributes:
+        facing: returns which way a corpus's dancers may face, by its name.
     """
 
-    def __init__(self, movement: Movements) -> None:
+    def __init__(self, movement: Movements, facing: Callable[[str], Facing] = lambda _: "free") -> None:
+        """Remember nothing yet.
+
+        Args:
+            movement: returns movements by key.
+            facing: returns which way a corpus's dancers may face, by its name.
+        """
+        self.facing = facing
         self._movement = movement
         self._marks: dict[tuple[str, int], Mark] = {}
         self._lengths: dict[str, int] = {}
@@ -141,6 +150,7 @@ def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks)
     Raises:
         MotionMindError: a movement or a frame of it is missing.
     """
+    turns = bool(state.blocks) and marks.facing(state.corpus) == "free"
     blocks: list[Part] = []
     insertions: list[Part | None] = []
     for place, block in enumerate(state.blocks):
@@ -159,10 +169,10 @@ def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks)
             insertions.append(None)
             end += marks.step(before.key, before.last)
         else:
-            before = _following(marks, before, key, 0, marks.length(key) - 1, end, inserted=True)
+            before = _following(marks, before, key, (0, marks.length(key) - 1), end, turns, inserted=True)
             insertions.append(before)
             end += before.seconds
-        blocks.append(_following(marks, before, key_of(block), block.first, block.last, end))
+        blocks.append(_following(marks, before, key_of(block), (block.first, block.last), end, turns))
     length = blocks[-1].at + blocks[-1].seconds if blocks else 0.0
     return Layout(tuple(blocks), tuple(insertions), length)
 
@@ -173,11 +183,12 @@ def _part(marks: Marks, key: str, first: int, last: int, at: float, place: tuple
 
 
 def _following(
-    marks: Marks, before: Part, key: str, first: int, last: int, at: float, *, inserted: bool = False
+    marks: Marks, before: Part, key: str, frames: tuple[int, int], at: float, turns: bool, *, inserted: bool = False
 ) -> Part:
-    """A part, set down where another one ends."""
+    """A part, set down where another one ends, and turned as it is if it may be."""
+    first, last = frames
     end, begin = marks.at(before.key, before.last), marks.at(key, first)
-    turn = before.turn + end.heading - begin.heading
+    turn = before.turn + end.heading - begin.heading if turns else 0.0
     x, z = _turned(end.x, end.z, before.turn)
     own_x, own_z = _turned(begin.x, begin.z, turn)
     place = before.place[0] + x - own_x, before.place[1] + z - own_z

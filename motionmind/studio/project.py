@@ -57,7 +57,7 @@ class Project:
         """Read a project's file; errors as of `open`."""
         self._journal, self._home = journal, home
         self.movements = Movements(journal, home)
-        self.marks = Marks(self.movements.get)
+        self.marks = Marks(self.movements.get, self.movements.facing)
         self.movements.saved = self._saved
         self.versions: dict[str, str] = {}
         self.words: list[str] = []

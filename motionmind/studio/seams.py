@@ -226,11 +226,11 @@ class Smoother:
 
     def _asked(self, name: str, seam: Seam) -> Question:
         movement, ask = self._studio.movements.get, seam.verdict.ask
-        sides = sides_of(seam.ends, movement)
+        sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.state.corpus))
         return Question(name, sides, options_of(ask, sides.a.skeleton, movement), ask != Ask())
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a job returns; JobCancelledError if it was cancelled, MotionMindError if it failed."""
+        """The result of a job; JobCancelledError if it was cancelled, MotionMindError if it failed."""
         self._job = self._studio.workers.submit(kind, function, *arguments)
         try:
             return await self._job.result()

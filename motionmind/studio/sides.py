@@ -1,7 +1,8 @@
 """The movement on both sides of a seam, as the engine is asked for what lies between: postures, speeds, passing ones.
 
-It goes by the variation's own rules (`motionmind.variation.piece`): both ends stand above the origin and face ahead,
-and show how fast the body moves there as far as the recording does. A held posture does not move.
+It goes by the variation's own rules (`motionmind.variation.piece`): both ends stand above the origin and face ahead, or
+keep their own headings where the corpus's dancers face the audience. They show how fast the body moves there, as far as
+the recording does. A held posture does not move.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from motionmind.body.limbs import limbs_of
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Facing
 from motionmind.studio.edits import Ask
 from motionmind.studio.piece import End
 from motionmind.studio.placement import Marks, Movements, check_body
@@ -24,7 +26,7 @@ _OPTIONS = {"start": "A", "end": "B"}
 
 
 class Sides(NamedTuple):
-    """What is asked of the engine at a seam.
+    """A question to the engine at a seam, as it is asked.
 
     Attributes:
         a: the posture that the seam leads from.
@@ -41,12 +43,13 @@ class Sides(NamedTuple):
     seconds: float
 
 
-def sides_of(ends: tuple[End, End], movement: Movements) -> Sides:
+def sides_of(ends: tuple[End, End], movement: Movements, facing: Facing) -> Sides:
     """Return the movement on both sides of a seam.
 
     Args:
         ends: where the seam leads from, and to.
         movement: returns movements by key.
+        facing: of the corpus that is asked; where it is "stage", the postures keep their own headings.
 
     Raises:
         MotionMindError: there is no such movement.
@@ -70,7 +73,7 @@ def sides_of(ends: tuple[End, End], movement: Movements) -> Sides:
         insertions=(),
     )
     i = len(before) - 1
-    piece = Piece.of(both)
+    piece = Piece.of(both, facing=facing)
     return Sides(*piece.ends(i, i + 1), *piece.around(i, i + 1), seconds)
 
 

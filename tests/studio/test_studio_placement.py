@@ -84,18 +84,18 @@ def test_each_part_is_set_down_where_the_one_before_ends(blocks, inserted):
         assert np.cos(turned) == pytest.approx(1.0)
 
 
-@given(stretches)
+@given(stretches, st.sampled_from(["free", "stage"]))
 @settings(max_examples=40, deadline=None)
-def test_the_performance_is_the_variation_s_arrangement(blocks):
+def test_the_performance_is_the_variation_s_arrangement(blocks, facing):
     """The same stretches of one movement, arranged as a variation is."""
     blocks = [("c/one", first, last) for _, first, last in blocks]
     state = piece_of(*blocks)
-    motion = performance(list(lay_out(state, lambda _: None, Marks(movement)).parts), movement)
+    motion = performance(list(lay_out(state, lambda _: None, Marks(movement, lambda _: facing)).parts), movement)
     order, last = [], -1
     for _, first, stop in blocks:
         order += list(range(first + (first == last), stop + 1))  # a variation holds a posture that comes twice
         last = stop
-    arranged = Piece.of(MOVEMENTS["c/one"]).arrange(np.array(order), {}).motion
+    arranged = Piece.of(MOVEMENTS["c/one"], facing=facing).arrange(np.array(order), {}).motion
     assert np.abs(motion.times - motion.times[0] - (arranged.times - arranged.times[0])).max() < 1e-9
     assert rot.angle(motion.rotations, arranged.rotations).max() < 1e-6
     assert motion.root == pytest.approx(arranged.root, abs=1e-9)

@@ -35,10 +35,11 @@ def same(one: Motion | None, other: Motion | None) -> bool:
     )
 
 
+@pytest.mark.parametrize("facing", ["free", "stage"])
 @pytest.mark.parametrize(("i", "k"), [(40, 90), (7, 3), (0, 2), (1, 0), (50, 50)])
-def test_a_seam_is_asked_about_as_a_variation_asks(clip, i, k):
-    piece = Piece.of(clip)
-    sides = sides_of((End("c/x", i, True), End("c/x", k, True)), {"c/x": clip}.__getitem__)
+def test_a_seam_is_asked_about_as_a_variation_asks(clip, i, k, facing):
+    piece = Piece.of(clip, facing=facing)
+    sides = sides_of((End("c/x", i, True), End("c/x", k, True)), {"c/x": clip}.__getitem__, facing)
     for mine, theirs in zip(sides[:2], piece.ends(i, k), strict=True):
         assert np.allclose(mine.rotations, theirs.rotations)
         assert np.allclose(mine.root, theirs.root)
@@ -50,21 +51,21 @@ def test_a_seam_is_asked_about_as_a_variation_asks(clip, i, k):
 
 
 def test_a_held_posture_does_not_move(clip):
-    sides = sides_of((End("c/x", 40, False), End("c/x", 90, False)), {"c/x": clip}.__getitem__)
+    sides = sides_of((End("c/x", 40, False), End("c/x", 90, False)), {"c/x": clip}.__getitem__, "free")
     assert sides.before is None
     assert sides.after is None
 
 
 def test_the_last_frame_has_nothing_after_it(clip):
     last = len(clip) - 1
-    assert sides_of((End("c/x", 4, True), End("c/x", last, True)), {"c/x": clip}.__getitem__).after is None
+    assert sides_of((End("c/x", 4, True), End("c/x", last, True)), {"c/x": clip}.__getitem__, "free").after is None
 
 
 def test_bodies_must_be_one(clip):
     hexapod = Engine.load("walk-hexapod").corpus
     movements = {"c/x": clip, "hexapod/x": hexapod.motion(hexapod.clips[0])}
     with pytest.raises(MotionMindError, match=r"hexapod/x is on another body than c/x: .*"):
-        sides_of((End("c/x", 4, True), End("hexapod/x", 1, True)), movements.__getitem__)
+        sides_of((End("c/x", 4, True), End("hexapod/x", 1, True)), movements.__getitem__, "free")
 
 
 def test_wishes_are_options_of_the_engine(engine, clip):
@@ -84,7 +85,7 @@ def test_wishes_are_options_of_the_engine(engine, clip):
 
 
 def test_a_limb_that_is_pinned_stays_on_the_way(engine, clip):
-    sides = sides_of((End("c/x", 10, False), End("c/x", 70, False)), {"c/x": clip}.__getitem__)
+    sides = sides_of((End("c/x", 10, False), End("c/x", 70, False)), {"c/x": clip}.__getitem__, "free")
     options = options_of(Ask(pins=(Pin("left_wrist"),)), clip.skeleton, {}.__getitem__)
     tween = engine.tween(sides.a, sides.b, **options)
     chain = engine.corpus.chains.index("left_wrist")

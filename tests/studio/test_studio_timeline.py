@@ -226,7 +226,7 @@ def test_insertions_are_chosen_by_keys_alone(page: Any) -> None:
         press("Tab")
         if page.evaluate("document.activeElement.dataset.testid") == "wish-joint":
             break
-    page.keyboard.type("left h")
+    press("ArrowDown")
     press("Tab", "Tab", "Enter")
     wait_for(page, "piece.seams[1].ask.pins.length === 1")
     press("Escape")
