@@ -55,7 +55,7 @@ export function Panel({ studio }) {
   };
   return html`<section class="stack vary">
     <h2>Variations</h2>
-    <${AttractorMap} studio=${studio} varying=${varying} playing=${view.playing} />
+    <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
     <label class="dial">
       <span class="row"><span class="grow">How far to depart</span>
       <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
