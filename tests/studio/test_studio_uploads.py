@@ -76,7 +76,9 @@ def test_understands_a_recording(uploads: Uploads, tmp_path: Path) -> None:
     assert found.error == ""
     facts = found.facts
     assert facts is not None
-    assert (facts.joints, facts.rig, facts.unit, facts.is_guessed) == (23, "human23", "cm", True)
+    assert (facts.joints, facts.rig, facts.people, facts.unit, facts.is_guessed) == (23, "human23", True, "cm", True)
+    assert facts.body is not None
+    assert facts.body.name == "My turn"
     assert facts.height == pytest.approx(1.7, abs=0.15)
     (clip,) = facts.clips
     assert (clip.name, clip.frames, round(clip.fps or 0)) == ("My turn", 60, 30)
