@@ -243,11 +243,10 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
 def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Path) -> None:
     (tmp_path / "bends.score").write_text(SCORE)
     page = open_page(1024, 768, "dark")
+    page.on("filechooser", lambda chooser: chooser.set_files(tmp_path / "bends.score"))
     to_panel(page, "movement")
     tab_to(page, "choose")
-    with page.expect_file_chooser() as chooser:
-        page.keyboard.press("Enter")
-    chooser.value.set_files(tmp_path / "bends.score")
+    page.keyboard.press("Enter")
     page.get_by_test_id("understood").wait_for()
     tab_to(page, "put")
     page.keyboard.press("Enter")
