@@ -187,6 +187,23 @@ def test_the_dial_answers_while_it_is_turned(served: Served, open_page: Open) ->
     assert len(seen) > 2
 
 
+def test_a_stretch_selected_on_the_time_line_is_kept(served: Served, open_page: Open) -> None:
+    two_clips(served)
+    served.edit(edit="split", block="b1", at=20, id="b3")
+    page = open_page()
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    page.evaluate("studio.store.set({ selection: { block: 'b3' } })")
+    page.get_by_test_id("keep-selected").click()
+    page.locator(".tiles li.kept").wait_for()
+    page.get_by_test_id("keep-selected").wait_for(state="detached")
+    page.get_by_test_id("vary").click()
+    until(page, "studio.store.state.piece.blocks.length > 3")
+    assert "b3" in piece(served)
+    page.get_by_test_id("let-go").click()
+    page.locator(".tiles li.kept").wait_for(state="detached")
+
+
 def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
     page = open_page()
     page.get_by_test_id("open-vary").click()
