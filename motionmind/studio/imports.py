@@ -34,7 +34,6 @@ def view(upload: Upload) -> dict[str, Any]:
     found: dict[str, Any] = msgspec.to_builtins(upload)
     if upload.facts is not None:
         found["facts"].pop("body")
-        found["facts"]["people"] = upload.facts.body is not None and upload.facts.body.name in ("human23", "human44")
         found["skips"] = [upload.skip(number) for number in range(len(upload.facts.clips))]
     return found
 

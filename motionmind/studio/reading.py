@@ -121,6 +121,7 @@ class Facts(msgspec.Struct, frozen=True):
         body: the body that they move, the corpora's where the file's joints map to it.
         joints: number of the file's own joints.
         rig: name of the rig that its joints are known as; "" if they are not.
+        people: whether the body is that of corpora of people.
         filled: joints of the corpora's body that it lacks.
         height: of a person with such bones, metres: it shows whether the unit is right.
         unit: the unit that was taken; "" where the format states it.
@@ -134,6 +135,7 @@ class Facts(msgspec.Struct, frozen=True):
     body: Body | None = None
     joints: int = 0
     rig: str = ""
+    people: bool = False
     filled: tuple[str, ...] = ()
     height: float = 0.0
     unit: str = ""
@@ -252,6 +254,7 @@ def _check_alone(path: Path) -> None:
 
 def _understand(order: Order, motions: list[Motion]) -> Facts:
     """Write the clips, on the corpora's body where their joints map to it, and say what was understood."""
+    from motionmind.body.human import human23, human44
     from motionmind.body.tempo import question_tempo
     from motionmind.corpus.flips import find_flips
     from motionmind.formats.units import HEIGHT_PER_SPAN, bone_span
@@ -273,9 +276,16 @@ def _understand(order: Order, motions: list[Motion]) -> Facts:
     unit, is_guessed = _unit(order)
     return Facts(
         clips=tuple(clips),
-        body=Body(body.name, body.names, tuple(map(int, body.parents)), body.offsets.tolist(), body.tips.tolist()),
+        body=Body(
+            displayed(Path(order.name).stem) if body.name == Path(order.file).stem else body.name,
+            body.names,
+            tuple(map(int, body.parents)),
+            body.offsets.tolist(),
+            body.tips.tolist(),
+        ),
         joints=len(raw),
         rig=known[0].name if known else "",
+        people=any(human().difference(body) is None for human in (human23, human44)),
         filled=tuple(filled_joints(known[1])) if known and len(body) == 23 else (),
         height=HEIGHT_PER_SPAN * bone_span(np.array(raw.parents), raw.offsets, raw.tips),
         unit=unit,

@@ -126,10 +126,8 @@ def test_a_piece_is_varied_by_mouse(served: Served, open_page: Open, size: str) 
     )
     assert page.get_by_test_id("map").get_attribute("aria-valuetext") != "its usual start"
     # What is kept stays while the rest is varied anew.
-    keep = page.get_by_test_id("tile-2").get_by_role("button", name=re.compile("^Keep"))
-    name = keep.get_attribute("aria-label").partition(": ")[2]
-    keep.click()
-    page.locator(".tiles li.kept").wait_for()
+    page.get_by_test_id("tile-2").get_by_role("button", name=re.compile("^Keep")).click()
+    name = page.locator(".tiles li.kept .keep").get_attribute("aria-label").partition(": ")[2]
     page.get_by_test_id("another").click()
     until(page, "studio.store && document.querySelectorAll('.tiles li.kept').length === 1")
     assert name in page.locator(".tiles li.kept .keep").get_attribute("aria-label")
@@ -189,6 +187,23 @@ def test_the_dial_answers_while_it_is_turned(served: Served, open_page: Open) ->
     assert len(seen) > 2
 
 
+def test_a_stretch_selected_on_the_time_line_is_kept(served: Served, open_page: Open) -> None:
+    two_clips(served)
+    served.edit(edit="split", block="b1", at=20, id="b3")
+    page = open_page()
+    page.get_by_test_id("open-vary").click()
+    page.get_by_test_id("tile-3").wait_for()
+    page.evaluate("studio.store.set({ selection: { block: 'b3' } })")
+    page.get_by_test_id("keep-selected").click()
+    page.locator(".tiles li.kept").wait_for()
+    page.get_by_test_id("keep-selected").wait_for(state="detached")
+    page.get_by_test_id("vary").click()
+    until(page, "studio.store.state.piece.blocks.length > 3")
+    assert "b3" in piece(served)
+    page.get_by_test_id("let-go").click()
+    page.locator(".tiles li.kept").wait_for(state="detached")
+
+
 def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
     page = open_page()
     page.get_by_test_id("open-vary").click()
@@ -245,11 +260,10 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
 def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Path) -> None:
     (tmp_path / "bends.score").write_text(SCORE)
     page = open_page(1024, 768, "dark")
+    page.on("filechooser", lambda chooser: chooser.set_files(tmp_path / "bends.score"))
     to_panel(page, "movement")
     tab_to(page, "choose")
-    with page.expect_file_chooser() as chooser:
-        page.keyboard.press("Enter")
-    chooser.value.set_files(tmp_path / "bends.score")
+    page.keyboard.press("Enter")
     page.get_by_test_id("understood").wait_for()
     tab_to(page, "put")
     page.keyboard.press("Enter")

@@ -76,7 +76,9 @@ def test_understands_a_recording(uploads: Uploads, tmp_path: Path) -> None:
     assert found.error == ""
     facts = found.facts
     assert facts is not None
-    assert (facts.joints, facts.rig, facts.unit, facts.is_guessed) == (23, "human23", "cm", True)
+    assert (facts.joints, facts.rig, facts.people, facts.unit, facts.is_guessed) == (23, "human23", True, "cm", True)
+    assert facts.body is not None
+    assert facts.body.name == "My turn"
     assert facts.height == pytest.approx(1.7, abs=0.15)
     (clip,) = facts.clips
     assert (clip.name, clip.frames, round(clip.fps or 0)) == ("My turn", 60, 30)
@@ -110,6 +112,15 @@ def test_a_pose_that_was_put_first_is_left_out(uploads: Uploads, tmp_path: Path)
     assert len(uploads.motion(found.id, 0)) == 59
     kept = asyncio.run(uploads.read(found.id, Choices(skip=0)))
     assert len(uploads.motion(kept.id, 0)) == 60
+
+
+def test_quick_movement_is_no_pose_that_was_put_first() -> None:
+    motion = recording()
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (len(motion), 23, 1))
+    angles = np.zeros((len(motion), 3))
+    angles[:, 0] = np.radians(15.0) * np.arange(len(motion))
+    rotations[:, human23().index("left_knee")] = rot.exp(angles)
+    assert not is_posed_first(replace(motion, rotations=rotations))
 
 
 def test_names_joints_that_jump(uploads: Uploads, tmp_path: Path) -> None:
@@ -217,6 +228,12 @@ def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
     assert str(uploads.folder(found.id)) not in found.error
     assert "root:" not in found.error
     assert time.monotonic() - before < 60.0
+
+
+@pytest.mark.parametrize("line", ["include secret.score", "include\t../secret.score as x", "body secret.toml"])
+def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str) -> None:
+    found = bring(uploads, "nosy.score", f"{line}\n{SCORE}".encode())
+    assert found.error == "nosy.score:1: takes in another file: bring a score that stands alone"
 
 
 @pytest.mark.parametrize(

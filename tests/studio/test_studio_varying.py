@@ -89,6 +89,14 @@ def test_a_stretch_of_the_piece_stays_where_it_is() -> None:
     assert 0 < at < len(found.blocks) - 1
 
 
+def test_a_run_ends_before_a_stretch_that_is_kept() -> None:
+    kept = Block("k", "m-0011223344556677", 10, 33, mirrored=True)
+    present = (Block("a", "ballet/adagio", 0, 19), kept, Block("b", "ballet/adagio", 20, 59))
+    stands = kept_in(present, {"k"}, clocks)
+    found = vary_blocks(PIECE[:1], Wanted(nudge=0.0, kept=stands), clocks, present=present)
+    assert found.blocks == present
+
+
 def test_what_was_varied_is_varied_from_its_first_order_again() -> None:
     found = vary(Wanted(depart=0.2))
     kept = kept_in(found.blocks, {found.blocks[3].id}, clocks)

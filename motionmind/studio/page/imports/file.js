@@ -28,7 +28,7 @@ export function FileCard({ imports, file, onLook, onPut, onFail }) {
     <header class="row">
       <strong class="grow cut" title=${file.name}>${file.name}</strong>
       <span class="pale numbers">${sizeOf(file.size)}</span>
-      <button class="button quiet" data-testid="forget-file" aria-label="Take ${file.name} away"
+      <button class="button quiet" data-testid="forget-file" aria-label="Remove ${file.name}"
         onClick=${() => imports.forget(file).catch(onFail)}>Remove</button>
     </header>
     ${error && html`<p class="said error" role="alert" data-testid="file-error">${error}</p>`}

@@ -69,15 +69,16 @@ export class Chart {
 }
 
 /**
- * Draw the map.
- * @param {CanvasRenderingContext2D} pen
- * @param {Chart} chart
- * @param {{sheets: string, piece: string, other: string, paper: string, ink: string}} inks
- * @param {{trail: Float32Array, other: Float32Array, every: number, jumps: number[], place: number | null}} shown
+ * @typedef {{sheets: string, piece: string, other: string, paper: string, ink: string}} Inks
+ * @typedef {{trail: Float32Array, other: Float32Array, every: number, jumps: number[]}} Shown
  */
-export function draw(pen, chart, inks, { trail, other, every, jumps, place }) {
-  const { width, height } = chart;
-  pen.clearRect(0, 0, width, height);
+
+/**
+ * Draw the map, all but where the movement is.
+ * @param {CanvasRenderingContext2D} pen @param {Chart} chart @param {Inks} inks @param {Shown} shown
+ */
+export function draw(pen, chart, inks, { trail, other, every, jumps }) {
+  pen.clearRect(0, 0, chart.width, chart.height);
   pen.globalAlpha = 0.5;
   pen.fillStyle = inks.sheets;
   for (let i = 0; i * 3 < chart.all.length; i++) {
@@ -96,15 +97,20 @@ export function draw(pen, chart, inks, { trail, other, every, jumps, place }) {
     diamond(pen, chart.at(other, n * every), 3.5);
   }
   if (trail.length) start(pen, chart.at(trail, 0), inks);
-  if (place !== null && other.length) {
-    const last = other.length / 3 - 1;
-    const [x, y] = chart.at(other, Math.min(Math.round(place * every), last));
-    pen.fillStyle = inks.other;
-    disc(pen, x, y, 5.5);
-    pen.strokeStyle = inks.paper;
-    pen.lineWidth = 1.5;
-    pen.stroke();
-  }
+}
+
+/**
+ * Draw where the variation is, among its postures.
+ * @param {CanvasRenderingContext2D} pen @param {Chart} chart @param {Inks} inks @param {Shown} shown @param {number} place
+ */
+export function drawHead(pen, chart, inks, { other, every }, place) {
+  if (!other.length) return;
+  const [x, y] = chart.at(other, Math.min(Math.round(place * every), other.length / 3 - 1));
+  pen.fillStyle = inks.other;
+  disc(pen, x, y, 5.5);
+  pen.strokeStyle = inks.paper;
+  pen.lineWidth = 1.5;
+  pen.stroke();
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {Chart} chart @param {Float32Array} some */

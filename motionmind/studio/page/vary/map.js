@@ -2,7 +2,7 @@
 
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
-import { Chart, draw, points } from "./chart.js";
+import { Chart, draw, drawHead, points } from "./chart.js";
 import { placeAt } from "./varying.js";
 
 const STEPS = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 40, PageDown: -40 });
@@ -21,9 +21,10 @@ function chartOf(api, flow) {
 }
 
 /**
- * @param {{studio: any, varying: import("./varying.js").Varying, playing: boolean}} props `playing`: the viewer shows the variation
+ * @param {{studio: any, varying: import("./varying.js").Varying, piece: any, playing: boolean}} props `playing`: the viewer
+ *   shows the variation, which is `piece` with all that was inserted
  */
-export function AttractorMap({ studio, varying, playing }) {
+export function AttractorMap({ studio, varying, piece, playing }) {
   const { viewer } = studio;
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [chart, setChart] = useState(/** @type {Chart | null} */ (null));
@@ -56,19 +57,25 @@ export function AttractorMap({ studio, varying, playing }) {
     if (!element || !chart) return undefined;
     let waiting = 0;
     const inks = colours(element);
+    const below = document.createElement("canvas"); // what does not move while the movement plays
+    const pen = /** @type {CanvasRenderingContext2D} */ (element.getContext("2d"));
     const paint = () => {
       waiting = 0;
       const ratio = window.devicePixelRatio;
-      const { clientWidth: width, clientHeight: height } = element;
+      const [width, height] = [element.clientWidth, element.clientHeight].map((size) => Math.round(size * ratio));
       if (!width || !height) return;
-      if (element.width !== Math.round(width * ratio) || element.height !== Math.round(height * ratio)) {
-        [element.width, element.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+      if (below.width !== width || below.height !== height) {
+        for (const canvas of [element, below]) Object.assign(canvas, { width, height });
+        chart.resize(element.clientWidth, element.clientHeight);
+        const under = /** @type {CanvasRenderingContext2D} */ (below.getContext("2d"));
+        under.scale(ratio, ratio);
+        draw(under, chart, inks, shown);
       }
-      chart.resize(width, height);
-      const pen = /** @type {CanvasRenderingContext2D} */ (element.getContext("2d"));
-      pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-      const place = playing && proposal ? placeAt(proposal, viewer.player.time) : null;
-      draw(pen, chart, inks, { ...shown, place });
+      pen.setTransform(1, 0, 0, 1, 0, 0);
+      pen.clearRect(0, 0, width, height);
+      pen.drawImage(below, 0, 0);
+      pen.scale(ratio, ratio);
+      if (playing && proposal) drawHead(pen, chart, inks, shown, placeAt({ ...proposal, piece }, viewer.player.time));
     };
     const soon = () => {
       waiting ||= requestAnimationFrame(paint);
@@ -82,17 +89,22 @@ export function AttractorMap({ studio, varying, playing }) {
       size.disconnect();
       viewer.player.removeEventListener("change", soon);
     };
-  }, [chart, shown, dark, playing]);
+  }, [chart, shown, dark, playing, piece]);
 
   const begin = (/** @type {number} */ number) => {
     if (!chart) return;
     along.current = number;
     varying.want({ start: chart.point(number) });
   };
+  const drop = () => {
+    setHeld(false);
+    varying.drop();
+  };
   const drag = (/** @type {PointerEvent} */ event) => {
     if (!chart || !canvas.current) return;
     const box = canvas.current.getBoundingClientRect();
-    begin(chart.nearest(event.clientX - box.left, event.clientY - box.top));
+    along.current = chart.nearest(event.clientX - box.left, event.clientY - box.top);
+    varying.drag(chart.point(along.current));
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
     const step = STEPS[event.key];
@@ -122,13 +134,13 @@ export function AttractorMap({ studio, varying, playing }) {
         drag(event);
       }}
       onPointerMove=${(/** @type {PointerEvent} */ event) => held && drag(event)}
-      onPointerUp=${() => setHeld(false)}
-      onPointerCancel=${() => setHeld(false)}
+      onPointerUp=${drop}
+      onPointerCancel=${drop}
       onKeyDown=${press}
     ></canvas>
     <figcaption class="hint" id="map-hint">
-      <span class="sign piece">● the piece</span> <span class="sign other">— its variation</span>
-      <span class="sign other">◇ goes elsewhere</span> <span>⊕ the start: drag it, or use the arrow keys</span>
+      <span class="sign piece">● the piece</span> <span class="sign other">— variation</span>
+      <span class="sign other">◇ leaps</span> <span>⊕ the start: drag it, or use the arrow keys</span>
     </figcaption>
   </figure>`;
 }

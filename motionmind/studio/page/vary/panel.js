@@ -55,7 +55,7 @@ export function Panel({ studio }) {
   };
   return html`<section class="stack vary">
     <h2>Variations</h2>
-    <${AttractorMap} studio=${studio} varying=${varying} playing=${view.playing} />
+    <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
     <label class="dial">
       <span class="row"><span class="grow">How far to depart</span>
       <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
@@ -80,6 +80,7 @@ export function Panel({ studio }) {
 function Order({ studio, varying, shown, isPiece, view }) {
   const count = shown.blocks.length;
   const { wish, proposal } = varying;
+  const selected = useChange(studio.store, () => studio.store.selection?.block);
   const waiting = shown.seams.filter((/** @type {any} */ seam) => seam.state === "waiting" || seam.state === "abrupt").length;
   const locked = proposal?.locked ?? [];
   return html`<div class="stack">
@@ -87,9 +88,12 @@ function Order({ studio, varying, shown, isPiece, view }) {
       <h3 class="grow" aria-live="polite">${count} stretch${count === 1 ? "" : "es"}, ${shown.seconds.toFixed(0)} s${
         isPiece && waiting ? ` · ${waiting} seam${waiting > 1 ? "s" : ""} to smooth` : ""
       }${isPiece ? " · this is the piece" : ""}</h3>
-      ${wish.kept.length > 0 &&
-      html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.want({ kept: [] })}>Let all go</button>`}
+      ${wish.kept.length + wish.stay.length > 0 &&
+      html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.letGo()}>Let all go</button>`}
     </div>
+    ${selected &&
+    !varying.keeps(selected) &&
+    html`<button class="button" data-testid="keep-selected" onClick=${() => varying.stay(selected)}>Keep the stretch selected on the time line</button>`}
     <${Tiles} studio=${studio} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
     <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>

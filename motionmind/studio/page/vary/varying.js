@@ -5,7 +5,7 @@ import { points } from "./chart.js";
 /**
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean}} Block
  * @typedef {{block: Block, place: number}} Kept
- * @typedef {{flow: string, depart: number, start: [number, number, number] | null, stretch: number, kept: Kept[]}} Wish
+ * @typedef {{flow: string, depart: number, nudge: number | null, start: [number, number, number] | null, stretch: number, kept: Kept[], stay: string[]}} Wish
  * @typedef {object} Proposal
  * @property {{seconds: number, parts: any[], blocks: any[], seams: any[]}} piece the variation, as a project tells its piece
  * @property {any[]} original parts of what it varies
@@ -24,7 +24,7 @@ import { points } from "./chart.js";
 
 /** The wish that a page begins with. @returns {Wish} */
 export function firstWish() {
-  return { flow: "lorenz", depart: 0.2, start: null, stretch: 2, kept: [] };
+  return { flow: "lorenz", depart: 0.2, nudge: null, start: null, stretch: 2, kept: [], stay: [] };
 }
 
 /** Fires "change" when the wish or the proposal has changed. */
@@ -68,6 +68,16 @@ export class Varying extends EventTarget {
     this.#changed();
   }
 
+  /** Begin elsewhere; while the hand is on it, with the nudge that there was, which is not sought. @param {[number, number, number]} start */
+  drag(start) {
+    return this.want({ start, nudge: this.proposal?.nudge ?? null });
+  }
+
+  /** The hand has let go: seek the nudge that departs as far as is wished. */
+  drop() {
+    return this.wish.nudge === null ? undefined : this.want({ nudge: null });
+  }
+
   /** Begin where the variation ends, which is somewhere else on the attractor. */
   another() {
     if (!this.proposal) return undefined;
@@ -83,6 +93,7 @@ export class Varying extends EventTarget {
   /** Keep a block of the proposal where it is, or let it go. @param {string} id */
   keep(id) {
     if (!this.proposal) return undefined;
+    if (this.wish.stay.includes(id)) return this.want({ stay: this.wish.stay.filter((other) => other !== id) });
     const { piece, places } = this.proposal;
     const kept = this.wish.kept.filter(({ block }) => block.id !== id);
     if (kept.length === this.wish.kept.length) {
@@ -91,6 +102,16 @@ export class Varying extends EventTarget {
     }
     kept.sort((one, other) => one.place - other.place);
     return this.want({ kept });
+  }
+
+  /** Keep a stretch of the piece where it is. @param {string} id */
+  stay(id) {
+    return this.want({ stay: [...this.wish.stay, id] });
+  }
+
+  /** Keep nothing. */
+  letGo() {
+    return this.want({ kept: [], stay: [] });
   }
 
   /** The edit that makes the proposal the piece. */
@@ -117,7 +138,7 @@ export function alike(one, other) {
 /** How far it departs, in words. @param {number} share of the steps */
 export function departure(share) {
   if (share < 0.005) return "as it is";
-  return `1 step in ${Math.max(Math.round(1 / share), 1)} goes elsewhere`;
+  return `1 step in ${Math.max(Math.round(1 / share), 1)}`;
 }
 
 /** The place among all postures at a time, with its fraction. @param {Proposal} proposal @param {number} time */
