@@ -2,6 +2,7 @@
 
 import { playable } from "../movements.js";
 
+const MOST = 4; // alternatives
 export const DRAGGED = "application/x-motionmind-posture";
 
 /**
@@ -32,6 +33,7 @@ export class Desk extends EventTarget {
     this.asked = 0; // counts searches, so that what comes late is known
     /** @type {any} what was heard of the job last */
     this.seen = null;
+    this.taking = 0; // the search whose movements are being fetched
     studio.store.addEventListener("change", () => this.#follow());
   }
 
@@ -125,25 +127,42 @@ export class Desk extends EventTarget {
 
   /** What the job has come to. */
   async #follow() {
-    const job = this.job && this.state === "searching" ? this.studio.store.jobs.get(this.job) : undefined;
+    const job = this.#latest;
     if (!job || job === this.seen) return;
     this.seen = job;
+    this.words = job.state === "waiting" ? "It waits until the engine is free." : "";
     if (job.state === "failed") {
       this.#fail(job.words);
       return;
     }
-    const { asked, job: id } = this;
-    for (const account of (job.partial ?? []).slice(this.found.length)) {
-      const motion = playable(await this.studio.api.get(`/api/between/${id}/${account.number}`));
-      if (asked !== this.asked) return;
-      if (account.number > this.found.length) this.found = [...this.found, { account, motion }];
-      this.#changed();
-    }
-    if (job.state === "done") {
+    this.#changed();
+    if (this.taking === this.asked) return; // whoever takes in movements sees this, too
+    const { asked } = this;
+    this.taking = asked;
+    await this.studio.act(() => this.#takeIn(asked));
+    if (this.taking === asked) this.taking = 0;
+    if (asked === this.asked && this.#latest?.state === "done") {
+      this.words = this.found.length < MOST ? "Nothing else differs enough." : "";
       this.state = "found";
-      this.words = this.found.length < 4 ? "Nothing else differs enough." : "";
       this.#changed();
     }
+  }
+
+  /** Fetch the movements that are found, one after another. @param {number} asked */
+  async #takeIn(asked) {
+    for (;;) {
+      const account = this.#latest?.partial?.[this.found.length];
+      if (!account) return;
+      const motion = playable(await this.studio.api.get(`/api/between/${this.job}/${account.number}`));
+      if (asked !== this.asked) return;
+      this.found = [...this.found, { account, motion }];
+      this.#changed();
+    }
+  }
+
+  /** The job that searches, as it was told of last. */
+  get #latest() {
+    return this.job && this.state === "searching" ? this.studio.store.jobs.get(this.job) : undefined;
   }
 
   /** @param {string} words */

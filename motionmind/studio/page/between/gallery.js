@@ -148,10 +148,11 @@ function Frames({ studio, clip }) {
   const place = (/** @type {number} */ at) => ({ key: clip.key, frame: at, title: `${clip.title} ${at}` });
   useEffect(() => {
     let here = true;
+    desk.show(false);
     studio.act(() => movement(studio.api, clip.key)).then((/** @type {any} */ found) => {
       if (!here || !found) return;
       motion.current = found;
-      desk.show(false);
+      if (desk.shown) return; // somebody was quicker
       const sought = wanted.current >= 0;
       viewer.show(found, { time: sought ? found.times[wanted.current] : found.start, title: clip.title, play: !sought });
     });

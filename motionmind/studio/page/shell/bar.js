@@ -25,6 +25,7 @@ export function Bar({ studio }) {
     <${Title} studio=${studio} title=${state?.title ?? ""} />
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>
+    <${Readiness} store=${store} />
     ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved</span>`}
     ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
     <button
@@ -42,6 +43,17 @@ export function Bar({ studio }) {
     </button>
     ${sheet && html`<${Sheet} studio=${studio} close=${() => setSheet(false)} />`}
   </header>`;
+}
+
+/** How far the studio is that gets ready for its first search. @param {{store: any}} props */
+function Readiness({ store }) {
+  const job = useChange(store, () => [...store.jobs.values()].find(({ kind, state }) => kind === "getting ready" && state === "running"));
+  return (
+    job &&
+    html`<span class="hint readiness" role="status">${job.words}
+      <progress value=${job.done} max=${job.of || 1} aria-label="Getting ready"></progress>
+    </span>`
+  );
 }
 
 /** @param {string} name @param {string} label @param {string | null | undefined} what @param {() => void} act */
