@@ -30,7 +30,7 @@ class _Answer(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Failure(_Answer):
-    """Why something was not done, in one line."""
+    """The reason that something was not done, in one line."""
 
     error: Annotated[str, msgspec.Meta(pattern=r"^[^\n]+\Z")]
 
@@ -235,7 +235,7 @@ class Variation(_Answer):
 
 
 class FactsView(_Answer):
-    """What was understood of a file."""
+    """An account of a file that was read."""
 
     clips: list[ClipFacts]
     joints: int
