@@ -323,28 +323,26 @@ def _room() -> int:
 # --- in the worker ----------------------------------------------------------------------------------------------------
 
 _home: Path | None = None
-_engines: OrderedDict[str, Engine] = OrderedDict()
+_engines: OrderedDict[tuple[str, int], Engine] = OrderedDict()
 
 
 def engine_of(name: str) -> Engine:
-    """Return the engine of a corpus in this worker, loaded when it is asked for first.
+    """Return the engine of a corpus in this worker, loaded when it is asked for first, or was built anew.
 
     Raises:
         MotionMindError: there is no such corpus.
     """
+    from motionmind.corpus import store
     from motionmind.tween.engine import Engine
 
-    if name not in _engines:
-        _engines[name] = Engine.load(name, _home)
+    manifest = store.locate(name, _home) / store.MANIFEST
+    known = name, manifest.stat().st_mtime_ns
+    if known not in _engines:
+        _engines[known] = Engine.load(name, _home)
         while len(_engines) > _ENGINES:
             _engines.popitem(last=False)
-    _engines.move_to_end(name)
-    return _engines[name]
-
-
-def forget_engine(name: str) -> None:
-    """Forget a corpus in this worker, so that it is loaded again."""
-    _engines.pop(name, None)
+    _engines.move_to_end(known)
+    return _engines[known]
 
 
 def _work(connection: Connection, home: Path | None, warm: str) -> None:
