@@ -117,14 +117,22 @@ class Job:
         if state == "done":
             try:
                 self.shown = self._finish(value) if self._finish else None
-            except MotionMindError as error:
-                state, words = "failed", str(error)
+            except Exception as error:
+                state, words = "failed", _words_of(error)
         self.state, self.words = state, words or self.words
         if state == "done":
             self._result.set_result(value)
         else:
             kind = JobCancelledError if state == "cancelled" else MotionMindError
             self._result.set_exception(kind(words))
+
+
+def _words_of(error: Exception) -> str:
+    """Return an error as a line; what nobody foresaw goes to the terminal."""
+    if isinstance(error, MotionMindError):
+        return str(error)
+    traceback.print_exception(error, file=sys.stderr)
+    return "this went wrong; the terminal says how"
 
 
 def _seen(future: asyncio.Future[Any]) -> None:
@@ -246,8 +254,12 @@ class Workers:
         elif message[0] == "report":
             _, job.done, job.of, words, partial = message
             job.words = words or job.words
-            if partial is not None:
-                job.take_partial(partial)
+            try:
+                if partial is not None:
+                    job.take_partial(partial)
+            except Exception as error:
+                job.end("failed", words=_words_of(error))
+                self.cancel(job)
         else:
             worker.job = None
             state, value = message
@@ -368,13 +380,10 @@ def _work(connection: Connection, home: Path | None, warm: str) -> None:
             return
         try:
             answer = "done", function(report, *arguments)
-        except MotionMindError as error:
-            answer = "failed", str(error)
         except MemoryError:
             answer = "failed", "there is not enough memory for this"
-        except Exception:
-            traceback.print_exc(file=sys.stderr)
-            answer = "failed", "this went wrong; the terminal says how"
+        except Exception as error:
+            answer = "failed", _words_of(error)
         with suppress(OSError):
             connection.send(answer)
 

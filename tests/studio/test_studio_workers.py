@@ -102,15 +102,20 @@ def test_a_job_that_fails_says_so_in_a_line_and_the_next_one_runs(function: Any,
     run(check)
 
 
-def test_what_cannot_be_finished_fails() -> None:
-    def full(_: int) -> None:
-        raise MotionMindError("no space left on device")
+@pytest.mark.parametrize("hook", ["finish", "collect"])
+@pytest.mark.parametrize(
+    ("error", "words"), [(MotionMindError("no space left"), "no space left"), (KeyError(), "went wrong")]
+)
+def test_what_cannot_be_taken_in_fails_and_the_next_job_runs(hook: str, error: Exception, words: str) -> None:
+    def broken(_: int) -> None:
+        raise error
 
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
-        job = workers.submit("sum", working.add, 2, 3, finish=full)
-        with pytest.raises(MotionMindError, match="no space left"):
+        job = workers.submit("sum", working.add, 2, 3, **{hook: broken})
+        with pytest.raises(MotionMindError, match=words):
             await job.result()
-        assert told[-1]["state"] == "failed"
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+        assert [one["state"] for one in told if one["id"] == job.id][-1] == "failed"
 
     run(check)
 
