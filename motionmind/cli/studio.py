@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,6 +61,8 @@ def studio(
     lies beside it. Without FILE a new project begins in the user's data folder. It needs the extra: pip install
     "motionmind[studio]".
     """
+    import webbrowser  # here, for other commands open none
+
     try:
         from motionmind.studio.serving import Server
         from motionmind.studio.studio import Studio

@@ -25,14 +25,14 @@ _FOREVER = "private, max-age=31536000, immutable"
 
 
 class Edited(msgspec.Struct, forbid_unknown_fields=True):
-    """What a window sends to edit."""
+    """An edit, and the window that it is done in."""
 
     window: Window
     edit: Edit
 
 
 class Windowed(msgspec.Struct, forbid_unknown_fields=True):
-    """What a window sends to take back, or do again."""
+    """The window that takes back, or does again."""
 
     window: Window
 

@@ -12,9 +12,10 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, Router
 
 from motionmind.studio import api, between, export, imports, posing, seams, varied
+from motionmind.studio.answers import Entering
 from motionmind.studio.guard import ENTER, Application, Guard, Message, Receive, Send, policy
 from motionmind.studio.pages import read_page
-from motionmind.studio.schema import Entering, document
+from motionmind.studio.schema import document
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 

@@ -18,7 +18,7 @@ _MOST = 32  # streams at once
 
 
 class Events:
-    """What is told, and the windows that listen."""
+    """The streams of the open windows."""
 
     def __init__(self) -> None:
         self._streams: set[_Stream] = set()
@@ -67,7 +67,7 @@ class Events:
 
 
 class _Stream:
-    """What a window is still to be told."""
+    """The events that a window is still to be told."""
 
     def __init__(self) -> None:
         self._waiting: dict[tuple[str, str], bytes] = {}

@@ -5,347 +5,36 @@ The page relies on it; tests check every answer that they get against it.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
+from motionmind.studio.answers import (
+    Begun,
+    CorpusView,
+    Entering,
+    Failure,
+    Gallery,
+    Health,
+    JobView,
+    KeptView,
+    Lines,
+    Map,
+    MovementData,
+    Nothing,
+    Opened,
+    Posed,
+    ProjectView,
+    Sheet,
+    UploadView,
+    Variation,
+)
 from motionmind.studio.api import Edited, Windowed
 from motionmind.studio.between import Acceptance, Between
 from motionmind.studio.corpora import Lesson
-from motionmind.studio.edits import Ask, Decision
-from motionmind.studio.piece import Found
 from motionmind.studio.posing import Changing, Dragging, Keeping, Opening, Telling, Turning
-from motionmind.studio.reading import ClipFacts, Fault
 from motionmind.studio.uploads import Choices
 from motionmind.studio.varied import Wish
-from motionmind.studio.view import SeamState
-from motionmind.studio.workers import JobState
-
-Text = Annotated[str, msgspec.Meta(max_length=2_000)]
-Numbers = str  # little-endian numbers in base64
-
-
-class _Answer(msgspec.Struct, forbid_unknown_fields=True):
-    """An answer, or a part of one."""
-
-
-class Failure(_Answer):
-    """Why something was not done, in one line."""
-
-    error: Annotated[str, msgspec.Meta(pattern=r"^[^\n]+\Z")]
-
-
-class Nothing(_Answer):
-    """Nothing but that it was done."""
-
-
-class Health(_Answer):
-    """Whether the studio answers."""
-
-    ready: Literal[True]
-
-
-class Entering(_Answer):
-    """The token of the URL that the terminal shows."""
-
-    token: str
-
-
-class PartView(_Answer):
-    """A stretch of a movement, placed in time and on the floor."""
-
-    key: str
-    first: int
-    last: int
-    at: float
-    seconds: float
-    place: tuple[float, float]
-    turn: float
-    inserted: bool
-
-
-class BlockView(_Answer):
-    """A stretch of the piece."""
-
-    id: str
-    source: str
-    first: int
-    last: int
-    mirrored: bool
-    key: str
-    title: Text
-    frames: int
-    at: float
-    seconds: float
-
-
-class SeamView(_Answer):
-    """A seam between two neighbours."""
-
-    left: str
-    right: str
-    number: int
-    state: SeamState
-    words: Text
-    chosen: int
-    alternatives: list[Found]
-    decision: Decision
-    ask: Ask
-    at: float
-    seconds: float
-
-
-class PieceView(_Answer):
-    """The piece."""
-
-    seconds: float
-    parts: list[PartView]
-    blocks: list[BlockView]
-    seams: list[SeamView]
-
-
-class Saved(_Answer):
-    """A saved posture, and the movement that it is."""
-
-    name: str
-    key: str
-
-
-class ProjectView(_Answer):
-    """The project as a window sees it."""
-
-    sequence: int
-    title: str
-    file: str
-    corpus: str
-    corpora: dict[str, str]
-    words: list[Text]
-    postures: list[Saved]
-    piece: PieceView
-    undo: str | None
-    redo: str | None
-
-
-class JobView(_Answer, omit_defaults=True):
-    """A job of the workers, and the data of an event `job`."""
-
-    id: str
-    kind: str
-    state: JobState
-    done: int
-    of: int
-    words: Text
-    partial: list[Any] = []
-    result: Any = None
-
-
-class Begun(_Answer):
-    """The id of a job that has begun."""
-
-    job: str
-
-
-class Skeleton(_Answer):
-    """A body's joints."""
-
-    names: list[str]
-    parents: list[int]
-    offsets: list[tuple[float, float, float]]
-
-
-class InsertionView(_Answer):
-    """A stretch that the engine made."""
-
-    times: list[float]
-    bridged: list[dict[str, int]]
-
-
-class MovementData(_Answer):
-    """A movement as the player reads it: player/README.md."""
-
-    name: str
-    first: int
-    farthest: list[int]
-    skeleton: Skeleton
-    body: dict[str, Any]
-    colours: dict[str, Any]
-    times: Numbers
-    root: Numbers
-    rotations: Numbers
-    insertions: list[InsertionView]
-
-
-class Listed(_Answer):
-    """A named posture."""
-
-    key: str
-    title: str
-
-
-class ListedClip(_Answer):
-    """A clip of a corpus."""
-
-    key: str
-    title: str
-    about: str
-    frames: int
-    seconds: float
-
-
-class ListedCorpus(_Answer):
-    """A corpus in the gallery."""
-
-    name: str
-    postures: list[Listed]
-    clips: list[ListedClip]
-
-
-class Gallery(_Answer):
-    """The postures and clips to choose from."""
-
-    corpora: list[ListedCorpus]
-    own: list[Listed]
-
-
-class Map(_Answer):
-    """A flow's attractor."""
-
-    flow: str
-    axes: Any
-    points: Numbers
-    about: str
-
-
-class Variation(_Answer):
-    """A variation of the piece."""
-
-    piece: PieceView
-    original: list[PartView]
-    places: list[int]
-    count: int
-    kept: list[str]
-    locked: list[str]
-    departs: float
-    nudge: float
-    every: int
-    trail: Numbers
-    other: Numbers
-    jumps: list[int]
-    about: dict[str, Any]
-
-
-class FactsView(_Answer):
-    """What was understood of a file."""
-
-    clips: list[ClipFacts]
-    joints: int
-    rig: str
-    filled: list[str]
-    height: float
-    unit: str
-    is_guessed: bool
-    doubt: str
-    faults: list[Fault]
-    notes: list[str]
-    people: bool
-
-
-class UploadView(_Answer):
-    """A file that somebody brought."""
-
-    id: str
-    name: str
-    size: int
-    kind: str
-    choices: Choices
-    facts: FactsView | None
-    error: str
-    skips: list[int] = []
-
-
-class KeptView(_Answer):
-    """A movement that the project keeps now."""
-
-    key: str
-    frames: int = 1
-
-
-class CorpusView(_Answer):
-    """A corpus, or why it cannot be read."""
-
-    name: str
-    title: str
-    own: bool
-    error: str
-    rate: Any = None
-    clips: int | None = None
-
-
-class SheetClip(_Answer):
-    """A clip on a corpus's sheet, and the frames that show it."""
-
-    key: str
-    name: str
-    about: str
-    frames: int
-    seconds: float
-    pictures: list[int]
-    mended: int
-
-
-class Sheet(_Answer):
-    """A corpus looked through."""
-
-    name: str
-    title: str
-    author: str
-    source: str
-    licence: str
-    body: str
-    postures: int
-    rate: float | None
-    clips: list[SheetClip]
-
-
-class TurnView(_Answer):
-    """An angle of a joint, degrees."""
-
-    joint: str
-    words: str
-    angle: str
-    label: str
-    least: float
-    most: float
-    degrees: float
-
-
-class Posed(_Answer):
-    """A posture in the editor; `turns` or the degrees of the same angles."""
-
-    rotations: list[float]
-    root: tuple[float, float, float]
-    standing: list[str]
-    corpus: str
-    known: list[Literal["seen", "near", "unseen"]]
-    turns: list[TurnView] | None = None
-    degrees: list[float] | None = None
-    words: str = ""
-
-
-class Opened(Posed):
-    """A posture, and all that the editor shows of its body."""
-
-    key: str = ""
-    title: str = ""
-    joints: list[dict[str, str]] = []
-    handles: list[dict[str, str]] = []
-    mirrors: bool = False
-
-
-class Lines(_Answer):
-    """Lines of a score."""
-
-    lines: Any
 
 
 class Call(NamedTuple):

@@ -117,14 +117,22 @@ class Job:
         if state == "done":
             try:
                 self.shown = self._finish(value) if self._finish else None
-            except MotionMindError as error:
-                state, words = "failed", str(error)
+            except Exception as error:
+                state, words = "failed", _words_of(error)
         self.state, self.words = state, words or self.words
         if state == "done":
             self._result.set_result(value)
         else:
             kind = JobCancelledError if state == "cancelled" else MotionMindError
             self._result.set_exception(kind(words))
+
+
+def _words_of(error: Exception) -> str:
+    """Return an error as a line; what nobody foresaw goes to the terminal."""
+    if isinstance(error, MotionMindError):
+        return str(error)
+    traceback.print_exception(error, file=sys.stderr)
+    return "this went wrong; the terminal says how"
 
 
 def _seen(future: asyncio.Future[Any]) -> None:
@@ -246,8 +254,12 @@ class Workers:
         elif message[0] == "report":
             _, job.done, job.of, words, partial = message
             job.words = words or job.words
-            if partial is not None:
-                job.take_partial(partial)
+            try:
+                if partial is not None:
+                    job.take_partial(partial)
+            except Exception as error:
+                job.end("failed", words=_words_of(error))
+                self.cancel(job)
         else:
             worker.job = None
             state, value = message
@@ -323,28 +335,26 @@ def _room() -> int:
 # --- in the worker ----------------------------------------------------------------------------------------------------
 
 _home: Path | None = None
-_engines: OrderedDict[str, Engine] = OrderedDict()
+_engines: OrderedDict[tuple[str, int], Engine] = OrderedDict()
 
 
 def engine_of(name: str) -> Engine:
-    """Return the engine of a corpus in this worker, loaded when it is asked for first.
+    """Return the engine of a corpus in this worker, loaded when it is asked for first, or was built anew.
 
     Raises:
         MotionMindError: there is no such corpus.
     """
+    from motionmind.corpus import store
     from motionmind.tween.engine import Engine
 
-    if name not in _engines:
-        _engines[name] = Engine.load(name, _home)
+    manifest = store.locate(name, _home) / store.MANIFEST
+    known = name, manifest.stat().st_mtime_ns
+    if known not in _engines:
+        _engines[known] = Engine.load(name, _home)
         while len(_engines) > _ENGINES:
             _engines.popitem(last=False)
-    _engines.move_to_end(name)
-    return _engines[name]
-
-
-def forget_engine(name: str) -> None:
-    """Forget a corpus in this worker, so that it is loaded again."""
-    _engines.pop(name, None)
+    _engines.move_to_end(known)
+    return _engines[known]
 
 
 def _work(connection: Connection, home: Path | None, warm: str) -> None:
@@ -370,13 +380,10 @@ def _work(connection: Connection, home: Path | None, warm: str) -> None:
             return
         try:
             answer = "done", function(report, *arguments)
-        except MotionMindError as error:
-            answer = "failed", str(error)
         except MemoryError:
             answer = "failed", "there is not enough memory for this"
-        except Exception:
-            traceback.print_exc(file=sys.stderr)
-            answer = "failed", "this went wrong; the terminal says how"
+        except Exception as error:
+            answer = "failed", _words_of(error)
         with suppress(OSError):
             connection.send(answer)
 

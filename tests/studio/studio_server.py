@@ -18,8 +18,9 @@ from urllib.parse import quote, urlsplit
 
 import msgspec
 
+from motionmind.studio.answers import Failure
 from motionmind.studio.project import Project
-from motionmind.studio.schema import CALLS, Failure
+from motionmind.studio.schema import CALLS
 from motionmind.studio.serving import Server
 from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys

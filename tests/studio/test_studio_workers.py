@@ -10,13 +10,16 @@ from typing import Any
 
 import pytest
 import working
+from bundled_clips import ballet_clip
 from studio_server import Served
 
+from motionmind.corpus import store
 from motionmind.errors import MotionMindError
 from motionmind.studio import events as events_module
 from motionmind.studio import workers as workers_module
 from motionmind.studio.events import Events
 from motionmind.studio.workers import Job, JobCancelledError, Workers
+from motionmind.tween.engine import Engine
 
 
 def run(check: Callable[[Workers, list[dict[str, Any]]], Any], home: Path | None = None, number: int = 1) -> None:
@@ -99,15 +102,20 @@ def test_a_job_that_fails_says_so_in_a_line_and_the_next_one_runs(function: Any,
     run(check)
 
 
-def test_what_cannot_be_finished_fails() -> None:
-    def full(_: int) -> None:
-        raise MotionMindError("no space left on device")
+@pytest.mark.parametrize("hook", ["finish", "collect"])
+@pytest.mark.parametrize(
+    ("error", "words"), [(MotionMindError("no space left"), "no space left"), (KeyError(), "went wrong")]
+)
+def test_what_cannot_be_taken_in_fails_and_the_next_job_runs(hook: str, error: Exception, words: str) -> None:
+    def broken(_: int) -> None:
+        raise error
 
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
-        job = workers.submit("sum", working.add, 2, 3, finish=full)
-        with pytest.raises(MotionMindError, match="no space left"):
+        job = workers.submit("sum", working.add, 2, 3, **{hook: broken})
+        with pytest.raises(MotionMindError, match=words):
             await job.result()
-        assert told[-1]["state"] == "failed"
+        assert await workers.submit("sum", working.add, 2, 3).result() == 5
+        assert [one["state"] for one in told if one["id"] == job.id][-1] == "failed"
 
     run(check)
 
@@ -122,6 +130,22 @@ def test_a_worker_keeps_its_corpus() -> None:
             await workers.submit("know", working.know, "nothing").result()
 
     run(check)
+
+
+def test_a_corpus_that_was_built_anew_is_loaded_anew(tmp_path: Path) -> None:
+    def learn(*clips: str) -> None:
+        Engine.fit([ballet_clip(clip) for clip in clips], name="mine").save(store.place_for("mine", tmp_path))
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        learn("plies")
+        small, process = await workers.submit("know", working.know, "mine").result()
+        learn("plies", "tendus")
+        assert await workers.submit("know", working.know, "mine").result() > (small, process)
+        store.delete("mine", tmp_path)
+        with pytest.raises(MotionMindError, match="no corpus"):
+            await workers.submit("know", working.know, "mine").result()
+
+    run(check, tmp_path)
 
 
 def test_workers_that_do_not_begin_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
