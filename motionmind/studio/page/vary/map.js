@@ -1,11 +1,16 @@
 /** The map of the attractor: the piece along it, the variation over it, and the start, which a hand drags. */
 
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.js";
-import { useChange } from "../shell/hooks.js";
+import { useChange, useKeys } from "../shell/hooks.js";
 import { Chart, draw, drawHead, points } from "./chart.js";
 import { placeAt } from "./varying.js";
 
 const STEPS = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 40, PageDown: -40 });
+const SHEET = [
+  { shown: ["←", "→"], does: "on the map: the start, along the attractor; with Shift farther", group: "Variations" },
+  { shown: ["PgUp", "PgDn"], does: "on the map: the start, far along", group: "Variations" },
+  { shown: ["Home"], does: "on the map: the usual start", group: "Variations" },
+];
 const NOTHING = new Float32Array(0);
 /** @type {Map<string, Promise<{chart: Chart, about: string}>>} */
 const charts = new Map();
@@ -26,6 +31,7 @@ function chartOf(api, flow) {
  */
 export function AttractorMap({ studio, varying, piece, playing }) {
   const { viewer } = studio;
+  useKeys(studio, SHEET);
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [chart, setChart] = useState(/** @type {Chart | null} */ (null));
   const [held, setHeld] = useState(false);

@@ -161,7 +161,10 @@ function useView(studio, varying, piece) {
   useEffect(() => {
     if (looking) show(undefined, beside).catch(failed);
   }, [proposal, piece, beside, looking]);
-  useEffect(() => () => studio.viewer.back(), []);
+  useEffect(() => {
+    studio.viewer.back(); // whatever another panel left there is not what is varied
+    return () => studio.viewer.back();
+  }, []);
   return {
     beside,
     playing: looking || isPiece,
