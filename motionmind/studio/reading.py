@@ -42,7 +42,7 @@ _ARM_SLOPE = 0.35  # of an arm that is stretched out level; 1 is upright
 
 
 class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to read.
+    """A file to read, and how.
 
     Attributes:
         file: name of the file in the folder.
@@ -114,7 +114,7 @@ class Body(msgspec.Struct, frozen=True):
 
 
 class Facts(msgspec.Struct, frozen=True):
-    """What was understood of a file.
+    """Facts of a file that was read.
 
     Attributes:
         clips: its clips.
