@@ -1,4 +1,4 @@
-"""How well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
+"""The measure of how well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
 
 from __future__ import annotations
 
