@@ -65,7 +65,7 @@ export function AttractorMap({ studio, varying, piece, playing }) {
       const [width, height] = [element.clientWidth, element.clientHeight].map((size) => Math.round(size * ratio));
       if (!width || !height) return;
       if (below.width !== width || below.height !== height) {
-        for (const canvas of [element, below]) Object.assign(canvas, { width, height });
+        for (const sheet of [element, below]) Object.assign(sheet, { width, height });
         chart.resize(element.clientWidth, element.clientHeight);
         const under = /** @type {CanvasRenderingContext2D} */ (below.getContext("2d"));
         under.scale(ratio, ratio);
