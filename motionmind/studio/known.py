@@ -1,4 +1,4 @@
-"""How well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
+"""The measure of how well a corpus knows a posture, joint by joint, and the nearest to it that it knows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _COUNTED = 1e-9  # degrees by which rounding may lead over a tolerance
 
 
 class Memory:
-    """What a corpus has seen of each joint."""
+    """The orientations that a corpus has seen, joint by joint."""
 
     def __init__(self, learned: Learned) -> None:
         self.corpus, self.space = learned.corpus, learned.space
