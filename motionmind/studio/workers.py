@@ -335,7 +335,7 @@ def _room() -> int:
 # --- in the worker ----------------------------------------------------------------------------------------------------
 
 _home: Path | None = None
-_engines: OrderedDict[tuple[str, int], Engine] = OrderedDict()
+_engines: OrderedDict[tuple[str, int, int], Engine] = OrderedDict()
 
 
 def engine_of(name: str) -> Engine:
@@ -347,8 +347,8 @@ def engine_of(name: str) -> Engine:
     from motionmind.corpus import store
     from motionmind.tween.engine import Engine
 
-    manifest = store.locate(name, _home) / store.MANIFEST
-    known = name, manifest.stat().st_mtime_ns
+    status = (store.locate(name, _home) / store.MANIFEST).stat()
+    known = name, status.st_ino, status.st_mtime_ns
     if known not in _engines:
         _engines[known] = Engine.load(name, _home)
         while len(_engines) > _ENGINES:
