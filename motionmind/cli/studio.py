@@ -57,9 +57,9 @@ def studio(
 ) -> None:
     """Open the studio: a page in the browser in which to compose, vary and pose movement, until Ctrl-C.
 
-    FILE is a project (.motionmind), which is made if it is not there, or movement to begin with, whose project then
-    lies beside it. Without FILE a new project begins in the user's data folder. It needs the extra: pip install
-    "motionmind[studio]".
+    FILE is a project (.motionmind), which is made if it is not there, or movement or a variation to begin with, whose
+    project then lies beside it. Without FILE a new project begins in the user's data folder. It needs the extra: pip
+    install "motionmind[studio]".
     """
     import webbrowser  # here, for other commands open none
 
@@ -106,6 +106,7 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
     from motionmind.studio.edits import Insert, Several
     from motionmind.studio.journal import SUFFIX
     from motionmind.studio.project import Project
+    from motionmind.variation.variation_json import is_variation
 
     if file is None:
         return Project.create(_new(home), corpus, home)
@@ -116,6 +117,15 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
         return Project.open(place, home)
     if place == file:
         return Project.create(place, corpus, home)
+    if is_variation(file):
+        from motionmind.studio.beginning import corpus_of, take_in
+        from motionmind.variation.variation_json import read_variation
+
+        variation = read_variation(file)
+        judge = corpus_of(variation)
+        project = Project.create(place, judge if judge and _is_here(judge, home) else corpus, home)
+        take_in(project, variation, _TERMINAL)
+        return project
     source = parse_movement(str(file), home).source
     motions = read_movements(source, (), home, joints=None, unit=None, asf=None, source_fps=None)
     project = Project.create(place, corpus, home)
@@ -126,6 +136,16 @@ def _project(file: Path | None, corpus: str, home: Path | None) -> Project:
     ]
     project.edit(_TERMINAL, Several(tuple(blocks), f"begin with {displayed(file.name)}"))
     return project
+
+
+def _is_here(corpus: str, home: Path | None) -> bool:
+    from motionmind.corpus import store
+
+    try:
+        store.locate(corpus, home)
+    except MotionMindError:
+        return False
+    return True
 
 
 def _new(home: Path | None) -> Path:

@@ -73,7 +73,7 @@ def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Fi
             findings.append(Finding(question.name, True, f"cannot be judged: {_line(error)}", ()))
             continue
         searched = None if joints or question.wished else ()
-        findings.append(Finding(question.name, bool(joints), _why(joints, corpus), searched))
+        findings.append(Finding(question.name, bool(joints), why_abrupt(joints, corpus), searched))
     return findings
 
 
@@ -106,7 +106,7 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     return list(distinct.values()), ""
 
 
-def _why(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
+def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
     """Say in a choreographer's words what makes a transition abrupt."""
     if not joints:
         return f"known in {displayed(corpus)}"

@@ -110,6 +110,16 @@ def read_variation(path: FilePath) -> Variation:
         raise FormatError(f"variation: {error}", path=path) from error
 
 
+def is_variation(path: FilePath) -> bool:
+    """Tell whether the file at `path` is JSON with a variation in it, damaged or not."""
+    if Path(path).suffix.lower() != ".json":
+        return False
+    try:
+        return "variation" in msgspec.json.decode(read_bytes(path), type=dict[str, msgspec.Raw])
+    except (msgspec.DecodeError, UnicodeDecodeError, FormatError):
+        return False
+
+
 def write_variation(path: FilePath, variation: Variation) -> None:
     """Write a variation, whole or not at all; MotionMindError if it cannot be written.
 
