@@ -1,4 +1,4 @@
-"""The beginning of a project: a variation that `motionmind vary` wrote, with the insertions and decisions at its seams."""
+"""The beginning of a project: a variation, with the insertions and decisions at its seams."""
 
 from __future__ import annotations
 
