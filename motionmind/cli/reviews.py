@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from motionmind.variation.variation import Variation
 
 
-@command("motionmind review variation.json --approve 1,2 --discard 3 --list")
+@command("motionmind review variation.json --approve 1,2 --discard 4 --list")
 @click.argument("file", type=FILE)
 @output(
     "Write the edited variation: .json  [default: FILE itself]; with --play a picture (.png), a film (.gif, .mp4, "

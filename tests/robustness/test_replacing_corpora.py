@@ -266,7 +266,7 @@ def test_2000_loads_beside_two_writers_are_each_of_one_version(mine: Path, write
         reader.start()
     for reader in readers:
         reader.join()
-    assert not failures
+    assert not failures, [str(one) for one in failures]
     assert len(seeds) == 2000
     assert len(set(seeds)) > 20  # it was replaced meanwhile
 
