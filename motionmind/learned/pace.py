@@ -148,10 +148,10 @@ class Pace:
             postures: orientations of their joints [n, J, 4], as `motionmind.corpus.corpus.Corpus.to_chains` gives them.
             shown: those of the corpus's postures, in the same way [N, J, 4].
         """
-        # The sum of squared cosines of half the angles; ties are resolved by number, on any machine.
-        order = (
-            np.argsort(-np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1), kind="stable") for one in postures
-        )
+        # The sum of squared cosines of half the angles. What is equal but for rounding is taken by number, on any
+        # machine.
+        alike = (np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1) for one in postures)
+        order = (np.argsort(-np.round(one, 9), kind="stable") for one in alike)
         return np.array([np.exp(np.log(STILL + self.lulls[near[:ALIKE]]).mean()) - STILL for near in order])
 
 

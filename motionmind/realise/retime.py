@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats
+from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.corpus.corpus import Corpus
@@ -100,5 +101,10 @@ def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool,
         rot.normalise(rotation_spline(times, motion.rotations, was)),
         natural_spline(times, motion.root, was),
     )
+    # A spline between frames may lead a little deeper into the floor than they do.
+    low = lowest_height(motion.skeleton, motion.rotations, motion.root)
+    floor = np.interp(was, times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
+    deep = np.minimum(np.interp(was, times, low), floor) - lowest_height(motion.skeleton, rotations, root)
+    root[:, 1] += np.maximum(deep, 0.0)
     rotations[[0, -1]], root[[0, -1]] = motion.rotations[[0, -1]], motion.root[[0, -1]]
     return Motion(motion.skeleton, rotations, root, later.frames), later
