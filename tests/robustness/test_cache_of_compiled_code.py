@@ -203,7 +203,7 @@ def test_many_processes_that_compile_at_once_all_succeed(tmp_path: Path) -> None
 import sys
 import numpy as np
 from motionmind.geometry.distances import squared_distance
-kinds = [np.float32, np.float64, np.int32, np.int64]
+kinds = [np.float32, np.float64, np.int64]
 first = int(sys.argv[1])
 for kind in kinds[first:] + kinds[:first]:
     print(squared_distance(np.ones((2, 4), kind), np.zeros((2, 4), kind)))
@@ -222,8 +222,8 @@ print(sum(squared_distance._cache_misses.values()))
         )
 
     for is_kept in (False, True):
-        outputs = [process.communicate() for process in [start(first) for first in range(4)]]
+        outputs = [process.communicate() for process in [start(first) for first in range(3)]]
         assert {error for _, error in outputs} == {""}
-        assert {tuple(sorted(out.splitlines()[:4])) for out, _ in outputs} == {("8.0",) * 4}
+        assert {tuple(sorted(out.splitlines()[:3])) for out, _ in outputs} == {("8.0",) * 3}
         if is_kept:
             assert {out.splitlines()[-1] for out, _ in outputs} == {"0"}
