@@ -284,6 +284,8 @@ def load(folder: Path) -> Stored:
             # Only a version that is current while it is held is complete, and stays so.
             if _read(path) == data:
                 if not there:
+                    if place.is_dir():  # made since, under a number that was free again
+                        continue
                     raise FormatError(f"there is no folder {place.name} beside it; {remedy(folder)}", path=path)
                 shapes = manifest.get("arrays")
                 if isinstance(shapes, list) and all(isinstance(name, str) for name in shapes):
