@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import insect
+from hypothesis import given
+from hypothesis import strategies as st
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
@@ -82,6 +84,18 @@ def test_a_way_is_what_a_body_does_between_two_postures() -> None:
 def test_still_moments_are_found_where_moves_meet() -> None:
     clip = reaches(human23(), [0.8, 1.2, 0.6, 1.0], [1.0, 1.0, 2.0, 2.0])
     np.testing.assert_allclose(find_still(way_of(clip).joints.mean(axis=1)), np.cumsum([24, 36, 18]), atol=4)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_still_moments_do_not_hang_on_rounding(seed: int) -> None:
+    """Joints of keyframed movement turn evenly from key to key: whether one step is less than the next is chance."""
+    chance = np.random.default_rng(seed)
+    lasts = chance.integers(20, 60, size=6)
+    steps = np.repeat(np.where(np.arange(6) % 2, 0.002, 0.05), lasts)
+    rounded = steps * (1.0 + 1e-14 * chance.standard_normal(len(steps)))
+    still = find_still(steps)
+    assert len(still) == 2  # nothing comes after the third slow stretch
+    np.testing.assert_array_equal(find_still(rounded), still)
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

@@ -100,7 +100,7 @@ def test_a_corpus_is_as_if_it_were_built_today(archive: Path, today: Engine, tmp
         for name, array in vars(getattr(today.grammar, part)).items():
             np.testing.assert_allclose(getattr(getattr(engine.grammar, part), name), array, atol=1e-3, err_msg=name)
     a, b = (read_motion(PIECE).posture(frame) for frame in (0, 6))
-    tween, other = engine.tween(a, b, moves=5), today.tween(a, b, moves=5)
+    tween, other = engine.tween(a, b), today.tween(a, b)
     np.testing.assert_array_equal(tween.path, other.path)
     assert tween.status == "optimal"
     assert {path: name for path, name in contents(folder).items() if path.name != "checked"} == before
