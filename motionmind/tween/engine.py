@@ -53,7 +53,7 @@ class Engine(LearnedCorpus):
     >>> tween.status, tween.moves
     ('optimal', 3)
     >>> engine.tween("ballet/arabesque", "ballet/fifth").moves
-    6
+    7
     """
 
     def __repr__(self) -> str:

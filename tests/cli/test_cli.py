@@ -89,7 +89,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
     table = {line.split()[0]: line for line in ran.out.splitlines()}
     table.pop("beware", None)  # where it goes beyond the corpus
     assert list(table) == [
-        "6",
+        "7",
         "moves",
         "pace",
         "cost",
@@ -117,7 +117,7 @@ def test_tween_prints_a_table_and_writes_what_was_asked_for(run: Run) -> None:
 def test_a_tween_is_told_in_plain_words_and_that_nothing_is_written(run: Run) -> None:
     ran = run("tween", ARABESQUE, FIFTH, "--corpus", "ballet")
     assert ran.out.splitlines() == [
-        "6 moves in 2.3 s, every one seen in ballet; proven the best of its kind; the left foot stays in place",
+        "7 moves in 2.7 s, every one seen in ballet; proven the best of its kind; the left foot stays in place",
         "written   nothing: name a file by -o",
     ]
 

@@ -102,9 +102,11 @@ def test_the_flows_are_those_there_are() -> None:
 
 @pytest.mark.parametrize("manifest", ["", "[]", "{", '{"clips": 3}', '{"scores": 3}', '{"clips": [{}], "skeleton": 1}'])
 def test_what_cannot_be_read_completes_to_nothing(complete: Complete, home: Path, manifest: str) -> None:
-    (home / "home/corpora/mine/manifest.json").write_text(manifest, "utf-8")
-    assert complete("tween", "mine/") == ["file,mine/"]
-    assert complete("graph", "--corpus", "mine", "--joint", "") == []
+    folder = home / "home/corpora/damaged"
+    folder.mkdir()
+    (folder / "manifest.json").write_text(manifest, "utf-8")
+    assert complete("tween", "damaged/") == ["file,damaged/"]
+    assert complete("graph", "--corpus", "damaged", "--joint", "") == []
 
 
 def test_a_tab_imports_no_numerics(home: Path) -> None:

@@ -91,7 +91,7 @@ def test_where_nothing_differs_by_so_much_the_error_says_how_much_can(ballet: En
     ends = read_posture(A), read_posture(B)
     pinned = {"left_wrist": "A"}
     plain = ballet.tween(*ends, pin=pinned)
-    words = r"no path of 6 moves was found that differs by 100\.0% from the earlier one; none can by more than 95\.7%"
+    words = r"no path of 7 moves was found that differs by 100\.0% from the earlier one; none can by more than 95\.7%"
     with pytest.raises(NoPathError, match=words) as fault:
         ballet.tween(*ends, pin=pinned, unlike=[plain], differ=1.0)
     most = 22 / 23  # of the joints
@@ -129,5 +129,5 @@ def test_the_command_line_prints_a_table_and_says_where_there_are_no_more(run: R
     assert run(*asked).out.splitlines() == [*lines[:3], lines[-1]]
     ran = run(*asked, "--differ", 0.9, "-o", "out.json")
     assert ran.code == 0
-    assert "note: 2 of 3 found: no path of 6 moves was found that differs by 90.0% from each of 2" in ran.err
+    assert "note: 2 of 3 found: no path of 7 moves was found that differs by 90.0% from each of 2" in ran.err
     assert [path.name for path in sorted(Path().glob("*.json"))] == ["out-1.json", "out-2.json"]

@@ -348,8 +348,14 @@ def chain_of(tween: Tween, joint: str) -> Int32s:
 
 
 def test_a_range_of_moves_is_kept_and_its_best_is_the_best_of_its_numbers(engine: Engine, plain: Tween) -> None:
-    found = join(engine, moves=(6, 8))
-    assert found.cost == pytest.approx(min(join(engine, moves=moves).cost for moves in (6, 7, 8)), abs=1e-6)
+    found, *narrower = (join(engine, moves=moves) for moves in ((6, 8), (6, 7), (7, 8)))
+    price = min(other.length.cost for other in narrower if other.length)
+    assert found.length is not None
+    assert found.length.cost == pytest.approx(price, abs=1e-6)
+    assert found.cost == pytest.approx(join(engine, moves=found.moves).cost, abs=1e-6)
+    heedless = join(engine, moves=(6, 8), without=["pace"], guide=0.0)
+    costs = [join(engine, moves=moves, guide=0.0).cost for moves in (6, 7, 8)]
+    assert heedless.cost == pytest.approx(min(costs), abs=1e-6)
     assert 6 <= found.moves <= 8
     assert join(engine, moves=(1, 60)).cost == pytest.approx(plain.cost, abs=1e-6)
 
