@@ -20,7 +20,7 @@ from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Sever
 from motionmind.studio.piece import End, Finding, Found, State, key_of, question_of
 from motionmind.studio.project import RefusedError
 from motionmind.studio.sides import options_of, sides_of
-from motionmind.studio.workers import engine_of
+from motionmind.studio.worker_loop import engine_of
 
 if TYPE_CHECKING:
     from motionmind.studio.sides import Sides
@@ -129,7 +129,7 @@ class _Desk:
         corpus = project.state.corpus
         question = question_of(ends, asked.options, corpus, project.versions)
         seeking = _Search(Between(a, b, asked.options), question)
-        job = self._studio.workers.submit("between", search, corpus, sides, options, collect=seeking.take)
+        job = self._studio.workers.submit("between", search, corpus, sides, options, collect=seeking.take, urgent=True)
         self._searches[job.id] = seeking
         while len(self._searches) > _KEPT:
             self._searches.popitem(last=False)

@@ -25,7 +25,8 @@ from motionmind.studio.alternatives import Account, account, find, usual_likelih
 from motionmind.studio.edits import Ask
 from motionmind.studio.piece import Finding, Found, Seam
 from motionmind.studio.sides import Sides, options_of, sides_of
-from motionmind.studio.workers import JobCancelledError, engine_of
+from motionmind.studio.worker_loop import engine_of
+from motionmind.studio.workers import JobCancelledError
 from motionmind.variation.seams import AbruptJoint, TransitionTest
 
 if TYPE_CHECKING:

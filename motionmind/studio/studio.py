@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
 _ENGINES = 2  # that the server keeps loaded
+_FIRST = 2.0  # seconds in which the page comes first, and workers that start would keep it waiting
 
 
 class Studio:
@@ -69,6 +71,7 @@ class Studio:
         """Start the workers, in the event loop."""
         self.workers = Workers(self.home, self._tell_of_job, self.project.state.corpus, self._processes)
         threading.Thread(target=_warm, args=(self.project.state.corpus, self.home), daemon=True).start()
+        asyncio.get_running_loop().call_later(_FIRST, self.workers.begin)
         if self._first is not None:
             self.workers.submit("getting ready", self._first)
 

@@ -5,29 +5,25 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import os
-import signal
-import sys
 import threading
-import traceback
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from motionmind.errors import MotionMindError
+from motionmind.studio.worker_loop import words_of, work
 
 if TYPE_CHECKING:
-    from motionmind.tween.engine import Engine
+    pass
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
-_ENGINES = 2  # that a worker keeps loaded
 _TRIES = 3  # starts of a worker that ends before it has begun
 _JOBS = 200  # that are over and can still be asked for
-_FEW = 4  # processors with which a second worker would only slow the first
-_MEMORY = 6 * 2**30  # bytes of it that allow for a second worker
+_FEW = 2  # processors with which a second worker does not slow the first
+_MEMORY = 2**30  # bytes that are free, of which a second worker takes less than a fifth
 
 
 class Report(Protocol):
@@ -54,6 +50,7 @@ class Job:
     Attributes:
         id: its name.
         kind: what it is for.
+        urgent: whether somebody waits for it.
         state: how it stands.
         done, of, words: how far it has come.
         partial: parts of the result so far, plain values for JSON.
@@ -68,8 +65,9 @@ class Job:
         task: tuple[Callable[..., Any], tuple[Any, ...]],
         finish: Callable[[Any], Any] | None,
         collect: Callable[[Any], Any] | None,
+        urgent: bool,
     ) -> None:
-        self.id, self.kind = f"j{number}", kind
+        self.id, self.kind, self.urgent = f"j{number}", kind, urgent
         self.state: JobState = "waiting"
         self.done, self.of, self.words = 0, 0, ""
         self.partial: list[Any] = []
@@ -118,21 +116,13 @@ class Job:
             try:
                 self.shown = self._finish(value) if self._finish else None
             except Exception as error:
-                state, words = "failed", _words_of(error)
+                state, words = "failed", words_of(error)
         self.state, self.words = state, words or self.words
         if state == "done":
             self._result.set_result(value)
         else:
             kind = JobCancelledError if state == "cancelled" else MotionMindError
             self._result.set_exception(kind(words))
-
-
-def _words_of(error: Exception) -> str:
-    """Return an error as a line; what nobody foresaw goes to the terminal."""
-    if isinstance(error, MotionMindError):
-        return str(error)
-    traceback.print_exception(error, file=sys.stderr)
-    return "this went wrong; the terminal says how"
 
 
 def _seen(future: asyncio.Future[Any]) -> None:
@@ -142,12 +132,16 @@ def _seen(future: asyncio.Future[Any]) -> None:
 
 
 class Workers:
-    """The worker processes, and the jobs that wait for them, the oldest first."""
+    """The worker processes, and the jobs that wait for them: the urgent ones first, and of those the oldest.
+
+    Where there are several workers, one of them does nothing but what is urgent, so that nobody waits for what goes on
+    in the background.
+    """
 
     def __init__(
         self, home: Path | None, tell: Callable[[Job], None], warm: str = "", number: int | None = None
     ) -> None:
-        """Start the workers.
+        """Set up the workers, which start with `begin`, or else with the first job.
 
         Args:
             home: the folder of the user's corpora; None for the usual one.
@@ -160,13 +154,21 @@ class Workers:
         self._numbers = count(1)
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
-        self._workers = [_Worker(self, home, warm) for _ in range(number or _room())]
+        self._number = number or _room()
+        self._has_begun = False  # whether the processes are started
+        self._workers: list[_Worker] = []
         self._failures = 0  # workers that have ended before they began, one after another
 
     @property
     def jobs(self) -> list[Job]:
         """The jobs that wait or run."""
         return [job for job in self._jobs.values() if job.state in ("waiting", "running")]
+
+    def begin(self) -> None:
+        """Start the processes, unless they are started."""
+        if not self._has_begun:
+            self._has_begun = True
+            self._workers = [_Worker(self, self._home, self._warm) for _ in range(self._number)]
 
     def submit(
         self,
@@ -175,6 +177,7 @@ class Workers:
         *arguments: Any,
         finish: Callable[[Any], Any] | None = None,
         collect: Callable[[Any], Any] | None = None,
+        urgent: bool = False,
     ) -> Job:
         """Have a worker call `function(report, *arguments)` when one is free.
 
@@ -184,14 +187,16 @@ class Workers:
             arguments: what can be pickled.
             finish: called here with the result, returns what the page is shown of it, plain values for JSON.
             collect: called here with each partial result, in the same way.
+            urgent: whether somebody waits for it.
         """
-        job = Job(self, next(self._numbers), kind, (function, arguments), finish, collect)
+        job = Job(self, next(self._numbers), kind, (function, arguments), finish, collect, urgent)
         self._jobs[job.id] = job
         over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
         for old in over[: max(0, len(over) - _JOBS)]:
             del self._jobs[old]
         self._waiting.append(job)
         self._tell(job)
+        self.begin()
         self.go_on()
         return job
 
@@ -215,7 +220,8 @@ class Workers:
         self.go_on()
 
     def close(self) -> None:
-        """End all workers."""
+        """End all workers, for good."""
+        self._has_begun = True
         for job in self.jobs:
             job.end("cancelled", words="the studio ends")
         self._waiting.clear()
@@ -230,10 +236,18 @@ class Workers:
             job.end("failed", words="the engine does not start; the terminal says why")
             self._tell(job)
         for worker in self._workers:
-            if worker.has_begun and worker.job is None and self._waiting:
-                job = self._waiting.popleft()
-                worker.run(job)
-                self._tell(job)
+            if worker.has_begun and worker.job is None and (chosen := self._next()):
+                self._waiting.remove(chosen)
+                worker.run(chosen)
+                self._tell(chosen)
+
+    def _next(self) -> Job | None:
+        """The job that a worker is to do next; None if there is none for now."""
+        urgent = next((job for job in self._waiting if job.urgent), None)
+        if urgent or not self._waiting:
+            return urgent
+        patient = sum(worker.job is not None and not worker.job.urgent for worker in self._workers)
+        return self._waiting[0] if patient < max(len(self._workers) - 1, 1) else None
 
     def hear(self, worker: _Worker, message: tuple[Any, ...] | None) -> None:
         """Take in what a worker says; None if it has ended."""
@@ -258,7 +272,7 @@ class Workers:
                 if partial is not None:
                     job.take_partial(partial)
             except Exception as error:
-                job.end("failed", words=_words_of(error))
+                job.end("failed", words=words_of(error))
                 self.cancel(job)
         else:
             worker.job = None
@@ -287,7 +301,7 @@ class _Worker:
         self._workers, self._is_killed, self.has_begun = workers, False, False
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
+        self._process = context.Process(target=work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
         self._theirs = theirs
         # Starting a process takes a tenth of a second, in which the server would not answer.
         threading.Thread(target=self._listen, daemon=True).start()
@@ -330,65 +344,3 @@ def _room() -> int:
     except (AttributeError, ValueError, OSError):
         memory = 0
     return 2 if processors >= _FEW and memory >= _MEMORY else 1
-
-
-# --- in the worker ----------------------------------------------------------------------------------------------------
-
-_home: Path | None = None
-_engines: OrderedDict[tuple[str, int, int], Engine] = OrderedDict()
-
-
-def engine_of(name: str) -> Engine:
-    """Return the engine of a corpus in this worker, loaded when it is asked for first, or was built anew.
-
-    Raises:
-        MotionMindError: there is no such corpus.
-    """
-    from motionmind.corpus import store
-    from motionmind.tween.engine import Engine
-
-    status = (store.locate(name, _home) / store.MANIFEST).stat()
-    known = name, status.st_ino, status.st_mtime_ns
-    if known not in _engines:
-        _engines[known] = Engine.load(name, _home)
-        while len(_engines) > _ENGINES:
-            _engines.popitem(last=False)
-    _engines.move_to_end(known)
-    return _engines[known]
-
-
-def _work(connection: Connection, home: Path | None, warm: str) -> None:
-    """Do jobs until the server ends."""
-    global _home  # noqa: PLW0603 - a worker has one
-    _home = home
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's to answer
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    connection.send(("begun",))
-    with suppress(MotionMindError):
-        if warm:
-            engine_of(warm)
-
-    def report(done: int, of: int, words: str = "", partial: Any = None) -> None:
-        connection.send(("report", done, of, words, partial))
-
-    while True:
-        try:
-            function, arguments = connection.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            answer = "done", function(report, *arguments)
-        except MemoryError:
-            answer = "failed", "there is not enough memory for this"
-        except Exception as error:
-            answer = "failed", _words_of(error)
-        with suppress(OSError):
-            connection.send(answer)
-
-
-def _end_with(parent: Any) -> None:
-    """End this process with the one that started it."""
-    parent.join()
-    os._exit(0)

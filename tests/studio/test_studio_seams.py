@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motionmind.geometry import rotations as rot
-from motionmind.studio import workers
+from motionmind.studio import worker_loop
 from motionmind.studio.edits import Ask, Passing, Pin
 from motionmind.studio.piece import End
 from motionmind.studio.seams import MOST_ALTERNATIVES, Question, judge, smooth
@@ -22,7 +22,7 @@ def say_nothing(done, of, words="", partial=None):
 
 @pytest.fixture(scope="module")
 def engine() -> Engine:
-    return workers.engine_of("ballet")
+    return worker_loop.engine_of("ballet")
 
 
 @pytest.fixture(scope="module")

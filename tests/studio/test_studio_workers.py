@@ -169,8 +169,30 @@ def test_workers_that_do_not_begin_are_given_up(monkeypatch: pytest.MonkeyPatch)
 
 def test_two_workers_work_side_by_side() -> None:
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
-        jobs = [workers.submit("long", working.sleep, 0.2) for _ in range(4)]
+        jobs = [workers.submit("long", working.sleep, 0.2, urgent=True) for _ in range(4)]
         assert len({await job.result() for job in jobs}) == 2
+
+    run(check, number=2)
+
+
+def test_what_somebody_waits_for_goes_before_what_waited_longer() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        jobs = [workers.submit("long", working.sleep, 0.05) for _ in range(3)]
+        urgent = [workers.submit("sum", working.add, number, 0, urgent=True) for number in range(2)]
+        for job in (*jobs, *urgent):
+            await job.result()
+        done = [one["id"] for one in told if one["state"] == "done"]
+        assert done.index(urgent[0].id) < done.index(urgent[1].id) < done.index(jobs[1].id) < done.index(jobs[2].id)
+
+    run(check)
+
+
+def test_one_of_two_workers_is_there_for_what_somebody_waits_for() -> None:
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        long = [workers.submit("long", working.sleep, 1000.0) for _ in range(2)]
+        await until(long[0], "running")
+        assert await workers.submit("sum", working.add, 2, 3, urgent=True).result() == 5
+        assert long[1].state == "waiting"
 
     run(check, number=2)
 

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from motionmind.errors import MotionMindError
-from motionmind.studio.workers import engine_of
+from motionmind.studio.worker_loop import engine_of
 
 
 def add(report: Any, one: int, other: int) -> int:

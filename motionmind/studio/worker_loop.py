@@ -1,0 +1,89 @@
+"""The inside of a worker process: it does one job after another, and keeps the engines that they need."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections import OrderedDict
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.tween.engine import Engine
+
+_ENGINES = 2  # that a worker keeps loaded
+
+_home: Path | None = None
+_engines: OrderedDict[tuple[str, int, int], Engine] = OrderedDict()
+
+
+def engine_of(name: str) -> Engine:
+    """Return the engine of a corpus in this worker, loaded when it is asked for first, or was built anew.
+
+    Raises:
+        MotionMindError: there is no such corpus.
+    """
+    from motionmind.corpus import store
+    from motionmind.tween.engine import Engine
+
+    status = (store.locate(name, _home) / store.MANIFEST).stat()
+    known = name, status.st_ino, status.st_mtime_ns
+    if known not in _engines:
+        _engines[known] = Engine.load(name, _home)
+        while len(_engines) > _ENGINES:
+            _engines.popitem(last=False)
+    _engines.move_to_end(known)
+    return _engines[known]
+
+
+def work(connection: Connection, home: Path | None, warm: str) -> None:
+    """Do jobs until the server ends."""
+    global _home  # noqa: PLW0603 - a worker has one
+    _home = home
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's to answer
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    connection.send(("begun",))
+    with suppress(MotionMindError):
+        if warm:
+            engine_of(warm)
+
+    def report(done: int, of: int, words: str = "", partial: Any = None) -> None:
+        connection.send(("report", done, of, words, partial))
+
+    while True:
+        try:
+            function, arguments = connection.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            answer = "done", function(report, *arguments)
+        except MemoryError:
+            answer = "failed", "there is not enough memory for this"
+        except Exception as error:
+            answer = "failed", words_of(error)
+        with suppress(OSError):
+            connection.send(answer)
+
+
+def _end_with(parent: Any) -> None:
+    """End this process with the one that started it."""
+    parent.join()
+    os._exit(0)
+
+
+def words_of(error: Exception) -> str:
+    """Return an error as a line; what nobody foresaw goes to the terminal."""
+    if isinstance(error, MotionMindError):
+        return str(error)
+    traceback.print_exception(error, file=sys.stderr)
+    return "this went wrong; the terminal says how"
