@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,7 +80,7 @@ def studio(
 
                 project.edit(_TERMINAL, SetCorpus(corpus))
             project.tell(url)
-            for words in project.words:
+            for words in (*project.words, *project.missing):
                 note(words)
             if is_open:
                 note(
@@ -87,7 +88,8 @@ def studio(
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
             work, keys = Studio(project, home, first=compile_all if is_cold() else None), Keys()
-            work.engine(project.state.corpus)
+            with suppress(MotionMindError):  # which is missing, and said to be
+                work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"
 
             def ready() -> None:

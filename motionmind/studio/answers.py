@@ -57,7 +57,7 @@ class PartView(_Answer):
 
 
 class BlockView(_Answer):
-    """A stretch of the piece."""
+    """A stretch of the piece; `missing` if there is no such movement any more, as of a corpus that was deleted."""
 
     id: str
     source: str
@@ -67,6 +67,7 @@ class BlockView(_Answer):
     key: str
     title: Text
     frames: int
+    missing: bool
     at: float
     seconds: float
 
@@ -112,6 +113,7 @@ class ProjectView(_Answer):
     corpus: str
     corpora: dict[str, str]
     words: list[Text]
+    missing: list[Text]
     postures: list[Saved]
     piece: PieceView
     undo: str | None

@@ -103,7 +103,8 @@ class _Desk:
         project = self._studio.project
         names = dict.fromkeys([project.state.corpus, *project.versions])
         own = [{"key": f"own/{name}", "title": name} for name in project.state.postures]
-        return json({"corpora": [self._listed(name) for name in names if name], "own": own})
+        here = [name for name in names if name and self._studio.movements.has(name)]
+        return json({"corpora": [self._listed(name) for name in here], "own": own})
 
     def _listed(self, name: str) -> dict[str, Any]:
         """List a corpus."""

@@ -1,4 +1,4 @@
-"""Whether an edit that comes in can be: the movements that it names exist, and are long enough."""
+"""Whether an edit that comes in can be, and what a piece lacks: movements that exist and are long enough."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Callable
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Arrange, Block, Edit, Insert, SavePosture, Trim, Wish, each
-from motionmind.studio.piece import State, key_of
+from motionmind.studio.piece import OWN, State, key_of
+from motionmind.studio.placement import Marks
 
 
 def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> None:
@@ -39,3 +40,32 @@ def check_movements(state: State, edit: Edit, frames: Callable[[str], int]) -> N
                 raise MotionMindError(
                     f"{displayed(block.source)} has frames 0 to {count - 1}, no frame {block.last}: end sooner"
                 )
+
+
+def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) -> list[str]:
+    """Say in a line each what a piece needs that is not there: corpora by name, and what others have no more.
+
+    Args:
+        state: the piece.
+        has_corpus: returns whether there is a corpus of a name.
+        marks: of the movements.
+    """
+    lines: dict[str, None] = {}
+    for name in sorted(corpora_of(state)):
+        if not has_corpus(name):
+            lines[f"the corpus {displayed(name)} is missing: build it again by that name"] = None
+    for block in state.blocks:
+        if not marks.has(key := key_of(block), block.last) and has_corpus(corpus_of(block.source) or state.corpus):
+            lines[f"frame {block.last} of {displayed(key)} is missing, which the piece needs"] = None
+    return list(lines)
+
+
+def corpora_of(state: State) -> set[str]:
+    """Return the names of the corpora that a piece needs."""
+    return {state.corpus, *(corpus_of(block.source) for block in state.blocks)} - {""}
+
+
+def corpus_of(source: str) -> str:
+    """Return the name of the corpus that a movement is of; "" if it is of none."""
+    name, slash, _ = source.partition("/")
+    return name if slash and f"{name}/" != OWN else ""

@@ -45,6 +45,8 @@ def composed(studio: Studio) -> Motion:
     project = studio.project
     if not project.state.blocks:
         raise MotionMindError("the piece is empty: there is nothing to take away yet")
+    if missing := project.missing:
+        raise MotionMindError(f"the piece cannot be taken away: {missing[0]}")
     layout = layout_of(project.state, project.finding, project.marks)
     return replace(performance(list(layout.parts), studio.movements.get), name=project.state.title or "piece")
 

@@ -88,8 +88,13 @@ def _corpus_routes(studio: Studio, uploads: Uploads) -> list[BaseRoute]:
         lesson = await api.body_of(request, Lesson)
         check_lesson(lesson, home)
         recordings = [_recording(uploads, part.upload, part.clip) for part in lesson.parts]
-        job = studio.workers.submit("learn", learn, lesson, recordings, home, finish=_whole)
+        job = studio.workers.submit("learn", learn, lesson, recordings, home, finish=learned)
         return api.json({"job": job.id})
+
+    def learned(result: dict[str, Any]) -> dict[str, Any]:
+        """Show the page all of a result; a corpus that was missing is there again."""
+        studio.forget(result["name"])
+        return result
 
     async def delete(request: Request) -> Response:
         name = known(request.path_params["name"], home)
@@ -118,8 +123,3 @@ def _sheet(name: str, home: Any) -> dict[str, Any]:
     from motionmind.learned import persistence
 
     return sheet_of(persistence.load(known(name, home), home).corpus)
-
-
-def _whole(result: dict[str, Any]) -> dict[str, Any]:
-    """Show the page all of a result."""
-    return result

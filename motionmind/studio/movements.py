@@ -164,14 +164,12 @@ class Movements:
         return motion
 
     def title(self, key: str) -> str:
-        """Return the words for a movement; MotionMindError if there is none."""
+        """Return the words for a movement."""
         if key.startswith(_MIRRORED):
             return f"{self.title(key[1:])} (mirrored)"
         if key in self._kept:
             return self._kept[key][0]
-        if key.startswith((f"{_OWN}/", _KEPT)):
-            return key.partition("/")[2] or key
-        return self._split(key)[1]
+        return displayed(key.partition("/")[2] or key)
 
     def keep(self, motion: Motion, title: str = "") -> str:
         """Keep a movement in the project, once, and return its key.
@@ -190,13 +188,17 @@ class Movements:
             self.take_in(self._journal.append(MovementLine(key, title, msgspec.Raw(record))))
         return key
 
+    def has(self, corpus: str) -> bool:
+        """Return whether there is such a corpus."""
+        return corpus in self._collections or corpus in store.list_corpora(self._home)
+
     def collection(self, corpus: str) -> Collection:
         """Return a corpus's clips and postures by name; MotionMindError if there is no such corpus."""
         return self._corpus(corpus).collection
 
     def facing(self, corpus: str) -> Facing:
-        """Return which way a corpus's dancers may face; MotionMindError if there is no such corpus."""
-        return self._corpus(corpus).facing
+        """Return which way a corpus's dancers may face; any if there is no such corpus."""
+        return self._corpus(corpus).facing if self.has(corpus) else "free"
 
     def forget(self, corpus: str) -> None:
         """Forget what is known of a corpus, which has changed."""

@@ -23,6 +23,8 @@ from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
 from motionmind.variation.piece import ALONE, Parts, Placement
 
+_STILL = 30.0  # frames a second of what is missing
+
 Movements = Callable[[str], Motion]  # returns the movement of a key; MotionMindError if there is none
 
 
@@ -75,6 +77,8 @@ class Mark(NamedTuple):
 class Marks:
     """Marks of movements' frames, each remembered: a piece asks for the same ones at every edit.
 
+    What is missing, a movement or a frame of it, stands still in the middle of the floor, `_STILL` frames a second.
+
     Attributes:
         facing: returns which way a corpus's dancers may face, by its name.
     """
@@ -91,27 +95,43 @@ class Marks:
         self._marks: dict[tuple[str, int], Mark] = {}
         self._lengths: dict[str, int] = {}
 
+    def forget(self) -> None:
+        """Forget all marks: movements have changed, or come to be there."""
+        self._marks.clear()
+        self._lengths.clear()
+
+    def has(self, key: str, frame: int) -> bool:
+        """Return whether there is such a movement, and such a frame of it."""
+        return frame < self._count(key)
+
     def at(self, key: str, frame: int) -> Mark:
-        """Return the mark of a frame; MotionMindError if there is no such movement or frame."""
+        """Return the mark of a frame."""
         if (known := self._marks.get((key, frame))) is None:
+            if not self.has(key, frame):
+                return Mark(0.0, 0.0, 0.0, frame / _STILL)
             motion = self._movement(key)
-            if not 0 <= frame < len(motion):
-                raise MotionMindError(f"{key} has frames 0 to {len(motion) - 1}, no frame {frame}")
             x, _, z = motion.root[frame].tolist()
             known = Mark(x, z, float(rot.heading(motion.rotations[frame, 0])), float(motion.times[frame]))
             self._marks[key, frame] = known
         return known
 
     def length(self, key: str) -> int:
-        """Return the number of frames of a movement."""
+        """Return the number of frames of a movement; MotionMindError if there is none."""
+        return self._count(key) or len(self._movement(key))
+
+    def _count(self, key: str) -> int:
+        """The number of frames of a movement; 0 if there is none."""
         if key not in self._lengths:
-            self._lengths[key] = len(self._movement(key))
+            try:
+                self._lengths[key] = len(self._movement(key))
+            except MotionMindError:
+                self._lengths[key] = 0
         return self._lengths[key]
 
     def step(self, key: str, frame: int) -> float:
         """Return the seconds from a frame to the next one; the last frame lasts as long as the one before it."""
-        count = self.length(key)
-        if count == 1:
+        count = self._count(key)
+        if count <= 1:
             return ALONE
         begin = min(frame, count - 2)
         return self.at(key, begin + 1).time - self.at(key, begin).time
@@ -146,9 +166,6 @@ def lay_out(state: State, insertion: Callable[[Seam], str | None], marks: Marks)
         state: the piece.
         insertion: returns the key of the movement that is inserted at a seam; None for none.
         marks: of the movements.
-
-    Raises:
-        MotionMindError: a movement or a frame of it is missing.
     """
     turns = bool(state.blocks) and marks.facing(state.corpus) == "free"
     blocks: list[Part] = []
@@ -209,7 +226,7 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         movement: returns movements by key.
 
     Raises:
-        MotionMindError: there is nothing.
+        MotionMindError: there is nothing, or a movement or a frame of it is missing.
         SkeletonError: the parts are on different skeletons.
     """
     if not parts:
@@ -219,6 +236,8 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
     whole = replace(whole, keyframed=all(movement(part.key).keyframed for part in parts))
     for place, part in enumerate(parts):
         motion = movement(part.key)
+        if part.last >= len(motion):
+            raise MotionMindError(f"{part.key} has frames 0 to {len(motion) - 1}, no frame {part.last}")
         check_body(parts[0].key, whole, part.key, motion)
         begin, stop = part.first, part.last + 1
         if part.inserted:

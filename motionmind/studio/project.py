@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
 from motionmind.studio import piece
-from motionmind.studio.checks import check_movements
+from motionmind.studio.checks import check_movements, corpora_of, missing_in
 from motionmind.studio.edits import Edit, touched, words_of
 from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
-from motionmind.studio.piece import Finding, Seam, State, key_of
+from motionmind.studio.piece import Finding, Seam, State
 from motionmind.studio.placement import Marks
 from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 
@@ -95,7 +95,7 @@ class Project:
 
         Raises:
             FormatError: it is no project, or damaged.
-            MotionMindError: it is open elsewhere, or a corpus or a movement that it needs is missing.
+            MotionMindError: it is open elsewhere.
         """
         journal = Journal.open(path)
         try:
@@ -131,6 +131,19 @@ class Project:
         """Have a function called after each edit, undo, redo and finding."""
         self._subscribers.append(callback)
 
+    @property
+    def missing(self) -> list[str]:
+        """What the piece needs that is not there, a line each."""
+        return missing_in(self.state, self.movements.has, self.marks)
+
+    def look_again(self, corpus: str) -> None:
+        """Look at a corpus again that was made anew or deleted."""
+        self.movements.forget(corpus)
+        self.marks.forget()
+        self._check_corpora(dict(self.versions))
+        self.state = replace(self.state)  # for whoever looks at each state once
+        self._changed()
+
     # --- findings ---------------------------------------------------------------------------------------------------
 
     def question(self, seam: Seam) -> str:
@@ -140,6 +153,12 @@ class Project:
     def finding(self, seam: Seam) -> Finding | None:
         """Return what is known of a seam."""
         return self._findings.get(self.question(seam))
+
+    def lacks(self, seam: Seam) -> bool:
+        """Return whether something is missing without which a seam can be neither judged nor smoothed."""
+        ends = [(end.key, end.frame) for end in seam.ends]
+        passed = [(one.posture, one.frame) for one in seam.verdict.ask.passing]
+        return not (self.movements.has(self.state.corpus) and all(self.marks.has(*at) for at in ends + passed))
 
     def keep_finding(self, finding: Finding) -> None:
         """Keep what was found at a seam; MotionMindError if it cannot be written."""
@@ -312,31 +331,18 @@ class Project:
 
     def _check_corpora(self, written: Mapping[str, str]) -> None:
         """Compare the corpora that there are with those that the project was made with."""
-        missing, changed = [], []
-        used = self._used(self.state)
+        changed = []
+        used = corpora_of(self.state)
         for name in sorted(used | set(written)):
             try:
                 version = version_of(name, self._home)
             except MotionMindError:
-                if name in used:
-                    missing.append(displayed(name))
+                if name in used and name in written:  # what was found beside it stays found
+                    self.versions[name] = written[name]
                 continue
             if version != written.get(name, version):
                 changed.append(name)
             self.versions[name] = version
-        if missing:
-            what = f"corpus {missing[0]}" if len(missing) == 1 else f"corpora {enumerated(missing)}"
-            raise MotionMindError(f"{self.path}: {what} is missing that it was made with: build it again by that name")
-        for block in self.state.blocks:
-            try:
-                count = self.marks.length(key_of(block))
-            except MotionMindError as error:
-                raise MotionMindError(f"{self.path}: {error}, which the piece needs") from error
-            if block.last >= count:
-                source = displayed(block.source)
-                raise MotionMindError(
-                    f"{self.path}: the piece needs frame {block.last} of {source}, which has {count} frames now"
-                )
         if changed:
             names = enumerated([displayed(name) for name in changed])
             self.words.append(f"{names} has changed since this piece was made: its seams are judged anew")
@@ -344,19 +350,10 @@ class Project:
 
     def _note_versions(self, state: State) -> None:
         """Write down the versions of corpora that a state uses for the first time."""
-        new = {name: version_of(name, self._home) for name in sorted(self._used(state) - self.versions.keys())}
+        new = {name: version_of(name, self._home) for name in sorted(corpora_of(state) - self.versions.keys())}
         if new:
             self._journal.append(Corpora(new))
             self.versions |= new
 
-    def _used(self, state: State) -> set[str]:
-        """Names of the corpora that a state needs."""
-        return {state.corpus, *_corpora_of(key_of(block) for block in state.blocks)} - {""}
-
     def _saved(self, name: str) -> str:
         return self.state.stable(f"{piece.OWN}{name}")
-
-
-def _corpora_of(keys: Iterable[str]) -> set[str]:
-    parts = (key.lstrip("~").partition("/") for key in keys)
-    return {name for name, slash, _ in parts if slash and f"{name}/" != piece.OWN}

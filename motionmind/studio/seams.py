@@ -178,7 +178,9 @@ class Smoother:
         corpus = project.state.corpus
         open_seams: dict[str, tuple[Seam, Finding | None]] = {}
         for seam in project.state.seams:
-            if not seam.goes_on and ((finding := project.finding(seam)) is None or finding.insertions is None):
+            if seam.goes_on or project.lacks(seam):
+                continue
+            if (finding := project.finding(seam)) is None or finding.insertions is None:
                 open_seams[project.question(seam)] = seam, finding
         for name in open_seams:
             self._seen.setdefault(name, len(self._seen))

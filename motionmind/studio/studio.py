@@ -98,7 +98,7 @@ class Studio:
     def forget(self, corpus: str) -> None:
         """Forget what is known of a corpus that was made anew or deleted."""
         self._engines.pop(corpus, None)
-        self.movements.forget(corpus)
+        self.project.look_again(corpus)
 
     def view(self, window: str) -> Mapping[str, Any]:
         """Return the project as a window sees it: `GET /api/project`."""
@@ -111,6 +111,7 @@ class Studio:
             "corpus": state.corpus,
             "corpora": project.versions,
             "words": project.words,
+            "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
             "piece": view_of(state, project.finding, project.marks, project.movements.title),
             "undo": project.undoable(window),

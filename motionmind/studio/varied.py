@@ -79,6 +79,8 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
     """
     project = studio.project
     state = project.state
+    if missing := project.missing:
+        raise MotionMindError(f"the piece cannot be varied: {missing[0]}")
     base = base_of(state)
     locked = locked_in(state)
     asked = [one for one in wish.kept if one.block.id not in locked]

@@ -38,7 +38,7 @@ def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:
 
 
 def layout_of(state: State, findings: Findings, marks: Marks) -> Layout:
-    """Place a piece's parts with what is known of its seams; errors as of `lay_out`."""
+    """Place a piece's parts with what is known of its seams."""
 
     def insertion(seam: Seam) -> str | None:
         found = chosen_at(seam, findings(seam))
@@ -55,9 +55,6 @@ def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str
         findings: what is known of its seams.
         marks: of the movements.
         title: returns a movement's title by its key.
-
-    Raises:
-        MotionMindError: a movement or a frame of it is missing.
     """
     layout = layout_of(state, findings, marks)
     blocks = [
@@ -65,7 +62,8 @@ def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str
         | {
             "key": key_of(block),
             "title": title(block.source),
-            "frames": marks.length(key_of(block)),
+            "frames": marks.length(key_of(block)) if (here := marks.has(key_of(block), block.last)) else block.last + 1,
+            "missing": not here,
             "at": part.at,
             "seconds": part.seconds,
         }
@@ -75,7 +73,7 @@ def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str
         _seam_view(seam, number, findings(seam), layout.insertions[number - 1], layout.blocks[number - 1 : number + 1])
         for number, seam in enumerate(state.seams, start=1)
     ]
-    parts = [msgspec.to_builtins(part) for part in layout.parts]
+    parts = [msgspec.to_builtins(part) for part in layout.parts if marks.has(part.key, part.last)]
     return {"seconds": layout.seconds, "parts": parts, "blocks": blocks, "seams": seams}
 
 

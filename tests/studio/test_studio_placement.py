@@ -17,7 +17,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.studio import edits as e
 from motionmind.studio.piece import Finding, Found, State, apply_all
 from motionmind.studio.placement import Marks, lay_out, performance
-from motionmind.studio.view import layout_of, state_of, view_of
+from motionmind.studio.view import state_of, view_of
 from motionmind.variation.piece import Piece
 
 BODY = Skeleton(
@@ -167,5 +167,15 @@ def test_parts_that_cannot_be_one_movement_are_refused():
     parts = list(lay_out(piece_of(("c/one", 0, 5), ("c/two", 3, 5)), lambda _: None, Marks(movement)).parts)
     with pytest.raises(MotionMindError, match="c/two is on another body than c/one"):
         performance(parts, {**MOVEMENTS, "c/two": other}.__getitem__)
+    longer = lay_out(piece_of(("c/two", 3, 25)), lambda _: None, Marks(movement))
     with pytest.raises(MotionMindError, match="c/two has frames 0 to 19, no frame 25"):
-        layout_of(piece_of(("c/two", 3, 25)), lambda _: None, Marks(movement))
+        performance(list(longer.parts), movement)
+
+
+def test_what_is_missing_keeps_its_place_and_is_said_to_be_missing() -> None:
+    piece = piece_of(("c/one", 0, 5), ("gone/clip", 10, 40), ("c/two", 3, 5))
+    view = view_of(piece, lambda _: None, Marks(movement), str.upper)
+    assert [block["missing"] for block in view["blocks"]] == [False, True, False]
+    assert view["blocks"][1]["seconds"] == pytest.approx(1.0)
+    assert view["blocks"][2]["at"] > view["blocks"][1]["at"] + 1.0
+    assert {part["key"] for part in view["parts"]} == {"c/one", "c/two"}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from bundled_clips import ballet_clip
+from studio_server import serving
 
 from motionmind.corpus import store
 from motionmind.errors import MotionMindError
@@ -68,17 +69,44 @@ def test_a_corpus_that_has_changed_is_said_once_and_its_seams_are_judged_anew(ho
 def test_a_corpus_that_is_missing_is_named(home: Path, path: Path) -> None:
     data = path.read_bytes()
     store.delete("mine", home)
-    with pytest.raises(MotionMindError, match="corpus mine is missing that it was made with"):
-        Project.open(path, home)
+    project = Project.open(path, home)
+    assert project.missing == ["the corpus mine is missing: build it again by that name"]
+    (seam,) = project.state.seams
+    assert project.lacks(seam)
+    assert project.finding(seam) is not None  # what was found stays
+    with pytest.raises(RefusedError, match="no movement mine/tendus"):
+        project.edit("w1", Insert("b3", "mine/tendus", 0, 0))
     assert path.read_bytes() == data
     learn(home, "plies", "tendus")
-    Project.open(path, home).close()
+    project.look_again("mine")
+    assert (project.missing, project.words, project.lacks(seam)) == ([], [], False)
+    project.edit("w1", Insert("b3", "mine/tendus", 0, 0))
+    project.close()
+
+
+def test_a_piece_without_its_corpus_is_shown_and_edited(home: Path, path: Path) -> None:
+    store.delete("mine", home)
+    with serving(Project.open(path, home), home) as client:
+        view = client.project()
+        assert view["missing"] == ["the corpus mine is missing: build it again by that name"]
+        assert [block["missing"] for block in view["piece"]["blocks"]] == [True, True]
+        assert [corpus["name"] for corpus in client.get("/api/gallery")["corpora"]] == []
+        refused = client.send("GET", "/api/export/bvh")
+        assert (refused.status, "corpus mine is missing" in refused.value["error"]) == (400, True)
+        client.edit(edit="corpus", name="ballet")
+        client.edit(edit="delete", block="b1")
+        view = client.insert("b3", "ballet/plies", 0, 9)
+        assert [block["missing"] for block in view["piece"]["blocks"]] == [True, False]
+        client.edit(edit="delete", block="b2")
+        assert client.project()["missing"] == []
 
 
 def test_a_stretch_that_its_corpus_lacks_now_is_named(home: Path, path: Path) -> None:
     learn(home, "plies")
-    with pytest.raises(MotionMindError, match="which the piece needs"):
-        Project.open(path, home)
+    project = Project.open(path, home)
+    last = project.state.blocks[0].last
+    assert project.missing == [f"frame {last} of mine/tendus is missing, which the piece needs"]
+    project.close()
 
 
 def test_a_corpus_that_there_is_not_is_refused(home: Path, path: Path) -> None:
