@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bundled_clips import ballet_clip
@@ -120,3 +121,21 @@ def test_a_corpus_that_there_is_not_is_refused(home: Path, path: Path) -> None:
     project.edit("w1", SetCorpus("ballet"))
     assert set(project.versions) == {"ballet", "mine"}
     project.close()
+
+
+def test_the_page_says_what_is_missing(home: Path, path: Path, browser: Any) -> None:
+    store.delete("mine", home)
+    with serving(Project.open(path, home), home) as client:
+        context = browser.new_context(viewport={"width": 1440, "height": 900})
+        page = context.new_page()
+        errors: list[str] = []
+        page.on("console", lambda message: message.type == "error" and errors.append(message.text))
+        try:
+            page.goto(client.entry)
+            page.get_by_text("the corpus mine is missing").wait_for()
+            assert page.locator(".stretch.missing").count() == 2
+            assert "missing" in page.get_by_test_id("block-b1").get_attribute("aria-label")
+            page.wait_for_timeout(300)
+            assert errors == []
+        finally:
+            context.close()

@@ -117,6 +117,8 @@ async function start() {
   Object.assign(window, { studio }); // for tests, and for whoever is curious
   render(html`<${Studio} studio=${studio} open=${open} />`, /** @type {Element} */ (document.getElementById("studio")));
   await studio.act(() => store.start());
+  for (const words of store.state?.words ?? []) studio.say(words);
+  for (const words of store.state?.missing ?? []) studio.say(words, { kind: "error" });
 }
 
 start();

@@ -41,9 +41,9 @@ export function playable(data, key = "") {
   return Object.assign(new Motion(data), { key }, bodies.get(about));
 }
 
-/** Where a picture of a frame is; a picture is as high as said, for paper as dark as said. */
-export function thumbnail(/** @type {string} */ key, /** @type {number} */ frame, /** @type {boolean} */ dark, height = 96) {
-  return `/api/thumbnails/${path(key)}/${frame}.png?dark=${Number(dark)}&height=${height}`;
+/** Where a picture of a frame is, so many pixels high; it stands on any paper. */
+export function thumbnail(/** @type {string} */ key, /** @type {number} */ frame, height = 96) {
+  return `/api/thumbnails/${path(key)}/${frame}.png?height=${height}`;
 }
 
 /** @param {string} key */

@@ -62,7 +62,6 @@ function Postures({ studio, postures }) {
   const desk = deskOf(studio);
   const choice = useChange(desk, () => desk.choice);
   const ends = useChange(desk, () => desk.ends);
-  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
   return html`<ul class="thumbs">
     ${postures.map(({ key, title }) => {
       const place = { key, frame: 0, title };
@@ -76,7 +75,7 @@ function Postures({ studio, postures }) {
           onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place))}
           onClick=${() => pick(studio, place)}
         >
-          <img src=${thumbnail(key, 0, dark)} alt="" loading="lazy" draggable="false" />
+          <img src=${thumbnail(key, 0)} alt="" loading="lazy" draggable="false" />
           <span class="cut">${title}</span>
           ${marks.map((mark) => html`<span class="mark">${mark}<span class="aside"> is this posture</span></span>`)}
         </button>
@@ -98,7 +97,6 @@ async function pick(studio, place) {
 function Clips({ studio, clips }) {
   const [open, setOpen] = useState("");
   const [all, setAll] = useState(false);
-  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
   return html`<ul class="clips">
       ${(all ? clips : clips.slice(0, FEW)).map(
         (clip) => html`<li key=${clip.key} class=${clip.key === open ? "card" : ""}>
@@ -111,7 +109,7 @@ function Clips({ studio, clips }) {
             onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(whole(clip)))}
             onClick=${() => setOpen(clip.key === open ? "" : clip.key)}
           >
-            <img src=${thumbnail(clip.key, clip.frames >> 1, dark, 64)} alt="" loading="lazy" draggable="false" />
+            <img src=${thumbnail(clip.key, clip.frames >> 1, 64)} alt="" loading="lazy" draggable="false" />
             <span class="grow"><span class="cut">${clip.title}</span><span class="hint cut">${clip.about}</span></span>
             <span class="hint numbers">${clip.seconds.toFixed(0)} s</span>
           </button>
@@ -131,10 +129,14 @@ function whole({ key, frames, title }) {
   return { key, frame: 0, last: frames - 1, title };
 }
 
-/** Put a clip at the end of the line of time. @param {any} studio @param {any} clip */
-async function insert(studio, clip) {
+/**
+ * Put a posture, or the frames of a clip up to `last`, at the end of the line of time.
+ * @param {any} studio
+ * @param {{key: string, frame: number, last?: number}} place
+ */
+export async function insert(studio, { key, frame, last = frame }) {
   const id = `b-${crypto.randomUUID().slice(0, 13)}`;
-  const edit = { edit: "insert", id, source: clip.key, first: 0, last: clip.frames - 1, mirrored: false, before: null };
+  const edit = { edit: "insert", id, source: key, first: frame, last, mirrored: false, before: null };
   if (await studio.act(() => studio.api.edit(edit))) studio.viewer.back();
 }
 
@@ -193,6 +195,6 @@ function Frames({ studio, clip }) {
       <button class="button" onClick=${() => set("a")}>As A</button>
       <button class="button" onClick=${() => set("b")}>As B</button>
     </div>
-    <button class="button" data-testid="insert-clip" onClick=${() => insert(studio, clip)}>All of it, onto the time line</button>
+    <button class="button" data-testid="insert-clip" onClick=${() => insert(studio, whole(clip))}>All of it, onto the time line</button>
   </div>`;
 }

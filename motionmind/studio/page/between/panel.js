@@ -5,7 +5,7 @@ import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { thumbnail } from "../movements.js";
 import { deskOf, dropped } from "./desk.js";
-import { Gallery } from "./gallery.js";
+import { Gallery, insert } from "./gallery.js";
 
 export { Centre } from "./alternatives.js";
 
@@ -16,6 +16,7 @@ const GROUP = "A to B";
 export function Panel({ studio }) {
   const desk = deskOf(studio);
   const ends = useChange(desk, () => desk.ends);
+  const choice = useChange(desk, () => desk.choice);
   const seconds = useChange(desk, () => desk.seconds);
   const state = useChange(desk, () => desk.state);
   const shown = useChange(desk, () => desk.shown);
@@ -54,6 +55,12 @@ export function Panel({ studio }) {
         html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
       }
     </label>
+    ${
+      choice &&
+      html`<button class="button" data-testid="insert-posture" onClick=${() => insert(studio, choice)}>
+        Put ${choice.title} onto the time line
+      </button>`
+    }
     <${Gallery} studio=${studio} />
   </div>`;
 }
@@ -61,7 +68,6 @@ export function Panel({ studio }) {
 /** One of both ends: its picture, and what sets it. @param {{studio: any, name: "a" | "b", place: any}} props */
 function End({ studio, name, place }) {
   const desk = deskOf(studio);
-  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
   const letter = name.toUpperCase();
   const drop = (/** @type {DragEvent} */ event) => {
     event.preventDefault();
@@ -71,7 +77,7 @@ function End({ studio, name, place }) {
   return html`<div class="end ${place ? "card" : "empty"}" onDragOver=${(/** @type {Event} */ event) => event.preventDefault()} onDrop=${drop}>
     ${
       place
-        ? html`<img src=${thumbnail(place.key, place.frame, dark, 128)} alt="" />
+        ? html`<img src=${thumbnail(place.key, place.frame, 128)} alt="" />
             <button class="button quiet icon clear" aria-label="Clear ${letter}" onClick=${() => desk.set(name, null)}>
               ${icon("close")}
             </button>

@@ -47,7 +47,6 @@ export function Corpora({ studio, imports }) {
 
 /** @param {{studio: any, sheet: any, onClose: () => void}} props */
 function Sheet({ studio, sheet, onClose }) {
-  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
   const play = async (/** @type {any} */ clip) => {
     onClose();
     studio.viewer.show(await movement(studio.api, clip.key), { title: clip.name, play: true });
@@ -64,7 +63,7 @@ function Sheet({ studio, sheet, onClose }) {
           <button class="strip-of" title="Play ${clip.name}" aria-label="Play ${clip.name}, ${clip.seconds} seconds" onClick=${() => play(clip)}>
             ${clip.pictures.map(
               (/** @type {number} */ frame) =>
-                html`<img key=${frame} loading="lazy" alt="" width="64" height="72" src=${thumbnail(clip.key, frame, dark, 72)} />`,
+                html`<img key=${frame} loading="lazy" alt="" width="64" height="72" src=${thumbnail(clip.key, frame, 72)} />`,
             )}
           </button>
           <div class="row"><strong class="grow cut">${clip.name}</strong><span class="pale numbers">${clip.seconds.toFixed(1)} s</span></div>

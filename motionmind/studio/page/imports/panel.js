@@ -29,6 +29,7 @@ export function Panel({ studio }) {
   const learning = useChange(studio.store, () => [...studio.store.jobs.values()].filter((job) => job.kind === "learn" && job.state === "done").length);
   useEffect(() => {
     imports.refresh().catch(failed);
+    if (learning) studio.store.load().catch(failed); // what the piece lacked may be there now
   }, [learning]);
   useEffect(() => () => studio.viewer.back(), []);
   const look = async (/** @type {any} */ file, /** @type {number} */ clip) => {

@@ -15,6 +15,7 @@ const SHOWN = /** @type {Record<string, string>} */ ({ " ": "Space", ArrowLeft: 
 // What holds the keys that it needs for itself.
 const WRITING = "input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]";
 const PRESSING = "button, summary, a[href], [role=button], [role=tab], [role=option], input";
+const RANGING = /^(arrow\w+|home|end|page(up|down))$/; // keys of a dial or a list
 
 const EVERYWHERE = "Everywhere";
 
@@ -58,7 +59,7 @@ export class Keys extends EventTarget {
     const name = named(event).toLowerCase();
     if (event.target.closest(WRITING) && !(name.startsWith("ctrl+") && event.target.matches("select"))) return;
     if ((name === " " || name === "enter") && event.target.closest(PRESSING)) return;
-    if (name.startsWith("arrow") && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
+    if (RANGING.test(name) && event.target.closest("input, [role=slider], [role=listbox], [role=tablist]")) return;
     const controls = this.controls();
     if (controls && orbit(event, controls)) return;
     // What came last is on top.

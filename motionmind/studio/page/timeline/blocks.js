@@ -32,7 +32,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
       const held = block.first === block.last;
       const width = held ? LEAST : (change?.seconds ?? block.seconds) * sight.scale;
       const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? LEAST / 2 : 0);
-      const classes = ["stretch", held && "held", block.mirrored && "mirrored", mine?.kind === "move" && "moving"];
+      const classes = ["stretch", held && "held", block.mirrored && "mirrored", block.missing && "missing", mine?.kind === "move" && "moving"];
       return html`<div
         key=${block.id}
         class=${classes.filter(Boolean).join(" ")}
@@ -51,8 +51,8 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
           transform: mine?.kind === "move" ? `translateX(${mine.by}px)` : "",
         }}
       >
-        ${width > 18 && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
-        ${width > 70 && html`<span class="name cut">${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
+        ${width > 18 && !block.missing && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
+        ${width > 70 && html`<span class="name cut">${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
         ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
       </div>`;
     })}
@@ -132,9 +132,9 @@ function landing({ blocks, seconds }, { id, place }) {
   return seconds;
 }
 
-function labelOf({ title, mirrored, at, seconds, first, last }) {
+function labelOf({ title, missing, mirrored, at, seconds, first, last }) {
   const long = first === last ? "a posture" : `${clock(seconds)} seconds`;
-  return `${title}, ${long}${mirrored ? ", mirrored" : ""}, from ${clock(at)}`;
+  return `${title}${missing ? ", missing" : ""}, ${long}${mirrored ? ", mirrored" : ""}, from ${clock(at)}`;
 }
 
 function sayOf(seam, word) {

@@ -7,7 +7,7 @@ import { lastBefore } from "./composed.js";
  * @typedef {{joint: string, hold: "start"|"end"|"throughout"}} Pin
  * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[]}} Ask
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, key: string, title: string,
- *   frames: number, at: number, seconds: number}} Block
+ *   frames: number, missing: boolean, at: number, seconds: number}} Block
  * @typedef {{left: string, right: string, number: number, state: string, words: string, chosen: number,
  *   alternatives: {key: string, seconds: number, words: string}[], decision: string, ask: Ask, at: number,
  *   seconds: number}} Seam

@@ -40,7 +40,6 @@ export function Panel({ studio }) {
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
   const stopped = useRested(useStore(studio, ({ jobs }) => [...jobs.values()].some(atSeams)));
   useEffect(() => studio.keys.add(ROWS), [studio]);
-  const picture = useThumbnails(studio);
   const seam = selected(piece, selection)?.seam;
   const joints = (does.movements.at(piece.parts[0]?.key)?.joints ?? []).filter((name) => LIMBS.test(name));
   return html`<section
@@ -131,17 +130,7 @@ function usePlayed(studio, movements, { parts }) {
   }, [told]);
 }
 
-/** A function that gives a posture's picture, for the paper that the page has. */
-function useThumbnails(studio) {
-  const [dark, setDark] = useState(() => Boolean(studio.viewer.theme?.dark));
-  useEffect(() => {
-    const { theme } = studio.viewer;
-    const change = () => setDark(theme.dark);
-    theme?.addEventListener("change", change);
-    return () => theme?.removeEventListener("change", change);
-  }, [studio]);
-  return useMemo(
-    () => (key, frame) => thumbnail(key, frame, dark, HEIGHT),
-    [dark],
-  );
+/** A posture's picture. @param {string} key @param {number} frame */
+function picture(key, frame) {
+  return thumbnail(key, frame, HEIGHT);
 }

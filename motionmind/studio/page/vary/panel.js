@@ -9,7 +9,6 @@ import { Tiles } from "./tiles.js";
 import { alike, departure, Varying } from "./varying.js";
 
 const FARTHEST = 0.4; // share of the steps: no attractor departs farther
-const OWN_KEYS = ["Home", "End", "PageUp", "PageDown"]; // of a dial, not of the page
 const STRETCHES = [1, 2, 4, 8]; // postures
 const FLOWS = [
   ["lorenz", "Lorenz"],
@@ -39,10 +38,11 @@ export function Panel({ studio }) {
   if (!isLong) {
     return html`<section class="stack vary">
       <h2>Variations</h2>
-      <p class="empty">There is nothing to vary yet. Put a clip on the time line, or take a way from A to B.</p>
+      <p class="empty">A variation reads the piece's stretches in another order. There are too few postures for it yet: put a clip onto
+      the time line, whole or in part.</p>
       <div class="row">
-        <button class="button" onClick=${() => studio.open("between")}>Go from A to B</button>
-        <button class="button" onClick=${() => studio.open("movement")}>Bring movement</button>
+        <button class="button" onClick=${() => studio.open("between")}>Choose a clip</button>
+        <button class="button" onClick=${() => studio.open("movement")}>Bring one of your own</button>
       </div>
     </section>`;
   }
@@ -61,7 +61,6 @@ export function Panel({ studio }) {
       <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
       <input type="range" data-testid="depart" min="0" max=${FARTHEST * 100} step="1" value=${Math.round(wish.depart * 100)}
         aria-valuetext=${proposal ? departure(proposal.departs) : ""}
-        onKeyDown=${(/** @type {KeyboardEvent} */ event) => OWN_KEYS.includes(event.key) && event.stopPropagation()}
         onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
     </label>
     <div class="row">
@@ -94,7 +93,7 @@ function Order({ studio, varying, shown, isPiece, view }) {
     ${selected &&
     !varying.keeps(selected) &&
     html`<button class="button" data-testid="keep-selected" onClick=${() => varying.stay(selected)}>Keep the stretch selected on the time line</button>`}
-    <${Tiles} studio=${studio} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
+    <${Tiles} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
     <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
   </div>`;

@@ -1,7 +1,6 @@
 /** The new order as a strip of pictures; each stretch can be looked at, and kept. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
-import { useChange } from "../shell/hooks.js";
 import { thumbnail } from "../movements.js";
 
 const MOST = 400; // stretches with pictures
@@ -18,11 +17,10 @@ const SEAMS = /** @type {Record<string, [string, string]>} */ ({
 });
 
 /**
- * @param {{studio: any, piece: any, kept: string[], locked: string[], onKeep: (id: string) => void,
+ * @param {{piece: any, kept: string[], locked: string[], onKeep: (id: string) => void,
  *   onPlay: (block: any) => void}} props
  */
-export function Tiles({ studio, piece, kept, locked, onKeep, onPlay }) {
-  const dark = useChange(studio.viewer.theme, () => studio.viewer.theme.dark);
+export function Tiles({ piece, kept, locked, onKeep, onPlay }) {
   const [settled, setSettled] = useState(/** @type {any} */ (null));
   const { blocks, seams } = piece;
   useEffect(() => {
@@ -30,7 +28,7 @@ export function Tiles({ studio, piece, kept, locked, onKeep, onPlay }) {
     return () => clearTimeout(waiting);
   }, [piece]);
   const picture = (/** @type {any} */ block) => {
-    const address = thumbnail(block.key, block.first, dark, 64);
+    const address = thumbnail(block.key, block.first, 64);
     return settled === piece || loaded.has(address) ? address : undefined;
   };
   return html`<ol class="tiles" data-testid="order" aria-label="The new order">
