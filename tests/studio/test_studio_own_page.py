@@ -214,8 +214,8 @@ def test_a_stretch_selected_on_the_time_line_is_kept(served: Served, open_page: 
 def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
     page = open_page()
     page.get_by_test_id("open-vary").click()
-    page.get_by_text("There is nothing to vary yet").wait_for()
-    page.get_by_role("button", name="Bring movement").click()
+    page.get_by_text("There are too few postures for it yet").wait_for()
+    page.get_by_role("button", name="Bring one of your own").click()
     page.get_by_test_id("choose-files").wait_for(state="attached")
 
 
