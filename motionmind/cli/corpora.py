@@ -24,6 +24,7 @@ from motionmind.cli.options import (
     show_help_without_command,
 )
 from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
+from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.warming import warm_once
 from motionmind.cli.words import parse_mixture, parse_tolerances
@@ -200,13 +201,18 @@ def _read_clips(
     progress("learning")
 
 
-@command("motionmind corpus list", "list")
+@command("motionmind corpus list --remote", "list")
 @JSON
+@option("--remote", section=Section.CORPORA, is_flag=True, help="List the corpora that can be fetched, and recipes.")
+@INDEX
 @HOME
-def list_corpora(as_json: bool, home: Path | None) -> None:
-    """List all corpora, bundled and your own."""
+def list_corpora(as_json: bool, remote: bool, index: str | None, home: Path | None) -> None:
+    """List all corpora, bundled and your own; or, with --remote, those that others publish."""
     from motionmind.corpus.store import list_corpora, read_manifest
 
+    if remote:
+        print_index(index, as_json=as_json)
+        return
     found = []
     for name, folder in list_corpora(home).items():
         try:
@@ -309,5 +315,5 @@ def delete(name: str, is_sure: bool, home: Path | None) -> None:
     click.echo(f"deleted {displayed_path(place)}")
 
 
-for _command in (build, list_corpora, info, check, rename, delete):
+for _command in (build, list_corpora, info, check, rename, delete, publish, fetch):
     corpora.add_command(_command)

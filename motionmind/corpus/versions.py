@@ -36,7 +36,7 @@ def hold(version: Path) -> Iterator[bool]:
     """Keep a version from being removed until the context ends; yield whether it is there."""
     with ExitStack() as stack:
         try:
-            there = stack.enter_context(_locked(version, alone=False))
+            there = stack.enter_context(locked(version, alone=False))
         except FileNotFoundError:
             there = False
         yield there
@@ -51,7 +51,7 @@ def new_version(folder: Path) -> Iterator[Path]:
         with ExitStack() as stack:
             try:
                 version.mkdir()
-                mine = stack.enter_context(_locked(version, alone=True, is_new=True))
+                mine = stack.enter_context(locked(version, alone=True, is_new=True))
             except (FileExistsError, FileNotFoundError):  # another writer's; or taken for a leftover
                 continue
             # Another writer may have removed it as a leftover, and made and locked it anew.
@@ -69,7 +69,7 @@ def remove_others(folder: Path, current: Callable[[], Path | None]) -> None:
     """
     with suppress(OSError):
         for version in [*filter(_is_version, folder.iterdir()), folder]:
-            with suppress(OSError), _locked(version, alone=True) as unused:
+            with suppress(OSError), locked(version, alone=True) as unused:
                 # Asked only now: whoever makes a version current holds it.
                 if not unused or (kept := current()) == version:
                     continue
@@ -138,8 +138,13 @@ def _moved_aside(folder: Path, suffix: str) -> list[Path]:
 
 
 @contextmanager
-def _locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]:
+def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]:
     """Lock a folder until the context or the process ends: alone, or with others who do not lock it alone.
+
+    Args:
+        folder: the folder, which is there.
+        alone: whether nobody else may lock it.
+        is_new: whether only those who lock it use it, so that where there are no locks it is taken to be unused.
 
     Yields:
         Whether it is locked; alone if nobody else has locked it, with others, or a new one, if the folder is still in

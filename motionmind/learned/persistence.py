@@ -61,20 +61,47 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
     Raises:
         CorpusError: the folder cannot be written, or holds anything but a built corpus.
     """
-    corpus, space = learned.corpus, learned.space
-    arrays: dict[str, NDArray[Any]] = {
+    arrays = _movement(learned)
+    for name, kind in _PARTS.items():
+        part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
+        arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
+    store.save(Path(folder), _manifest(learned), arrays)
+
+
+def save_movement(learned: Learned, folder: str | os.PathLike[str]) -> None:
+    """Write a corpus's movement and its states alone, as `save`: `load_movement` learns all else from them again."""
+    store.save(Path(folder), _manifest(learned), _movement(learned))
+
+
+def load_movement(folder: str | os.PathLike[str]) -> Learned:
+    """Load the movement and the states of a built corpus, and learn all else from them.
+
+    Args:
+        folder: as `save` or `save_movement` wrote it, in this version or an earlier one.
+
+    Raises:
+        FormatError: it cannot be read, or is not valid.
+    """
+    return learn_from_states(*_read_movement(Path(folder), store.load(Path(folder))))
+
+
+def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
+    """Return the arrays from which all that was learned can be learned again, by name."""
+    corpus = learned.corpus
+    return {
         "rotations": corpus.rotations,
         "root": corpus.root,
         "times": corpus.times,
         "detail": corpus.detail,
         "states": learned.states,
-        "centres": space.centres,
+        "centres": learned.space.centres,
     }
-    for name, kind in _PARTS.items():
-        part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
-        arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
-    skeleton = corpus.skeleton
-    manifest = {
+
+
+def _manifest(learned: Learned) -> dict[str, Any]:
+    """Return a built corpus's entries in its manifest."""
+    corpus, space, skeleton = learned.corpus, learned.space, learned.corpus.skeleton
+    return {
         **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
         "skeleton": {
             "name": skeleton.name,
@@ -92,7 +119,6 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
             "labels": space.labels,
         },
     }
-    store.save(Path(folder), manifest, arrays)
 
 
 def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:

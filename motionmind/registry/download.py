@@ -1,0 +1,203 @@
+"""Files from the network: over TLS, no larger than they are said to be, verified, and taken up where they ended.
+
+Everything that comes is checked against a SHA-256 that the index states, so a part of a file may be kept and taken up
+again by any later process without asking the server whether it still has the same file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import ipaddress
+import shutil
+import urllib.request
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+from urllib.error import HTTPError, URLError
+from urllib.parse import urlsplit
+
+from motionmind.errors import CorpusError
+from motionmind.files import sync_folder
+
+_TIMEOUT = 30.0  # seconds in which a server must answer, or send the next bytes
+_CHUNK = 2**18  # bytes
+_MOST_CONNECTIONS = 5  # for one file, each of which must bring something
+_REDIRECTIONS = 5
+
+Progress = Callable[[int], None]  # is told how many bytes there are
+
+
+def check_address(url: str, before: str | None = None) -> None:
+    """Check that an address may be asked: over TLS, or on this machine if nothing else asked for that.
+
+    Args:
+        url: the address.
+        before: the address that named it, if any.
+
+    Raises:
+        CorpusError: it may not; the message says why.
+    """
+    try:
+        parts = urlsplit(url)
+        host, is_secret, _ = parts.hostname, parts.username or parts.password, parts.port
+    except ValueError as error:
+        raise CorpusError(f"{url}: is not an address: {error}") from error
+    if is_secret:
+        raise CorpusError(f"{url}: names a user or a password, which would be sent to whoever is there")
+    is_here = _is_loopback(host or "")
+    if parts.scheme not in (("https", "http") if is_here else ("https",)) or not host:
+        raise CorpusError(f"{url}: is not asked for; addresses begin with https:// (or are on this machine)")
+    if is_here and before is not None and not _is_loopback(urlsplit(before).hostname or ""):
+        raise CorpusError(f"{url}: is on this machine, and {before} is not; it is not asked for")
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    with suppress(ValueError):
+        return ipaddress.ip_address(host).is_loopback
+    return False
+
+
+class _Redirections(urllib.request.HTTPRedirectHandler):
+    """Follows redirections to addresses that may be asked, and no others."""
+
+    max_redirections = _REDIRECTIONS
+
+    def redirect_request(
+        self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str, headers: Any, newurl: str
+    ) -> urllib.request.Request | None:
+        """Return the request for the new address."""
+        check_address(newurl, req.full_url)
+        return super().redirect_request(req, fp, code, msg, headers, newurl)
+
+
+def _open(url: str, start: int = 0) -> Any:
+    """Ask for an address, from a byte on; return the response, whose status is 200 or, from that byte on, 206."""
+    check_address(url)
+    request = urllib.request.Request(url, headers={"Accept-Encoding": "identity", "User-Agent": "motionmind"})
+    if start:
+        request.add_header("Range", f"bytes={start}-")
+    handlers: list[urllib.request.BaseHandler] = [_Redirections()]
+    if _is_loopback(urlsplit(url).hostname or ""):
+        handlers.append(urllib.request.ProxyHandler({}))  # which would ask its own machine
+    return urllib.request.build_opener(*handlers).open(request, timeout=_TIMEOUT)
+
+
+def _reason(error: Exception) -> str:
+    """Say in words why an address gave nothing."""
+    if isinstance(error, HTTPError):
+        return f"the server answers {error.code} {error.reason}"
+    cause = error.reason if isinstance(error, URLError) else error
+    if isinstance(cause, TimeoutError):
+        return f"nothing came for {_TIMEOUT:g} s"
+    if isinstance(cause, OSError):
+        return cause.strerror or str(cause)
+    return str(cause) or type(cause).__name__
+
+
+def read_address(url: str, most: int) -> tuple[bytes, str]:
+    """Read a small file from an address: its bytes, and the address after redirections.
+
+    Args:
+        url: the address.
+        most: the most bytes that it may have.
+
+    Raises:
+        CorpusError: it may not be asked, cannot be reached, or gives more.
+    """
+    try:
+        with _open(url) as response:
+            data, reached = response.read(most + 1), response.url
+            if response.length and len(data) <= most:
+                raise http.client.HTTPException(f"it ended {response.length:,} bytes early")
+    except (OSError, http.client.HTTPException, ValueError) as error:
+        raise CorpusError(f"{url}: cannot be reached: {_reason(error)}") from error
+    if len(data) > most:
+        raise CorpusError(f"{url}: is larger than {most // 10**6} MB")
+    return data, str(reached)
+
+
+def download(url: str, place: Path, size: int, sha256: str, on_progress: Progress | None = None) -> None:
+    """Download a file; what has come is kept beside its place until all has, and the next call goes on from there.
+
+    Args:
+        url: its address.
+        place: where it goes, in a folder that nobody else writes to.
+        size: its bytes.
+        sha256: its hash.
+        on_progress: is told how many bytes there are.
+
+    Raises:
+        CorpusError: it cannot be reached, ended early, is larger, is another file, or the disk is too small.
+    """
+    part = place.with_name(f"{place.name}.part")
+    try:
+        had = min(part.stat().st_size, size) if part.exists() else 0
+        if (free := shutil.disk_usage(place.parent).free) < size - had:
+            lacking = f"{size - had:,} bytes are needed, and {free:,} are free"
+            raise CorpusError(f"{place.parent}: the disk is too small: {lacking}")
+        with part.open("ab") as file:
+            if file.tell() > size:
+                _empty(file)
+            _complete(url, file, size, on_progress)
+        found = file_hash(part)
+        if found != sha256 and had:  # of another file of this size, perhaps: it is fetched whole
+            part.unlink()
+            return download(url, place, size, sha256, on_progress)
+        if found != sha256:
+            part.unlink()
+            raise CorpusError(f"{url}: is not the file that the index names: its SHA-256 is {found}, not {sha256}")
+        part.replace(place)
+        sync_folder(place.parent)
+    except OSError as error:
+        raise CorpusError(f"{part}: cannot be written: {error.strerror or error}") from error
+
+
+def _complete(url: str, file: IO[bytes], size: int, on_progress: Progress | None) -> None:
+    """Append to a file what lacks of it, over as many connections as bring something, up to a limit."""
+    for _ in range(_MOST_CONNECTIONS):
+        if (start := file.tell()) == size:
+            return
+        reason = "the connection ended"
+        try:
+            with _open(url, start) as response:
+                _append(url, file, size, response, on_progress)
+        except HTTPError as error:
+            if error.code != http.client.REQUESTED_RANGE_NOT_SATISFIABLE:
+                raise CorpusError(f"{url}: cannot be fetched: {_reason(error)}") from error
+            _empty(file)  # it is shorter there: whatever it is, it begins anew
+        except (OSError, http.client.HTTPException, ValueError) as error:
+            reason = _reason(error)
+        if file.tell() == start:
+            break
+    if file.tell() != size:
+        raise CorpusError(f"{url}: {file.tell():,} of {size:,} bytes have come: {reason}; fetch it again to go on")
+
+
+def _append(url: str, file: IO[bytes], size: int, response: Any, on_progress: Progress | None) -> None:
+    """Append a response to a file, from where it says that it begins; CorpusError if that is more than `size` bytes."""
+    if response.status != http.client.PARTIAL_CONTENT:
+        _empty(file)  # the server sends the whole file
+    elif not response.headers.get("Content-Range", "").startswith(f"bytes {file.tell()}-"):
+        raise http.client.HTTPException("the server sends another part of the file than it was asked for")
+    while chunk := response.read(_CHUNK):
+        if file.tell() + len(chunk) > size:
+            _empty(file)
+            raise CorpusError(f"{url}: is larger than the {size:,} bytes that the index states")
+        file.write(chunk)
+        if on_progress:
+            on_progress(file.tell())
+
+
+def _empty(file: IO[bytes]) -> None:
+    file.seek(0)
+    file.truncate()
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file; OSError if it cannot be read."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

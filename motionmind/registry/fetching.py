@@ -1,0 +1,136 @@
+"""Fetching a corpus: from an index to a corpus of the user's own, verified, validated and learned here."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import platformdirs
+
+from motionmind.corpus import store
+from motionmind.corpus.versions import locked
+from motionmind.errors import CorpusError, FormatError
+from motionmind.files import make_folder
+from motionmind.learned.learning import Learned
+from motionmind.learned.persistence import load_movement, save
+from motionmind.registry.archive import unpack
+from motionmind.registry.download import Progress, check_address, download, file_hash
+from motionmind.registry.index import Entry, Recipe, Source, find, is_address, open_index
+
+_ARCHIVE = "archive.tar"
+_TOLD = ("title", "author", "source", "licence")  # by the index and the corpus, which must agree
+
+
+def archives() -> Path:
+    """Return the folder in which fetched archives are kept, each under its SHA-256."""
+    return Path(platformdirs.user_cache_dir("motionmind", appauthor=False)) / "archives"
+
+
+def look_up(name: str, index: str | None = None) -> tuple[Entry | Recipe, Source]:
+    """Return what an index says of a corpus, and the index.
+
+    Args:
+        name: of a corpus; or the address of an index, with "#name" after it if that holds several corpora.
+        index: the path or the address of an index to look in before the one that comes with MotionMind.
+
+    Raises:
+        CorpusError: there is no such corpus, or the index cannot be reached.
+        FormatError: it is not an index.
+    """
+    if not is_address(name):
+        return find(name, [index, None] if index else [None])
+    place, _, fragment = name.partition("#")
+    if fragment:
+        return find(fragment, [place])
+    source = open_index(place)
+    if len(source.index.corpora) != 1:
+        names = ", ".join(entry.name for entry in source.index.corpora[:20]) or "none"
+        raise CorpusError(f"{place}: holds {len(source.index.corpora)} corpora ({names}); add #NAME to the address")
+    return source.index.corpora[0], source
+
+
+def fetch(
+    entry: Entry,
+    source: Source,
+    *,
+    name: str | None = None,
+    home: str | os.PathLike[str] | None = None,
+    on_progress: Progress | None = None,
+) -> Path:
+    """Fetch a corpus, and return its folder among the user's own; it is written whole or not at all.
+
+    Its archive is kept, so that it is not downloaded again; a download that ends early is gone on with.
+
+    Args:
+        entry: the corpus, from `look_up`.
+        source: the index that it is in.
+        name: the name that it gets; its own by default.
+        home: the user's home (`motionmind.corpus.store.home`).
+        on_progress: is told how many bytes of the archive there are.
+
+    Raises:
+        CorpusError: the name is invalid or taken, the archive cannot be got or is not the one that the index names, or
+            the corpus in it is not valid.
+    """
+    chosen = entry.name if name is None else name
+    place = store.place_for(chosen, home)
+    if (place / store.MANIFEST).exists():
+        raise CorpusError(f"there is a corpus {chosen!r} already; fetch this one under another name")
+    if entry.corpus_version not in store.VERSIONS[store.BUILT]:
+        newest = store.VERSIONS[store.BUILT][-1]
+        raise CorpusError(f"{entry.name} is a corpus of version {entry.corpus_version}; {newest} can be read")
+    with _held(entry) as folder:
+        archive = _obtain(entry, source, folder, on_progress)
+        learned = _learn(entry, archive, folder / "unpacked")
+        save(replace(learned, corpus=replace(learned.corpus, name=chosen)), place)
+    return place
+
+
+@contextmanager
+def _held(entry: Entry) -> Iterator[Path]:
+    """Hold the folder of an archive alone; nothing but archives is in it before or after."""
+    folder = archives() / entry.archive.sha256
+    try:
+        make_folder(folder)
+        with locked(folder, alone=True, is_new=True) as is_mine:
+            if not is_mine:
+                raise CorpusError(f"{entry.name} is being fetched by another process")
+            shutil.rmtree(folder / "unpacked", ignore_errors=True)  # of a process that was killed
+            try:
+                yield folder
+            finally:
+                shutil.rmtree(folder / "unpacked", ignore_errors=True)
+    except OSError as error:
+        raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
+
+
+def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | None) -> Path:
+    """Return the verified archive of a corpus: a file beside a local index, the one that was kept, or a new one."""
+    where, wanted = source.locate(entry.archive), entry.archive
+    if is_address(where):
+        check_address(where, source.place if is_address(source.place) else None)
+    kept = folder / _ARCHIVE if is_address(where) else Path(where)
+    if is_address(where) and not (kept.exists() and file_hash(kept) == wanted.sha256):
+        download(where, kept, wanted.size, wanted.sha256, on_progress)
+    elif not is_address(where) and file_hash(kept) != wanted.sha256:
+        raise CorpusError(f"{kept}: is not the file that the index names: its SHA-256 is not {wanted.sha256}")
+    return kept
+
+
+def _learn(entry: Entry, archive: Path, folder: Path) -> Learned:
+    """Unpack an archive and learn from what it holds; CorpusError if that is not valid, or not what the index says."""
+    place = folder / entry.name
+    unpack(archive, entry.files, place)
+    try:
+        learned = load_movement(place)
+    except FormatError as error:
+        message = str(error).removesuffix(f"; {store.remedy(place)}").replace(f"{place}{os.sep}", "")
+        raise CorpusError(f"the archive of {entry.name} holds no valid corpus: {message}") from error
+    for key in _TOLD:
+        if (told := getattr(learned.corpus, key)) != getattr(entry, key):
+            raise CorpusError(f"the archive of {entry.name} states another {key} than the index: {told!r:.200}")
+    return learned
