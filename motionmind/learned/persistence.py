@@ -92,6 +92,8 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
             "labels": space.labels,
         },
     }
+    if corpus.origins:
+        manifest["origins"] = [asdict(origin) for origin in corpus.origins]
     store.save(Path(folder), manifest, arrays)
 
 
@@ -188,6 +190,7 @@ def _read_arrays(
             times=arrays["times"],
             detail=arrays["detail"],
             faults=manifest.faults,
+            origins=manifest.origins,
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
         space = StateSpace(
@@ -247,6 +250,7 @@ def _read_source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discre
     about = {clip.name: clip.about for clip in manifest.clips}
     about |= {clip.name: clip.about for score in scores for clip in score.clips}
     corpus = gather(
+        performer={clip.name: clip.performer for clip in manifest.clips},
         motions=[*clips, *(motion for score in scores for motion in motions(score))],
         flips="keep",
         about=about,
