@@ -9,6 +9,7 @@ from .body.skeleton import Skeleton as Skeleton
 from .chaos.flows import Flow as Flow
 from .chaos.flows import flow_of as flow_of
 from .corpus.store import list_corpora as list_corpora
+from .credits.credit import Credit as Credit
 from .discretize.library import write_library as write_library
 from .discretize.naming import name_states as name_states
 from .discretize.protocol import Discretization as Discretization
@@ -62,6 +63,7 @@ __version__: str
 __all__ = [
     "Bridge",
     "CorpusError",
+    "Credit",
     "Discretization",
     "Engine",
     "Explanation",

@@ -17,7 +17,7 @@ from motionmind import MotionMindError, WrongTypeError
 from motionmind.corpus.gather import Gathering
 
 # Made by MotionMind and given to its users, who make none; errors and warnings take any message.
-ANSWERS = {"Bridge", "Explanation", "Figure", "Seam", "Sighting", "Source", "Tween", "TweenReport", "Wait"}
+ANSWERS = {"Bridge", "Credit", "Explanation", "Figure", "Seam", "Sighting", "Source", "Tween", "TweenReport", "Wait"}
 PROTOCOLS = {"Discretization", "MotionReader", "MotionWriter"}  # which others implement
 SCORE = """title  Two bends of the knees
 body   human23
@@ -63,7 +63,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     tween_asked = {"a": posture, "b": motion.posture(3), "moves": 3}
     gathering: dict[str, Any] = {"rate": None, "skip": 0, "facing": "free", "flips": "repair", "flip_degrees": 60.0}
     gathering |= {"mirror": False, "reverse": None, "about": None}
-    gathering |= dict.fromkeys(("title", "author", "source", "licence"), "")
+    gathering |= dict.fromkeys(("title", "author", "source", "licence", "performer"), "")
     assert gathering.keys() == Gathering.__annotations__.keys()
     path = folder / "out"
     return {
@@ -108,7 +108,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "Engine.save": (engine.save, {"folder": folder / "saved"}),
         "Engine.tween": (engine.tween, tween_asked),
         "Flow": (mm.Flow, {"name": "own", "field": flow.field, "start": flow.start, "step": 0.01}),
-        "Insertion": (mm.Insertion, {"times": [0.0, 1.0]}),
+        "Insertion": (mm.Insertion, {"times": [0.0, 1.0], "credits": ()}),
         "Insertion.renamed": (mm.Insertion(np.arange(2.0)).renamed, {"joints": {}}),
         "Motion": (mm.Motion, {"skeleton": skeleton, "times": [0.0], **still}),
         "Motion.at": (motion.at, {"times": [0.5]}),

@@ -22,7 +22,7 @@ from sphinx.util.docutils import SphinxDirective
 _log = logging.getLogger(__name__)
 
 SUBJECTS = {
-    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "Sighting", "list_corpora"),
+    "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "Credit", "Sighting", "list_corpora"),
     "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure"),
     "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
     "Files": (

@@ -27,6 +27,7 @@ from motionmind.arguments import (
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.tables import data_frame, data_set
+from motionmind.credits.credit import Credit, add_up, check_shares
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -86,6 +87,7 @@ class Insertion:
     Attributes:
         times: times [M + 1] of the postures that its M moves join, seconds; the first is A's, the last B's.
         bridged: moves of joints that no corpus attests: the joint's name, and the number of the move from 0.
+        credits: whose movement it is made of; empty where that is not known, and where nothing moves.
 
     >>> import numpy as np
     >>> from motionmind import Insertion
@@ -95,10 +97,13 @@ class Insertion:
 
     times: Floats
     bridged: tuple[tuple[str, int], ...] = ()
+    credits: tuple[Credit, ...] = ()
 
     def __post_init__(self) -> None:
         times = as_floats("times", self.times)
         check_items("bridged", self.bridged, "pairs of a joint's name and a move", tuple)
+        check_items("credits", self.credits, "credits", Credit)
+        check_shares(self.credits)
         if times.ndim != 1 or len(times) == 0 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError("an insertion's times must be finite and increasing, one at least")
         for joint, move in self.bridged:
@@ -223,6 +228,26 @@ class Motion:
                 start, end = one.times[move : move + 2]
                 found[:, self.skeleton.index(joint)] |= (self.times > start - _MOMENT) & (self.times < end + _MOMENT)
         return found & self.inserted()[:, None]
+
+    @property
+    def credits(self) -> tuple[Credit, ...]:
+        """Shares of time by clip: insertions by their credits, and all else as given movement of this name.
+
+        It is empty for a posture that the engine came back to without moving.
+        """
+        start, end = float(self.times[0]), float(self.times[-1])
+        if start == end:
+            return () if self.insertions else (self._given(1.0),)
+        shares, rest = [], end - start
+        for one in self.insertions:
+            seconds = float(min(one.times[-1], end) - max(one.times[0], start))
+            if seconds > _MOMENT:
+                rest -= seconds
+                shares += [replace(credit, share=credit.share * seconds) for credit in one.credits or (Credit(1.0),)]
+        return add_up([*shares, self._given(rest if rest > _MOMENT else 0.0)])
+
+    def _given(self, share: float) -> Credit:
+        return Credit(share, self.name or "movement")
 
     @property
     def fps(self) -> float:

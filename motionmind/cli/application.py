@@ -13,6 +13,7 @@ import click
 from motionmind.cli.catalogue import postures
 from motionmind.cli.conversion import convert, posture
 from motionmind.cli.corpora import corpora
+from motionmind.cli.credits import credits as credit
 from motionmind.cli.looks import explain, graph
 from motionmind.cli.measures import measure
 from motionmind.cli.options import group, show_help_without_command
@@ -47,7 +48,7 @@ def app(context: click.Context) -> None:
 
 
 for _command in (
-    *(tween, postures, posture, convert, corpora, explain, graph, measure, sheet, render, compose, library),
+    *(tween, postures, posture, convert, corpora, explain, credit, graph, measure, sheet, render, compose, library),
     *(vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)

@@ -12,6 +12,7 @@ from motionmind.cli.files import (
     MOVEMENT,
     check_outputs,
     evened,
+    note_licences,
     note_lossy_fields,
     question_clock,
     read_mapping,
@@ -155,6 +156,7 @@ def convert(
         write_papers(output, motion, form=form)
     else:
         write_motion(output, motion, unit=out_unit or "cm")
+    note_licences(output, motion)
     note_lossy_fields(output, lossy_fields(motion, output, source=next(iter(named.source.paths), None)))
     click.echo(
         f"{displayed_path(output)}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints "

@@ -124,6 +124,13 @@ def corpora(context: click.Context) -> None:
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
 @option("--source", section=Section.ABOUT, default="", show_default=False, help="State where the movement comes from.")
+@option(
+    "--performer",
+    section=Section.ABOUT,
+    default="",
+    show_default=False,
+    help="Name who performs the movement, if not the author: credits name them.",
+)
 @option("--licence", section=Section.ABOUT, default="", show_default=False, help="State the licence of the movement.")
 @HOME
 def build(

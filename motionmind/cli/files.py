@@ -50,6 +50,7 @@ def write(path: Path, movement: Motion | Posture) -> None:
     from motionmind.render.pictures import write_picture
 
     motion = movement.as_motion() if isinstance(movement, Posture) else evened(path, movement)
+    note_licences(path, motion)
     if path.suffix.lower() in PICTURES:
         write_picture(path, motion)
         return
@@ -58,6 +59,14 @@ def write(path: Path, movement: Motion | Posture) -> None:
     else:
         write_motion(path, motion)
     note_lossy_fields(path, lossy_fields(motion, path))
+
+
+def note_licences(path: Path, motion: Motion) -> None:
+    """Note what stands against passing on a motion that is written, by the licences of what it is made of."""
+    from motionmind.credits.ledger import objections
+
+    for objection in objections(motion.credits):
+        note(f"{path}: {objection}")
 
 
 def evened(path: Path, motion: Motion) -> Motion:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import check_outputs
+from motionmind.cli.files import check_outputs, note_licences
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
@@ -178,6 +178,7 @@ def render(
     motion = whole.slice(frames.start, frames.stop)
     with all_or_none():
         for path in outputs:
+            note_licences(path, motion)
             write_picture(path, motion, first=frames.start, **drawing)
     seconds = motion.times[-1] - motion.times[0]
     for path in outputs:

@@ -337,11 +337,11 @@ def print_origins(summary: dict[str, Any]) -> None:
     if len(rows) < 2 and not any(name != displayed(summary["name"]) for name, _ in rows):
         return
     width = max(len(name) for name, _ in rows)
-    click.echo(f"{'learned from':{width}}  clips  postures  moves  each counts  of all moves")
+    click.echo(f"{'learned from':{width}}  clips  postures  moves  each counts  of all moves  licence")
     for name, row in rows:
         click.echo(
             f"{name:{width}}  {row['clips']:5}  {row['postures']:8}  {row['moves']:5}  {row['weight']:11.4g}  "
-            f"{row['share']:12.1%}"
+            f"{row['share']:12.1%}  {displayed(row['licence']) or '-'}"
         )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, write
+from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, note_licences, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
 from motionmind.cli.printing import (
     Interruption,
@@ -373,6 +373,7 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
         for path in outputs:
             suffix = path.suffix.lower()
             if suffix == ".json":
+                note_licences(path, variation.motion())
                 write_variation(path, variation)
             else:
                 motion = variation.motion()

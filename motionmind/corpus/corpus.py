@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.display import displayed
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
@@ -59,6 +60,7 @@ class Clip:
         mirrored: whether left and right are exchanged.
         reverse: the price, in nats per move, of learning it backwards too; None if it is not.
         repairs: what was mended of its recording.
+        performer: who performs it; "" if that is not known, or is the corpus's author.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Clip:
     mirrored: bool = False
     reverse: float | None = None
     repairs: tuple[JointRepair, ...] = ()
+    performer: str = ""
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -151,6 +154,7 @@ class Corpus:
         licence: the licence for its use.
         faults: joint flips in the corpus's own recordings.
         skip: frames that were dropped at each recording's start, such as an added T-pose.
+        origins: the corpora that its other clips were taken from.
     """
 
     name: str
@@ -168,6 +172,7 @@ class Corpus:
     licence: str = ""
     faults: tuple[JointFlip, ...] = ()
     skip: int = 0
+    origins: tuple[Origin, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:
@@ -265,6 +270,30 @@ class Corpus:
     def clip_of(self, posture: int) -> Clip:
         """Return the clip that a posture is in."""
         return self.clips[int(self._clip_of[posture])]
+
+    @cached_property
+    def own_origin(self) -> Origin:
+        """Where its own clips come from."""
+        return Origin(self.name, self.title, self.author, self.source, self.licence)
+
+    @cached_property
+    def clip_origins(self) -> dict[str, Origin]:
+        """Where its clips come from, by the name of the corpus that each was taken from, its own among them.
+
+        Corpora that were mixed before origins were kept are known by their names alone.
+        """
+        known = {origin.name: origin for origin in (*self.origins, self.own_origin)}
+        names = dict.fromkeys(clip.corpus or self.name for clip in self.clips)
+        return {name: known.get(name, Origin(name)) for name in names}
+
+    def credit_of(self, clip: Clip) -> Credit:
+        """Return the credit of a movement that is all made of a clip."""
+        return credit_clip(self.clip_origins[clip.corpus or self.name], clip.name, clip.performer)
+
+    @cached_property
+    def clips_by_name(self) -> dict[tuple[str, str], Clip]:
+        """A clip by the name of the corpus that it was taken from and its own; a mirror image has these in common."""
+        return {(clip.corpus or self.name, clip.name): clip for clip in self.clips}
 
     def motion(self, clip: Clip) -> Motion:
         """Return a clip's N postures as a motion."""

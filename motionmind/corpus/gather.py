@@ -29,6 +29,7 @@ from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, JointRepair, subdivide_times
 from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
+from motionmind.corpus.origins import gather_origins, warn_of_licences
 from motionmind.errors import CorpusError, MotionMindWarning, SkeletonError, enumerated
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline
@@ -61,6 +62,7 @@ class Gathering(TypedDict, total=False):
     author: str
     source: str
     licence: str
+    performer: str | Mapping[str, str]
 
 
 def gather(
@@ -80,6 +82,7 @@ def gather(
     author: str = "",
     source: str = "",
     licence: str = "",
+    performer: str | Mapping[str, str] = "",
 ) -> Corpus:
     """Gather `motions`, and the corpora to `mix` with them, into a corpus; all are on the same joints.
 
@@ -106,12 +109,15 @@ def gather(
         author: who made it.
         source: where it comes from.
         licence: the licence for its use.
+        performer: who performs the recordings: one for all, or each by the recording's name. Where it is not known, the
+            author is credited.
 
     Returns:
         The corpus.
 
     Warns:
-        MotionMindWarning: recordings contradict their clocks (`question_tempo`).
+        MotionMindWarning: recordings contradict their clocks (`question_tempo`), or the licences of the corpora stand
+            against passing on what is made of them together (`motionmind.credits.licences`).
 
     Raises:
         CorpusError: nothing is left to learn from, recordings or corpora differ in their joints or cannot be brought to
@@ -125,11 +131,13 @@ def gather(
     check_mapping("about", about, or_none=True)
     for key, value in (("title", title), ("author", author), ("source", source), ("licence", licence)):
         check_text(key, value)
+    if not isinstance(performer, str):
+        check_mapping("performer", performer)
     check_items("clips", motions, "motions")
     _check_options(skip, flips, flip_degrees, reverse)
     given = None if rate == "auto" else rate
     _check_mix(name, mix, given)
-    own = _take_recordings(motions, rate, skip, flips, flip_degrees)
+    own = _take_recordings(motions, rate, skip, flips, flip_degrees, performer)
     body = own.body
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
@@ -152,7 +160,7 @@ def gather(
     if mirror:
         pieces += _mirror_images(pieces)
     between = _frames_between(common)
-    return Corpus(
+    corpus = Corpus(
         name,
         body,
         _lay_out_clips(name, pieces, common, reverse),
@@ -168,7 +176,11 @@ def gather(
         licence,
         own.faults,
         skip,
+        gather_origins(other for other, _ in mix),
     )
+    if mix:
+        warn_of_licences(corpus)
+    return corpus
 
 
 # --- options ----------------------------------------------------------------------------------------------------------
@@ -293,7 +305,12 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
 
 
 def _take_recordings(
-    motions: Iterable[Motion], rate: Rate, skip: int, flips: Flips, flip_degrees: float
+    motions: Iterable[Motion],
+    rate: Rate,
+    skip: int,
+    flips: Flips,
+    flip_degrees: float,
+    performer: str | Mapping[str, str],
 ) -> _Recordings:
     """Skip frames, repair recordings or cut them at faults, and take their postures at `rate`."""
     from motionmind.body.tempo import question_tempo  # a tween from a built corpus does not need it
@@ -330,7 +347,8 @@ def _take_recordings(
         wanted = _posture_rate(motion) if rate == "auto" else rate
         if wanted is not None:
             rates.add(wanted)
-        pieces += _cut(motion, cuts, wanted, _later(repairs, skip))
+        by = performer if isinstance(performer, str) else performer.get(motion.name, "")
+        pieces += _cut(motion, cuts, wanted, Clip(motion.name, 0, 0, repairs=_later(repairs, skip), performer=by))
     if doubts:
         message = (
             f"frames per second, or the unit, are doubtful where people move as nobody can: {enumerated(doubts, 3)}"
@@ -339,8 +357,8 @@ def _take_recordings(
     return _Recordings(pieces, tuple(faults), max(rates, default=None), first.skeleton if first else None)
 
 
-def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, repairs: tuple[JointRepair, ...]) -> list[_Piece]:
-    """Cut a recording before the frames `cuts`, and take its parts' postures.
+def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, whole: Clip) -> list[_Piece]:
+    """Cut a recording before the frames `cuts`, and take its parts' postures; `whole` is its clip.
 
     Parts are numbered, and those of a single posture, which have no move, are dropped.
     """
@@ -351,8 +369,9 @@ def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, repairs: tuple
         postures = replace(part if rate is None else part.resample(rate), name=name)
         if len(postures) > 1 or not cuts:
             first, last = part.times[0], part.times[-1]
-            within = tuple(one for one in repairs if one.seconds[0] <= last and first <= one.seconds[1])
-            pieces.append(_Piece(postures, _with_detail(postures, part, rate), Clip(name, 0, 0, repairs=within)))
+            within = tuple(one for one in whole.repairs if one.seconds[0] <= last and first <= one.seconds[1])
+            clip = replace(whole, name=name, repairs=within)
+            pieces.append(_Piece(postures, _with_detail(postures, part, rate), clip))
     return pieces
 
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from motionmind.corpus.corpus import Clip, Facing, JointFlip
+from motionmind.credits.credit import Origin
 from motionmind.errors import FormatError
 
 _Schema = TypeVar("_Schema", bound=msgspec.Struct)
@@ -15,11 +16,12 @@ _Vector = tuple[float, float, float]
 
 
 class ClipFile(msgspec.Struct, frozen=True):
-    """A clip of a corpus that people write; `file` is relative to the manifest's folder."""
+    """A clip of a corpus that people write; `file` is relative to the manifest's folder, `performer` as in Clip."""
 
     name: str
     file: str
     about: str
+    performer: str = ""
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,6 +76,7 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
     clips: tuple[Clip, ...]
     faults: tuple[JointFlip, ...]
     space: SpaceEntry
+    origins: tuple[Origin, ...] = ()
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:

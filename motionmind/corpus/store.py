@@ -33,7 +33,7 @@ _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name fro
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_cells.py", "_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py", "plugins.py"),
-    *("geometry", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
+    *("geometry", "credits", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
 )
 
 

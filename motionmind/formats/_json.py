@@ -16,6 +16,7 @@ from motionmind._typing import Floats, Indices
 from motionmind.body.human import BODIES
 from motionmind.body.motion import Insertion
 from motionmind.body.skeleton import Skeleton
+from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindWarning, SkeletonError, did_you_mean, enumerated, quoted
 from motionmind.files import FilePath
 from motionmind.formats.text import LARGEST, MOST_JOINTS
@@ -57,11 +58,12 @@ class SkeletonSchema(msgspec.Struct, forbid_unknown_fields=True):
     joints: list[JointSchema]
 
 
-class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True):
-    """A stretch that the engine inserted: the times of its postures, and (joint, move) for each bridge."""
+class InsertionSchema(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """A stretch that the engine inserted: the times of its postures, (joint, move) for each bridge, and its credits."""
 
     times: list[float]
     bridged: list[tuple[str, int]] = []  # msgspec copies it for each object
+    credits: list[Credit] = []
 
 
 MARKS = "motionmind"  # where glTF keeps MarksSchema: the key in a node's extras
@@ -92,12 +94,12 @@ def kind_of(data: bytes, path: FilePath) -> str:
 
 def to_insertion(schema: InsertionSchema) -> Insertion:
     """Build an insertion; MotionMindError if its times do not increase, or it bridges a move that it does not have."""
-    return Insertion(np.array(schema.times), tuple(schema.bridged))
+    return Insertion(np.array(schema.times), tuple(schema.bridged), tuple(schema.credits))
 
 
 def insertion_schema(insertion: Insertion, start: float = 0.0) -> InsertionSchema:
     """Return what a file holds of an insertion, with its times counted from `start`, seconds."""
-    return InsertionSchema(rounded(insertion.times - start).tolist(), list(insertion.bridged))
+    return InsertionSchema(rounded(insertion.times - start).tolist(), list(insertion.bridged), list(insertion.credits))
 
 
 def decode(data: bytes, schema: type[T], path: FilePath) -> T:

@@ -101,7 +101,7 @@ def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
 def _manifest(learned: Learned) -> dict[str, Any]:
     """Return a built corpus's entries in its manifest."""
     corpus, space, skeleton = learned.corpus, learned.space, learned.corpus.skeleton
-    return {
+    manifest: dict[str, Any] = {
         **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
         "skeleton": {
             "name": skeleton.name,
@@ -119,6 +119,9 @@ def _manifest(learned: Learned) -> dict[str, Any]:
             "labels": space.labels,
         },
     }
+    if corpus.origins:
+        manifest["origins"] = [asdict(origin) for origin in corpus.origins]
+    return manifest
 
 
 def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
@@ -214,6 +217,7 @@ def _read_arrays(
             times=arrays["times"],
             detail=arrays["detail"],
             faults=manifest.faults,
+            origins=manifest.origins,
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
         space = StateSpace(
@@ -273,6 +277,7 @@ def _read_source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discre
     about = {clip.name: clip.about for clip in manifest.clips}
     about |= {clip.name: clip.about for score in scores for clip in score.clips}
     corpus = gather(
+        performer={clip.name: clip.performer for clip in manifest.clips},
         motions=[*clips, *(motion for score in scores for motion in motions(score))],
         flips="keep",
         about=about,

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Int32s
+from motionmind._typing import Bools, Int32s, Ints
 from motionmind.arguments import check_integer
 from motionmind.corpus.corpus import Clip, Corpus, Facing, Repair
 from motionmind.errors import MotionMindError
@@ -25,14 +25,16 @@ class ClipSummary(msgspec.Struct, frozen=True):
         name: the clip's label.
         postures: number of its postures.
         about: a line on its content.
+        performer: who performs it; the corpus's author where that is not known.
     """
 
     name: str
     postures: int
     about: str
+    performer: str
 
 
-class Origin(msgspec.Struct, frozen=True):
+class OriginSummary(msgspec.Struct, frozen=True):
     """The clips of a corpus that come from one corpus, in the same direction and with the same weight.
 
     Attributes:
@@ -44,6 +46,7 @@ class Origin(msgspec.Struct, frozen=True):
         moves: number of their moves.
         weight: weight of each move.
         share: weighted share of all moves of the corpus, from 0 to 1.
+        licence: the licence of that corpus.
     """
 
     corpus: str
@@ -54,6 +57,7 @@ class Origin(msgspec.Struct, frozen=True):
     moves: int
     weight: float
     share: float
+    licence: str
 
 
 class FlipReport(msgspec.Struct, frozen=True):
@@ -121,7 +125,7 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
     source: str
     licence: str
     clips: list[ClipSummary]
-    origins: list[Origin]
+    origins: list[OriginSummary]
     postures: int
     moves: int
     skeleton: str
@@ -210,7 +214,9 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "author": corpus.author,
         "source": corpus.source,
         "licence": corpus.licence,
-        "clips": [ClipSummary(clip.label, len(clip), clip.about) for clip in corpus.clips],
+        "clips": [
+            ClipSummary(clip.label, len(clip), clip.about, corpus.credit_of(clip).performer) for clip in corpus.clips
+        ],
         "origins": origins(corpus),
         "postures": len(corpus),
         "moves": len(corpus.begins),
@@ -229,7 +235,7 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
     }
 
 
-def origins(corpus: Corpus) -> list[Origin]:
+def origins(corpus: Corpus) -> list[OriginSummary]:
     """Return where a corpus's clips come from, grouped by corpus, mirroring, direction and weight."""
     groups: dict[tuple[str, bool, bool, float], list[Clip]] = {}
     for backwards in (False, True):
@@ -242,7 +248,9 @@ def origins(corpus: Corpus) -> list[Origin]:
     for (name, is_mirrored, backwards, weight), clips in groups.items():
         moves = sum(len(clip) - 1 for clip in clips)
         share = weight * moves / total
-        out.append(Origin(name, is_mirrored, backwards, len(clips), sum(map(len, clips)), moves, weight, share))
+        postures = sum(map(len, clips))
+        licence = corpus.clip_origins[name].licence
+        out.append(OriginSummary(name, is_mirrored, backwards, len(clips), postures, moves, weight, share, licence))
     return out
 
 
@@ -255,12 +263,23 @@ def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
         pairs: number of pairs.
         seed: of their random choice.
     """
+    chosen = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
+    return float(joined_pairs(grammar, states, chosen).all(axis=1).mean())
+
+
+def joined_pairs(grammar: Grammar, states: Int32s, pairs: Ints) -> Bools:
+    """Return which chains attested moves alone can lead from one posture to another [P, L].
+
+    Args:
+        grammar: what was learned of the states.
+        states: states of the corpus's postures [N, L].
+        pairs: numbers of the postures [P, 2].
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import breadth_first_order
 
     graph = grammar.transitions
-    chosen = np.random.default_rng(seed).integers(len(states), size=(pairs, 2))
-    joined = np.ones(pairs, dtype=bool)
+    joined = np.zeros((len(pairs), states.shape[1]), dtype=bool)
     for chain, size in enumerate(graph.sizes()):
         first = graph.starts[chain]
         rows = slice(graph.indptr[first], graph.indptr[first + size])
@@ -268,12 +287,12 @@ def joinable(grammar: Grammar, states: Int32s, pairs: int, seed: int) -> float:
             (np.ones(rows.stop - rows.start), graph.targets[rows], graph.indptr[first : first + size + 1] - rows.start),
             shape=(size, size),
         )
-        a, b = states[chosen[:, 0], chain], states[chosen[:, 1], chain]
+        a, b = states[pairs, chain].T
         for state in np.unique(a):
             reached = np.zeros(size, dtype=bool)
             reached[breadth_first_order(chain_graph, state, return_predecessors=False)] = True
-            joined[a == state] &= reached[b[a == state]]
-    return float(joined.mean())
+            joined[a == state, chain] = reached[b[a == state]]
+    return joined
 
 
 def _by_chain(grammar: Grammar, values: NDArray[Any]) -> dict[str, Any]:

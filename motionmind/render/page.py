@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
+from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.display import displayed
 from motionmind.files import FilePath, write_atomically
 from motionmind.render.body_shape import shape_of
@@ -65,6 +66,7 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
 
 def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
     """Fill in the template of the page."""
+    data = {**data, "credits": sections_of(ledger_of(motion.credits)) if motion.insertions else {}}
     return Template(_text("page.html")).substitute(
         title=html.escape(displayed(motion.name or motion.skeleton.name)),
         style=_text("player.css") + style,

@@ -26,6 +26,7 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus, Facing
+from motionmind.credits.credit import Credit
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, suggestion
 from motionmind.names.finding import Collection, open_collection
@@ -65,7 +66,7 @@ class Packed(msgspec.Struct, frozen=True):
 
 
 class MotionRecord(msgspec.Struct, frozen=True):
-    """A motion in a project's file; the fields are those of `Motion` and `Skeleton`."""
+    """A motion in a project's file; the fields are those of `Motion` and `Skeleton`, and the insertions' credits."""
 
     body: str
     names: tuple[str, ...]
@@ -77,6 +78,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
     times: Packed
     insertions: tuple[tuple[tuple[float, ...], tuple[tuple[str, int], ...]], ...] = ()
     keyframed: bool = False
+    credits: tuple[tuple[Credit, ...], ...] = ()  # of each insertion, where they are known
 
     @classmethod
     def of(cls, motion: Motion) -> MotionRecord:
@@ -93,6 +95,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
             Packed.of(motion.times),
             tuple((tuple(one.times.tolist()), one.bridged) for one in motion.insertions),
             motion.keyframed,
+            tuple(one.credits for one in motion.insertions),
         )
 
     def motion(self, name: str) -> Motion:
@@ -104,7 +107,11 @@ class MotionRecord(msgspec.Struct, frozen=True):
         except ValueError as error:
             raise MotionMindError(f"{displayed(name)}: its numbers cannot be read: {error}") from error
         skeleton = Skeleton(self.body, self.names, self.parents, offsets, tips)
-        insertions = tuple(Insertion(np.array(times), bridged) for times, bridged in self.insertions)
+        credited = self.credits or ((),) * len(self.insertions)  # none in projects of 0.2 and before
+        insertions = tuple(
+            Insertion(np.array(times), bridged, shares)
+            for (times, bridged), shares in zip(self.insertions, credited, strict=False)
+        )
         return Motion(skeleton, rotations, root, times, name, insertions, self.keyframed)
 
 

@@ -133,7 +133,7 @@ class Project:
 
     @property
     def missing(self) -> list[str]:
-        """What the piece needs that is not there, a line each."""
+        """Corpora, clips and files that the piece needs and that are not there, a line each."""
         return missing_in(self.state, self.movements.has, self.marks)
 
     def look_again(self, corpus: str) -> None:

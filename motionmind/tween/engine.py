@@ -15,6 +15,7 @@ from motionmind._typing import Bools, Ints
 from motionmind.arguments import check_function, check_integer, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
+from motionmind.credits.credit import Credit
 from motionmind.display import displayed
 from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
@@ -27,6 +28,7 @@ from motionmind.search.sample import sample_path
 from motionmind.search.solve import Certificate, Watch, solve
 from motionmind.tween.certificate import Bridge, Source, break_down_cost, source_of, trace_path
 from motionmind.tween.constraints import find_conflicts
+from motionmind.tween.crediting import credit_tween
 from motionmind.tween.formulate import Formulation, formulate
 from motionmind.tween.nearest_body import diagnose_posturewise
 from motionmind.tween.pacing import tempo_of, worded
@@ -273,8 +275,10 @@ class Engine(LearnedCorpus):
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
+        shown = _shown(sources, followed)
+        found = tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in detail)
         return Tween(
-            motion=motion,
+            motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,
             path=path,
             status=certificate.status,
@@ -290,8 +294,8 @@ class Engine(LearnedCorpus):
             path_degrees=path_degrees,
             followed=followed,
             via_degrees=formulation.snap_degrees[1:-1],
-            sources=_shown(sources, followed),
-            detail=tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in detail),
+            sources=shown,
+            detail=found,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,
@@ -360,6 +364,12 @@ def _shown(sources: tuple[tuple[Source | None, ...], ...], followed: Bools) -> t
         tuple(source if shown else None for source, shown in zip(row, shows, strict=True))
         for row, shows in zip(sources, seen, strict=True)
     )
+
+
+def _credited(motion: Motion, found: tuple[Credit, ...]) -> Motion:
+    """Return the motion of a tween with its credits."""
+    (insertion,) = motion.insertions
+    return replace(motion, insertions=(replace(insertion, credits=found),))
 
 
 def _with_bridges(motion: Motion, bridges: tuple[Bridge, ...]) -> Motion:

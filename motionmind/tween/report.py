@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from motionmind.arguments import check_path
+from motionmind.credits.ledger import Ledger
 from motionmind.errors import FormatError
 from motionmind.files import FilePath, read_bytes
 from motionmind.learned.plausibility import Sighting
@@ -76,6 +77,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
         degrees: angle of each joint's move [T][L].
         likelihood: P(state arrived in | state left) of each joint's move; 0 where it is not attested [T][L].
         costs: the cost taken apart.
+        credits: whose movement it is made of; null in reports of 0.1.
         motion_sha256: hash of the file that the movement was written to with the report; null where none was.
 
     >>> from motionmind import Engine, read_report
@@ -120,6 +122,7 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
     degrees: list[list[float]]
     likelihood: list[list[float]]
     costs: ReportedCosts
+    credits: Ledger | None = None
     motion_sha256: str | None = None
 
     def __post_init__(self) -> None:

@@ -10,6 +10,8 @@ from typing import Any
 from motionmind._cells import html_of
 from motionmind._typing import Bools, Floats, States
 from motionmind.body.motion import Motion
+from motionmind.credits.credit import Credit
+from motionmind.credits.ledger import ledger_of
 from motionmind.learned.plausibility import Plausibility, Sighting
 from motionmind.search.cfn import cfn
 from motionmind.search.length import LengthChoice
@@ -127,6 +129,11 @@ class Tween:
         return gap_of(self.cost, self.lower_bound)
 
     @property
+    def credits(self) -> tuple[Credit, ...]:
+        """Shares of its time by clip, the largest first; empty where nothing moves."""
+        return self.motion.credits
+
+    @property
     def node_budget(self) -> int:
         """Number of nodes that A* might hold."""
         return self.request.nodes(len(self.joints))
@@ -189,5 +196,6 @@ def report_of(tween: Tween, motion_sha256: str | None = None) -> TweenReport:
         degrees=costs.degrees.tolist(),
         likelihood=costs.likelihood.tolist(),
         costs=ReportedCosts(costs.moves.tolist(), costs.coordination.tolist(), costs.per_move, costs.guide.tolist()),
+        credits=ledger_of(tween.credits),
         motion_sha256=motion_sha256,
     )

@@ -9,6 +9,8 @@ import numpy as np
 
 from motionmind._typing import Ints
 from motionmind.corpus.corpus import Facing
+from motionmind.credits.credit import Credit
+from motionmind.credits.ledger import Ledger, ledger_of
 from motionmind.search.solve import Status
 from motionmind.tween.certificate import Bridge, Wait
 from motionmind.variation.course import Course
@@ -72,7 +74,8 @@ class CountsReport(msgspec.Struct, frozen=True):
 
 
 class CandidateReport(msgspec.Struct, frozen=True):
-    """A candidate for an insertion (see `InsertionCandidate`): its length in moves and seconds, and its certificate."""
+    """A candidate for an insertion (see `InsertionCandidate`): its length in moves and seconds, its certificate, and
+    whose movement it is made of."""
 
     moves: int
     seconds: float
@@ -83,6 +86,7 @@ class CandidateReport(msgspec.Struct, frozen=True):
     attested: float
     bridges: list[Bridge]
     waits: list[Wait]
+    credits: list[Credit]
 
 
 class SeamReport(msgspec.Struct, frozen=True):
@@ -102,8 +106,9 @@ class SeamReport(msgspec.Struct, frozen=True):
 
 class VariationReport(msgspec.Struct, frozen=True):
     """The report of a variation as it stands; `order` is the piece's postures [L], `edits` the number of edits,
-    `limits` those that its first order was kept within, null for none, and `motion_sha256` the hash of the file that
-    was written with the report, null where none was."""
+    `credits` whose movement it is made of: its own stretches are the piece's, `limits` those that its first order was
+    kept within, null for none, and `motion_sha256` the hash of the file that was written with the report, null where
+    none was."""
 
     piece: PieceReport
     course: CourseReport
@@ -111,6 +116,7 @@ class VariationReport(msgspec.Struct, frozen=True):
     counts: CountsReport
     seams: list[SeamReport]
     edits: int
+    credits: Ledger
     limits: Limits | None = None
     motion_sha256: str | None = None
 
@@ -123,6 +129,7 @@ def report_of(
     seams: Sequence[Seam],
     edits: int,
     kept: Kept | None,
+    shares: tuple[Credit, ...],
 ) -> VariationReport:
     """Report a variation: all but the movement.
 
@@ -134,6 +141,7 @@ def report_of(
         seams: its seams.
         edits: number of its edits.
         kept: the order within limits that it began with, if it did.
+        shares: whose movement it is made of.
     """
     return VariationReport(
         PieceReport(piece.motion.name, len(piece), piece.facing),
@@ -142,6 +150,7 @@ def report_of(
         _counts_report(piece, order, seams),
         list(map(_seam_report, seams)),
         edits,
+        ledger_of(shares),
         kept.limits if kept else None,
     )
 
@@ -208,4 +217,5 @@ def _candidate_report(candidate: Candidate) -> CandidateReport:
         candidate.attested,
         list(candidate.bridges),
         list(candidate.waits),
+        list(candidate.motion.credits),
     )

@@ -172,7 +172,16 @@ class Variation:
     def report(self) -> dict[str, Any]:
         """Report what it is made of, all but the movement, as plain values for JSON (see `VariationReport`)."""
         report: dict[str, Any] = msgspec.to_builtins(
-            report_of(self.piece, self.course, self.order, self.postures, self.seams, len(self.edits), self.kept)
+            report_of(
+                self.piece,
+                self.course,
+                self.order,
+                self.postures,
+                self.seams,
+                len(self.edits),
+                self.kept,
+                self.motion().credits,
+            )
         )
         return report
 

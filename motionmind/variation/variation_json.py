@@ -173,7 +173,9 @@ def _frames(motion: Motion) -> FramesSchema:
         root=motion.root.tolist(),
         rotations=motion.rotations.tolist(),
         name=motion.name,
-        insertions=[InsertionSchema(mark.times.tolist(), list(mark.bridged)) for mark in motion.insertions],
+        insertions=[
+            InsertionSchema(mark.times.tolist(), list(mark.bridged), list(mark.credits)) for mark in motion.insertions
+        ],
         keyframed=motion.keyframed,
     )
 

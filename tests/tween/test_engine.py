@@ -265,6 +265,7 @@ REPORT = [
     "degrees",
     "likelihood",
     "costs",
+    "credits",
     "motion_sha256",
 ]
 
@@ -440,7 +441,7 @@ def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_written_corpus_is_learned_once_and_again_when_it_changes(written: Path, tmp_path: Path) -> None:
     first = Engine.load("mine", tmp_path)
-    assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "segments"}
+    assert first.info()["clips"][0] == {"name": "the scurry", "postures": 40, "about": "segments", "performer": "us"}
     (built,) = (tmp_path / "cache").iterdir()
     before = {path: path.stat().st_mtime_ns for path in built.rglob("*.*")}
     assert Engine.load("mine", tmp_path).info() == first.info()

@@ -1,6 +1,7 @@
 /** The page: what is on it, put together; buttons and keys. README.md describes `window.motionmind`. */
 
 import { Body } from "motionmind/body";
+import { writeCredits } from "motionmind/credits";
 import { Filming } from "motionmind/filming";
 import { listen, writeKeys } from "motionmind/keys";
 import { writeLegend } from "motionmind/legend";
@@ -29,6 +30,7 @@ function start() {
   for (const element of document.querySelectorAll(".moving")) element.hidden = !moving;
   $("ends").hidden = motion.insertions.every((insertion) => motion.ends(insertion).length === 0);
   writeLegend($("legend").querySelector("ul"), motion, body, data.colours);
+  writeCredits($("credits"), data.credits);
   $("legend").open = $("stage").clientWidth >= ROOMY.width && $("stage").clientHeight >= ROOMY.height;
   writeKeys($("sheet").querySelector("dl"), motion);
 
@@ -78,7 +80,7 @@ function makeStage(...things) {
     $("message").textContent =
       "This browser shows no 3D pictures (WebGL 2 is not available), so the movement cannot be shown. " +
       "Turn on hardware acceleration in its settings, or open the page in another browser.";
-    for (const element of document.querySelectorAll("footer, #views, #page, #legend, #canvas")) element.hidden = true;
+    for (const element of document.querySelectorAll("footer, #views, #page, #legend, #credits, #canvas")) element.hidden = true;
     return undefined;
   }
 }

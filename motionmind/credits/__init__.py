@@ -1,0 +1,1 @@
+"""Credits: whose movement a movement is made of, and under which licences."""
