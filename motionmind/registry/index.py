@@ -115,7 +115,7 @@ class Recipe(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Index(msgspec.Struct, frozen=True, kw_only=True):
-    """What an index file holds."""
+    """The content of an index file."""
 
     format: Literal["motionmind-index"]
     version: Literal[1]

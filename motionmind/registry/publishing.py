@@ -29,7 +29,7 @@ _NEEDED = ("title", "author", "source", "licence")
 
 
 class Published(NamedTuple):
-    """What was published: the entry in the index, and the files that were written."""
+    """A published corpus: its entry in the index, and the files that were written."""
 
     entry: Entry
     files: tuple[Path, ...]
