@@ -1,15 +1,16 @@
 """Coordination of joints: a Bayesian network over the joint tree, P(state of a joint | state of its parent).
 
-Stuart and Bradley, "Learning the grammar of dance", ICML (1998), coordinate joints by such a network. A pgmpy network
-is the model of record. A joint's conditional distribution is estimated from the corpus's postures with a Dirichlet
-prior of `PSEUDO_COUNT` virtual postures that are distributed as the joint's marginal. So a pair that was never seen
-together is expensive, but possible. For states c of the joint and p of its parent, with N the corpus's counts (each
-posture by its weight), m the marginal and a the pseudo-count,
+Stuart and Bradley, "Learning the grammar of dance", ICML (1998), coordinate joints by such a network. A joint's
+conditional distribution is estimated from the corpus's postures with a Dirichlet prior of `PSEUDO_COUNT` virtual
+postures that are distributed as the joint's marginal. So a pair that was never seen together is expensive, but
+possible. For states c of the joint and p of its parent, with N the corpus's counts (each posture by its weight), m the
+marginal and a the pseudo-count,
 
     P(c | p) = (N(p, c) + a m(c)) / (N(p) + a)
 
-If N(p, c) = 0, then -log P(c | p) = -log(a m(c)) + log(N(p) + a): a term of c and a term of p. The search reads it in
-that form.
+If N(p, c) = 0, then -log P(c | p) = -log(a m(c)) + log(N(p) + a): a term of c and a term of p. Learning and search have
+it in that form, which is as large as the pairs that were seen. A pgmpy network (`fit_network`) says the same in dense
+tables, for whoever wants to ask other things of it.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.errors import CorpusError
 
 if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
 
 
 PSEUDO_COUNT = 1.0  # virtual postures in the Dirichlet prior
+MOST_CELLS = 100_000_000  # of the dense tables of a network: 0.8 GB, and pgmpy copies them
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,48 @@ class Coordination:
         return np.asarray(out)
 
 
+def count_coordination(
+    parents: Ints, states: Int32s, sizes: Ints, joints: int, weights: Floats | None = None
+) -> Coordination:
+    """Count how joints coordinate.
+
+    Args:
+        parents: parent chain [L], or -1.
+        states: state of each chain in each posture [N, L].
+        sizes: number of states of each chain [L].
+        joints: number of the first chains, which are joints; others get no coordination.
+        weights: weight of each posture [N]; None for 1.
+    """
+    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
+    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    coupled = np.where(np.arange(len(parents)) < joints, parents, -1).astype(np.int64)
+    child_costs = np.zeros(starts[-1])
+    pair_starts, pair_counts = [0], [np.zeros(0, dtype=np.int64)]
+    pair_states, pair_costs, parent_costs = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0)]
+    for j, parent in enumerate(coupled):
+        pair_starts.append(pair_starts[-1] + (int(sizes[parent]) if parent >= 0 else 0))
+        if parent < 0:
+            continue
+        prior = PSEUDO_COUNT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
+        visits = np.bincount(states[:, parent], weights, sizes[parent]) + PSEUDO_COUNT
+        keys, which = np.unique(states[:, parent].astype(np.int64) * sizes[j] + states[:, j], return_inverse=True)
+        p, c = keys // sizes[j], keys % sizes[j]
+        pair_counts.append(np.bincount(p, minlength=sizes[parent]))
+        pair_states.append(c)
+        pair_costs.append(np.log(visits[p]) - np.log(np.bincount(which, weights, len(keys)) + prior[c]))
+        child_costs[starts[j] : starts[j + 1]] = -np.log(prior)
+        parent_costs.append(np.log(visits))
+    return Coordination(
+        coupled,
+        np.array(pair_starts, dtype=np.int64),
+        np.concatenate([[0], np.cumsum(np.concatenate(pair_counts))]).astype(np.int64),
+        np.concatenate(pair_states).astype(np.int32),
+        np.concatenate(pair_costs),
+        child_costs,
+        np.concatenate(parent_costs),
+    )
+
+
 def fit_network(
     names: tuple[str, ...], parents: Ints, states: Int32s, sizes: Ints, weights: Floats | None = None
 ) -> DiscreteBayesianNetwork:
@@ -97,7 +142,16 @@ def fit_network(
         states: state of each joint in each posture [N, J].
         sizes: number of states of each joint [J].
         weights: weight of each posture [N]; None for 1.
+
+    Raises:
+        CorpusError: the network's tables would have more than MOST_CELLS cells.
     """
+    cells = sum(int(sizes[j]) * int(sizes[p]) for j, p in enumerate(parents) if p >= 0)
+    if cells > MOST_CELLS:
+        raise CorpusError(
+            f"a network over these states has {cells:,} cells, and can have {MOST_CELLS:,}: learn with a coarser "
+            "tolerance, or read the coordination's lists of pairs"
+        )
     import pandas as pd
     from pgmpy.models import DiscreteBayesianNetwork
     from pgmpy.parameter_estimator import DiscreteBayesianEstimator
@@ -119,58 +173,3 @@ def fit_network(
     frame = pd.DataFrame({name: states[:, j] for j, name in enumerate(names)})
     network.add_cpds(*estimator.fit(network, frame, sample_weight=weights).parameters_)
     return network
-
-
-def compile_network(
-    network: DiscreteBayesianNetwork,
-    names: tuple[str, ...],
-    parents: Ints,
-    states: Int32s,
-    sizes: Ints,
-    weights: Floats | None = None,
-) -> Coordination:
-    """Compile a network's conditional distributions into flat arrays.
-
-    Args:
-        network: the network; chains that are not nodes of it get no coordination.
-        names: names of the chains [L].
-        parents: parent chain [L], or -1.
-        states: the states that the network was fitted to [N, L], which show the pairs that were seen.
-        sizes: number of states of each chain [L].
-        weights: weight of each posture [N]; None for 1.
-
-    Raises:
-        ValueError: a distribution of the network is not over a chain and its parent.
-    """
-    weights = np.ones(len(states)) if weights is None else np.asarray(weights)
-    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    child_costs = np.zeros(starts[-1])
-    pair_starts, pair_counts = [0], []
-    pair_states, pair_costs, parent_costs = [], [], []
-    coupled = np.array([p if name in network else -1 for name, p in zip(names, parents, strict=True)], dtype=np.int64)
-    for j, parent in enumerate(coupled):
-        if parent < 0:
-            pair_starts.append(pair_starts[-1])
-            continue
-        cpd = network.get_cpds(names[j])
-        values = cpd.get_values()  # [states of j, states of the parent]
-        if cpd.variables != [names[j], names[parent]] or values.shape != (sizes[j], sizes[parent]):
-            raise ValueError(f"the CPD of {names[j]} is over {cpd.variables} {values.shape}, not it and its parent")
-        keys = np.unique(states[:, parent].astype(np.int64) * sizes[j] + states[:, j])
-        p, c = keys // sizes[j], keys % sizes[j]
-        pair_counts.append(np.bincount(p, minlength=sizes[parent]))
-        pair_states.append(c)
-        pair_costs.append(-np.log(values[c, p]))
-        marginal = np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
-        child_costs[starts[j] : starts[j + 1]] = -np.log(PSEUDO_COUNT * marginal)
-        parent_costs.append(np.log(np.bincount(states[:, parent], weights, sizes[parent]) + PSEUDO_COUNT))
-        pair_starts.append(pair_starts[-1] + sizes[parent])
-    return Coordination(
-        coupled,
-        np.array(pair_starts, dtype=np.int64),
-        np.concatenate([[0], np.cumsum(np.concatenate([np.zeros(0, np.int64), *pair_counts]))]).astype(np.int64),
-        np.concatenate([np.zeros(0), *pair_states]).astype(np.int32),
-        np.concatenate([np.zeros(0), *pair_costs]),
-        child_costs,
-        np.concatenate([np.zeros(0), *parent_costs]),
-    )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.grammar.bridges import Bridges, find_bridges
-from motionmind.grammar.coordination import Coordination, compile_network, fit_network
+from motionmind.grammar.coordination import Coordination, count_coordination
 from motionmind.grammar.transitions import Transitions, count_transitions
 
 
@@ -19,7 +19,7 @@ class Grammar:
         centres: orientation of each state of each chain [G, 4].
         transitions: the joint graphs.
         bridges: unattested moves between neighbouring states.
-        coordination: P(state of a joint | state of its parent), compiled from the network.
+        coordination: P(state of a joint | state of its parent), from the corpus's counts.
     """
 
     chains: tuple[str, ...]
@@ -68,6 +68,5 @@ def learn(
         weights=weights,
         posture_weights=posture_weights,
     )
-    network = fit_network(chains[:joints], parents[:joints], states[:, :joints], sizes[:joints], posture_weights)
-    coordination = compile_network(network, chains, parents, states, sizes, posture_weights)
+    coordination = count_coordination(parents, states, sizes, joints, posture_weights)
     return Grammar(chains, centres, transitions, find_bridges(centres, transitions), coordination)

@@ -9,14 +9,12 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.body.capsules import penetration
 from motionmind.body.contact import contact_points, floor_height, limb_heights, lowest_height
-from motionmind.body.limbs import limb_of_points, limbs_of, parts_of
+from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.limits import find_loose
-from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.distances import squared_distance
-from motionmind.jit import jit
+from motionmind.learned.clusters import clusters_of
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
 LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
@@ -24,7 +22,6 @@ FIRM = 0.5  # how firmly a limb stands that bears
 RARE = 0.01  # share of postures in which limbs may be deeper in each other, or the weight farther out, than usual
 USUAL = 0.08  # metres of overhang, for a corpus that shows none
 MOST = 0.15  # metres of overhang at most: dancers who lean farther are moving
-ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +36,8 @@ class Carriage:
         begins: moment that each step leads from [2 M].
         ends: moment that it leads to [2 M].
         shares: share of each step among those that leave the same moment [2 M].
-        clusters: number of the cluster that each part of the body is in at each moment [N, P] (see `clusters_of`).
+        clusters: number of the cluster that each part of the body is in at each moment [N, P] (see
+            `motionmind.learned.clusters`).
         turn: turn about the vertical in each half of each move [M], radians.
         travel: displacement of the root in the same, metres, in the body's heading midway [M, 3].
         clearance: height of the lowest point above the clip's floor (`floor_height`) [N], metres, at least 0.
@@ -173,38 +171,3 @@ def _overhang(corpus: Corpus, stands: Floats, aloft: Floats) -> Floats:
     supports = near & bears[alone][:, limb_of_points(corpus.skeleton)[joints]]
     over = overhang(places[..., [0, 2]], supports, mass[alone][:, [0, 2]])
     return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
-
-
-def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
-    """Cluster the postures of each part of a body: [N, P], with parts as in `parts_of` and clusters numbered from 0.
-
-    In order, a posture founds a cluster unless a founder lies within ALIKE; then each joins its nearest founder.
-
-    Args:
-        skeleton: the body.
-        orientations: orientations of the chains [N, L, 4].
-    """
-    parts = parts_of(skeleton)
-    out = np.empty((len(orientations), len(parts)), dtype=np.int32)
-    for part, joints in enumerate(parts):
-        out[:, part] = _clusters(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
-    return out
-
-
-@jit
-def _clusters(orientations: Floats, within: float) -> Ints:
-    """Return the clusters [N] of one part's orientations [N, m, 4]; founders are more than `within` apart, squared."""
-    founders = np.empty(len(orientations), np.int64)
-    out = np.empty(len(orientations), np.int64)
-    count = 0
-    for founded in (False, True):
-        for i in range(len(orientations)):
-            least = np.inf
-            for k in range(count):
-                distance = squared_distance(orientations[i], orientations[founders[k]])
-                if distance < least:
-                    least, out[i] = distance, k
-            if not founded and least > within:
-                founders[count] = i
-                count += 1
-    return out

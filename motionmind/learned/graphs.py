@@ -59,7 +59,7 @@ def joint_graph(learned: LearnedCorpus, joint: str) -> nx.DiGraph:
 
 
 def network(learned: LearnedCorpus) -> DiscreteBayesianNetwork:
-    """Return the coordination as a pgmpy network over the joints, from which the search's costs were compiled."""
+    """Return the coordination as a pgmpy network over the joints, whose tables say the same as the search's costs."""
     joints = len(learned.corpus.skeleton)
     parents, sizes = learned.corpus.chain_parents[:joints], learned.space.sizes[:joints]
     states, weights = np.asarray(learned.states[:, :joints]), learned.corpus.weights

@@ -17,7 +17,8 @@ from motionmind.learned.carriage import Carriage, learn_carriage
 from motionmind.learned.pace import Pace, learn_pace
 from motionmind.learned.plausibility import Plausibility, learn_plausibility
 
-MOST_STATES_LEARNED = 10_000  # of a joint: learning its pairs takes some 6 GB
+MOST_STATES_LEARNED = 50_000  # of a joint: a search among them takes some 6 GB
+MOST_FACINGS = 10_000  # each of which makes all turns that any makes
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
         discretization: how orientations become states; only states with a posture in them are kept.
 
     Raises:
-        CorpusError: a joint, or the facing, has more than MOST_STATES_LEARNED states.
+        CorpusError: a joint has more than MOST_STATES_LEARNED states, or the facing more than MOST_FACINGS.
     """
     orientations = corpus.to_chains(corpus.rotations)
     joints = corpus.skeleton.names
@@ -107,7 +108,7 @@ def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States
 
 
 def _check_size(corpus: Corpus, space: StateSpace) -> None:
-    """Raise a CorpusError if learning, which compares all pairs of a joint's states, would take too much memory."""
+    """Raise a CorpusError if a search among a joint's states would take too much memory."""
     largest = int(np.argmax(space.sizes))
     if space.sizes[largest] > MOST_STATES_LEARNED:
         raise CorpusError(
@@ -119,10 +120,10 @@ def _check_size(corpus: Corpus, space: StateSpace) -> None:
 
 def _check_facing(corpus: Corpus, tolerance: float) -> None:
     """Raise a CorpusError if the circle has too many states for a root of this tolerance, degrees."""
-    if _facings(tolerance) > MOST_STATES_LEARNED:
+    if _facings(tolerance) > MOST_FACINGS:
         raise CorpusError(
             f"corpus {corpus.name!r}: the facing has {_facings(tolerance)} states within {tolerance:g} degrees, and "
-            f"can have {MOST_STATES_LEARNED}; give {corpus.skeleton.names[0]} a coarser tolerance"
+            f"can have {MOST_FACINGS}; give {corpus.skeleton.names[0]} a coarser tolerance"
         )
 
 

@@ -20,9 +20,10 @@ import pytest
 from toys import solution
 
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, find_bridges
-from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, compile_network, fit_network
+from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, count_coordination, fit_network
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions
 from motionmind.search.problem import Model, Problem, Rules
@@ -252,6 +253,26 @@ def test_unless_attested_bridges_run_both_ways_along_a_shortest_tree_and_else_to
             assert np.sum(angles[before] < angles[before, after]) <= NEAREST  # itself among them
 
 
+def test_of_many_states_the_bridges_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for size in (2, 3, 7, 60, 300):
+        centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
+        graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
+        every = find_bridges(centres, graph)
+        monkeypatch.setattr("motionmind.grammar.bridges.MOST_COMPARED", 1)
+        near = find_bridges(centres, graph)
+        monkeypatch.undo()
+        for one, other in zip(vars(near).values(), vars(every).values(), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+def test_many_states_that_coincide_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionmind.grammar.bridges.MOST_COMPARED", 1)
+    turns = np.repeat([0.0, 0.3, 2.0], 20)
+    centres = rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), turns)
+    graph = count_transitions(np.zeros((1, 1), np.int32), np.array([60]), np.zeros(0, np.int64), np.zeros(0))
+    assert nx.is_strongly_connected(nx.DiGraph(list(bridge_edges(graph, find_bridges(centres, graph), 0))))
+
+
 def test_states_that_coincide_are_bridged_too() -> None:
     centres = np.tile([0.0, 0.0, 0.0, 1.0], (5, 1))
     graph = count_transitions(np.zeros((1, 1), np.int32), np.array([5]), np.zeros(0, np.int64), np.zeros(0))
@@ -307,12 +328,20 @@ def test_the_facing_coordinates_with_nothing(seed: int) -> None:
     assert net.pair_starts[facing] == net.pair_starts[facing + 1]
 
 
-def test_a_network_over_other_parents_is_refused() -> None:
-    body = corpus(1)
-    other = np.array([-1, 0, 1])
-    network = fit_network(body.names[:3], other, body.states[:, :3], body.sizes[:3])
-    with pytest.raises(ValueError, match="joint2"):
-        compile_network(network, body.names[:3], np.array([-1, 0, 0]), body.states[:, :3], body.sizes[:3])
+def test_a_network_that_is_too_large_is_refused_before_it_is_made() -> None:
+    sizes = np.array([20_000, 20_000])
+    with pytest.raises(CorpusError, match=r"has 400,000,000 cells, and can have 100,000,000: learn with a coarser"):
+        fit_network(("pelvis", "hip"), np.array([-1, 0]), np.zeros((2, 2), dtype=np.int32), sizes)
+
+
+def test_coordination_takes_no_more_than_what_was_seen() -> None:
+    """The dense table of these states would take 80 GB."""
+    states = np.stack([np.arange(100_000), np.arange(100_000)[::-1]], axis=1).astype(np.int32)
+    found = count_coordination(np.array([-1, 0]), states, np.array([100_000, 100_000]), 2)
+    assert found.pair_costs.shape == (100_000,)
+    starts = np.array([0, 100_000, 200_000])
+    assert found.cost(1, 0, 99_999, starts) == pytest.approx(-np.log((1.0 + 1e-5) / 2.0))
+    assert found.cost(1, 0, 0, starts) == pytest.approx(-np.log(1e-5 / 2.0))
 
 
 # --- what the search reads -------------------------------------------------------------------------------------------

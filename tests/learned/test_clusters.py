@@ -1,0 +1,65 @@
+"""Clusters of postures: a posture founds one unless a founder is near, and joins the nearest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motionmind._typing import Floats, Ints
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.distances import squared_distance
+from motionmind.learned import clusters
+from motionmind.learned.clusters import ALIKE
+
+
+def one_by_one(orientations: Floats, within: float) -> Ints:
+    """The clusters [N], every posture compared with every founder."""
+    founders: list[int] = []
+    for i, posture in enumerate(orientations):
+        if all(squared_distance(posture, orientations[k]) > within for k in founders):
+            founders.append(i)
+    distances = [[squared_distance(posture, orientations[k]) for k in founders] for posture in orientations]
+    return np.argmin(distances, axis=1)
+
+
+def wander(seed: int, count: int, joints: int, pace: float) -> Floats:
+    """Postures of a body whose joints wander."""
+    steps = np.random.default_rng(seed).normal(0.0, pace, (count, joints, 3))
+    return rot.exp(np.cumsum(steps, axis=0))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    joints=st.integers(1, 6),
+    pace=st.sampled_from([0.0, 0.01, 0.1, 1.0]),
+    block=st.sampled_from([1, 7, 64]),
+)
+def test_clusters_are_those_of_all_comparisons(seed: int, joints: int, pace: float, block: int) -> None:
+    orientations = wander(seed, 60, joints, pace)
+    orientations[17:23] = orientations[40:46]  # what is danced again is in the same cluster
+    within = joints * ALIKE**2
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(clusters, "BLOCK", block)
+        patch.setattr(clusters, "LOOKED_AT", (1, 3, 60))
+        found = clusters.clusters(orientations, within)
+    np.testing.assert_array_equal(found, one_by_one(orientations, within))
+    np.testing.assert_array_equal(found[17:23], found[40:46])
+
+
+def test_of_many_that_all_differ_few_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of twice as many postures, all of them clusters of their own, no more than twice as many are compared."""
+    compared, compare = [0], clusters._compare
+
+    def counted(orientations: Floats, postures: Ints, founders: Ints, near: Ints, *rest: Floats) -> None:
+        compared[-1] += near.size
+        compare(orientations, postures, founders, near, *rest)
+
+    monkeypatch.setattr(clusters, "_compare", counted)
+    for count in (2_000, 4_000, 8_000):
+        compared.append(0)
+        orientations = rot.exp(np.random.default_rng(count).normal(0.0, 1.0, (count, 4, 3)))
+        found = clusters.clusters(orientations, 4 * ALIKE**2)
+        assert found.max() > 0.9 * count
+        assert compared[-1] <= 2 * 33 * count
