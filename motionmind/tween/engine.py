@@ -321,7 +321,7 @@ class Engine(LearnedCorpus):
         return graphs.joint_graph(self, joint)
 
     def network(self) -> DiscreteBayesianNetwork:
-        """Return the coordination network as a pgmpy network over the joints, whose tables say the same as the costs."""
+        """Return the coordination network as a pgmpy network; its tables say the same as the costs."""
         return graphs.network(self)
 
     def info(self) -> dict[str, Any]:
