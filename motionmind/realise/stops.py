@@ -15,6 +15,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.steps import steps_at
 
+_ALL = slice(None)
 _SOON = 1e-3  # seconds over which a velocity of the body is taken apart into its chains'
 
 
@@ -64,7 +65,7 @@ def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) 
     return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
 
 
-def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice) -> Rates:
+def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _ALL) -> Rates:
     """Return the velocities in moments of the corpus: means of the steps that lead there and on, in `Rates`.
 
     Args:
