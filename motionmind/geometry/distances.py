@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Singles
 from motionmind.jit import jit
 
 
 @jit
-def squared_distance(a: Floats, b: Floats) -> float:
+def squared_distance(a: Floats | Singles, b: Floats | Singles) -> float:
     """Return the sum over joints of 4 sin^2(angle / 2) between rotations `a` and `b` [m, 4].
 
     For small angles this is the sum of their squares, radians squared.
@@ -19,7 +19,7 @@ def squared_distance(a: Floats, b: Floats) -> float:
 
 
 @jit
-def squared_turn(a: Floats, b: Floats) -> float:
+def squared_turn(a: Floats | Singles, b: Floats | Singles) -> float:
     """Return 4 sin^2(angle / 2) between two rotations [4]: for a small angle its square, radians squared."""
     cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     return float(4.0 * max(1.0 - cosine * cosine, 0.0))

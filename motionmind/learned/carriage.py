@@ -15,6 +15,7 @@ from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.clusters import clusters_of
+from motionmind.learned.neighbours import MANY, Neighbours, build_neighbours
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
 LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
@@ -49,6 +50,7 @@ class Carriage:
         loose: whether each joint breaks its limits in the corpus [J].
         touches: how deep limbs are in each other at most, but for RARE postures, by the pairs of `Capsules.pairs` [P],
             metres.
+        trees: by which few of the moments are looked at; None where there are few, or an earlier version learned.
     """
 
     orientations: Floats
@@ -65,6 +67,7 @@ class Carriage:
     overhang: Floats
     loose: Bools
     touches: Floats
+    trees: Neighbours | None = None
 
 
 def learn_carriage(corpus: Corpus) -> Carriage:
@@ -83,9 +86,10 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     stands = _standing(corpus)
     clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
     aloft = _aloft(corpus, clear)
+    counts = np.concatenate([corpus.weights, weights])
     return Carriage(
         orientations,
-        np.concatenate([corpus.weights, weights]),
+        counts,
         np.concatenate([begins, middles]),
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
@@ -98,6 +102,7 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)]),
         find_loose(corpus.skeleton, corpus.rotations),
         _touching(corpus),
+        build_neighbours(corpus.skeleton, orientations, counts) if len(counts) > MANY else None,
     )
 
 

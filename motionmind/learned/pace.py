@@ -152,7 +152,11 @@ class Pace:
         # machine.
         alike = (np.sum(np.einsum("njc,jc->nj", shown, one) ** 2, axis=1) for one in postures)
         order = (np.argsort(-np.round(one, 9), kind="stable") for one in alike)
-        return np.array([np.exp(np.log(STILL + self.lulls[near[:ALIKE]]).mean()) - STILL for near in order])
+        return np.array([self.lull_of(near[:ALIKE]) for near in order])
+
+    def lull_of(self, numbers: Ints) -> float:
+        """Return the mean lull of some of the corpus's postures, by number [n]."""
+        return float(np.exp(np.log(STILL + self.lulls[numbers]).mean()) - STILL)
 
 
 def learn_pace(corpus: Corpus) -> Pace:

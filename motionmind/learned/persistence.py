@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, fields, replace
+from dataclasses import MISSING, asdict, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import States
+from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
@@ -32,9 +33,10 @@ from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.transitions import Transitions
 from motionmind.learned.carriage import Carriage
 from motionmind.learned.learning import Learned, learn, learn_from_states
+from motionmind.learned.neighbours import Neighbours
 from motionmind.learned.pace import Pace
 from motionmind.learned.plausibility import Plausibility
-from motionmind.learned.validity import FORMS, MOVEMENT, check_forms, check_values
+from motionmind.learned.validity import FORMS, MOVEMENT, TREES, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
@@ -64,7 +66,9 @@ def save(learned: Learned, folder: str | os.PathLike[str]) -> None:
     arrays = _movement(learned)
     for name, kind in _PARTS.items():
         part = getattr(learned if kind in (Carriage, Pace, Plausibility) else learned.grammar, name)
-        arrays |= {f"{name}.{field.name}": getattr(part, field.name) for field in fields(kind)}
+        arrays |= {f"{name}.{key}": getattr(part, key) for key in _array_names(kind)}
+    if learned.carriage.trees is not None:
+        arrays |= {f"neighbours.{key}": array for key, array in learned.carriage.trees.arrays.items()}
     store.save(Path(folder), _manifest(learned), arrays)
 
 
@@ -170,7 +174,8 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Bridges, "bridges", arrays),
         _part(Coordination, "coordination", arrays),
     )
-    carriage, pace = _part(Carriage, "carriage", arrays), _part(Pace, "pace", arrays)
+    carriage = replace(_part(Carriage, "carriage", arrays), trees=_trees(arrays, corpus.skeleton))
+    pace = _part(Pace, "pace", arrays)
     return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", arrays))
 
 
@@ -239,7 +244,19 @@ def _read_arrays(
 
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
     """Return a part of what was learned from its arrays, which are named after its fields."""
-    return kind(**{field.name: arrays[f"{name}.{field.name}"] for field in fields(kind)})
+    values: dict[str, Any] = {key: arrays[f"{name}.{key}"] for key in _array_names(kind)}
+    return kind(**values)
+
+
+def _array_names(kind: type[_Part]) -> list[str]:
+    """Return the names of the fields of a part that are arrays."""
+    return [field.name for field in fields(kind) if field.default is MISSING]
+
+
+def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours | None:
+    """Return the trees over a corpus's moments; None where it has none."""
+    own = {name.partition(".")[2]: array for name, array in arrays.items() if name in TREES}
+    return Neighbours(parts_of(skeleton), **own) if own else None
 
 
 def _clip_entry(clip: Clip) -> dict[str, Any]:

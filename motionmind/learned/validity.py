@@ -2,7 +2,7 @@
 
 Letters are sizes: N postures, M moves, J joints, L chains, G states in all, H = N + M moments, S = 2 M steps, E
 transitions, B bridges, V pair rows and Q pairs of the coordination, K frames of detail between postures, P pairs of
-limbs.
+limbs, D nodes of the trees over moments.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.discretize import StateSpace
+from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.pace import LENGTHS
 from motionmind.learned.plausibility import MEASURES
 
@@ -87,6 +88,15 @@ FORMS = {
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
 }
 
+TREES = {  # of a corpus of many moments, in versions that have them
+    "neighbours.order": _Form("i4", "parts H"),
+    "neighbours.ranks": _Form("i4", "parts H"),
+    "neighbours.bounds": _Form("i4", "D 2"),
+    "neighbours.centres": _Form("f4", "D joints 4", -2.0, 2.0),
+    "neighbours.radii": _Form("f8", "parts D", 0.0),
+    "neighbours.weights": _Form("f8", "parts D", 0.0, 1e15),
+}
+
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, all the others can be learned
 
 
@@ -100,7 +110,8 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
     """
     sizes = {"J": len(skeleton), "L": len(skeleton) + (facing == "free"), "P": len(capsules_of(skeleton).pairs())}
     sizes |= {"parts": len(parts_of(skeleton)), "limbs": len(limbs_of(skeleton))}
-    for name, form in FORMS.items():
+    sizes["joints"] = sum(map(len, parts_of(skeleton)))
+    for name, form in (FORMS | TREES).items():
         if name not in arrays:
             continue
         array = arrays[name]
@@ -143,6 +154,8 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
     if FORMS.keys() <= arrays.keys():
         _check_grammar(arrays, corpus, space, later)
         _check_carriage(arrays, len(corpus), len(later))
+    if TREES.keys() & arrays.keys():
+        _check_trees(arrays)
 
 
 def _check_grammar(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: StateSpace, later: Floats) -> None:
@@ -169,6 +182,20 @@ def _check_carriage(arrays: Mapping[str, NDArray[Any]], postures: int, moves: in
             raise ValueError(f"carriage.{name} has not {size} entries, as the corpus's moves make")
     for name in ("carriage.begins", "carriage.ends", "carriage.clusters"):
         _check_range(name, arrays, moments)
+
+
+def _check_trees(arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Check the trees over a corpus's moments."""
+    if missing := next((name for name in TREES if name not in arrays), None):
+        raise ValueError(f"lists no array {missing}")
+    order, ranks = arrays["neighbours.order"], arrays["neighbours.ranks"]
+    count = order.shape[1]
+    for name in ("neighbours.order", "neighbours.ranks"):
+        _check_range(name, arrays, count)
+    if not np.array_equal(np.take_along_axis(ranks, order, 1), np.broadcast_to(np.arange(count), order.shape)):
+        raise ValueError("neighbours.ranks is not where the moments are in neighbours.order")
+    if not np.array_equal(arrays["neighbours.bounds"], node_bounds(count)):
+        raise ValueError(f"neighbours.bounds is not that of {count} moments")
 
 
 def _check_units(name: str, arrays: Mapping[str, NDArray[Any]]) -> None:

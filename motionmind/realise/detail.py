@@ -16,8 +16,14 @@ from motionmind.corpus.corpus import Corpus, Moves
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.neighbours import postures_near
+from motionmind.realise.steps import steps_at
 
 GOES_OVER = 0.4  # radians a joint, root mean square: how much nearer another posture must be to leave a run for it
+NEAREST = 48  # postures of a large corpus near each of a movement's whose moves are looked at
+BESIDE = 4  # moves before and after these
+LEAVES = 32  # of the tree over a large corpus that are searched for them
 # How many times as fast as a movement its copied moves may be before it gets less of their detail. Means of walks are
 # slower than any movement that was recorded, mostly by less than this. Chosen on `indian` and `cmu-05`: at 3, movement
 # of `cmu-05` is taken for the dancer's less often.
@@ -27,7 +33,7 @@ LIVELIER = 4.0
 MISSES = 0.6
 
 
-def likest_moves(moves: Moves, orientations: Floats, poses: Floats) -> Ints:
+def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints | None = None) -> Ints:
     """Return the corpus's moves [T] that lead along a movement's postures, in long runs.
 
     They minimise the sum of d^2 over both ends of all moves, with d the distance from the movement's postures, radians,
@@ -36,12 +42,21 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats) -> Ints:
 
     Args:
         moves: the corpus's moves.
-        orientations: of the corpus's postures [N, J, 4].
+        orientations: of the corpus's postures, the joints' first [N, L, 4].
         poses: orientations of the movement's postures [T + 1, J, 4].
+        among: numbers of the moves to choose from, rising [m] (`moves_near`); None for all.
     """
-    distances = _squared_distances(np.ascontiguousarray(orientations), np.ascontiguousarray(poses)) / poses.shape[1]
-    cost = distances[:-1, moves.begins] + distances[1:, moves.ends]
-    before = _predecessors(moves)
+    poses = np.ascontiguousarray(poses)
+    if among is None:
+        among, begins, ends = np.arange(len(moves.begins)), moves.begins, moves.ends
+        shown = orientations[:, : poses.shape[1]]
+    else:
+        postures, which = np.unique([moves.begins[among], moves.ends[among]], return_inverse=True)
+        begins, ends = which.reshape(2, -1)
+        shown = orientations[postures, : poses.shape[1]]
+    distances = _squared_distances(np.ascontiguousarray(shown), poses) / poses.shape[1]
+    cost = distances[:-1, begins] + distances[1:, ends]
+    before = _predecessors(moves, among)
     total, came_from = cost[0], []
     for step in cost[1:]:
         least = int(total.argmin())
@@ -52,7 +67,20 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats) -> Ints:
     out = [int(total.argmin())]
     for previous in reversed(came_from):
         out.append(int(previous[out[-1]]))
-    return np.array(out[::-1], dtype=np.int64)
+    return among[out[::-1]]
+
+
+def moves_near(moves: Moves, carriage: Carriage, poses: Floats) -> Ints | None:
+    """Return the corpus's moves near a movement's postures [T + 1, J, 4], and those around them in the clips.
+
+    None stands for all, of a corpus without trees.
+    """
+    if carriage.trees is None:
+        return None
+    count = len(carriage.weights) - len(carriage.turn)
+    near = [postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES) for pose in poses]
+    leaving = steps_at(np.unique(np.concatenate(near)), True, carriage.begins, carriage.ends, count)[2]
+    return np.unique(np.clip(leaving[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(moves.begins) - 1))
 
 
 def detail_of(corpus: Corpus, moves: Ints) -> Floats:
@@ -104,16 +132,16 @@ def _turns(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(rot.angle(a, b) ** 2, axis=-1)))
 
 
-def _predecessors(moves: Moves) -> Ints:
-    """Return the move that precedes each in its clip [M], in the same direction of time; -1 for the first of a clip."""
-    out = np.full(len(moves.begins), -1)
-    count = max(int(moves.begins.max()), int(moves.ends.max())) + 1
-    forward = moves.ends > moves.begins
-    for direction in (np.flatnonzero(forward), np.flatnonzero(~forward)):
-        arrives = np.full(count, -1)
-        arrives[moves.ends[direction]] = direction
-        out[direction] = arrives[moves.begins[direction]]
-    return out
+def _predecessors(moves: Moves, among: Ints) -> Ints:
+    """Return which of some moves precedes each in its clip [m], in the same direction of time; -1 for none of them.
+
+    Moves are in the order of their clips; those backward in time follow on the ones after them.
+    """
+    begins, ends = moves.begins[among], moves.ends[among]
+    before = among + np.where(ends > begins, -1, 1)
+    place = np.minimum(np.searchsorted(among, before), len(among) - 1)
+    follows = (among[place] == before) & (ends[place] == begins)
+    return np.where(follows, place, -1)
 
 
 @jit

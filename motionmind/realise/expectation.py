@@ -6,11 +6,12 @@ The search takes it as its guide, before any path is known; the motion takes it 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -27,9 +28,12 @@ class Expectation(NamedTuple):
         half_steps: times [2 T + 1], seconds.
         poses: orientations of the joints [2 T + 1, J, 4], without the body's turning where facing is free.
         headings: where the body faces [2 T + 1], radians.
-        moments: probabilities of the corpus's moments [2 T + 1, N].
-        moves: probabilities of the corpus's moves in each half step [2 T, M].
+        moments: probabilities of moments of the corpus [2 T + 1, n].
+        moves: probabilities of moves of the corpus in each half step [2 T, m].
         trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1.
+        of_moments: which of the corpus's moments are meant [n]; all of them where they are a slice.
+        of_moves: which of its moves are meant [m]; all of them where they are a slice.
+        left_out: share of walks whose ends were not looked at (`motionmind.realise.mean_walk.MeanWalk`).
     """
 
     half_steps: Floats
@@ -38,6 +42,9 @@ class Expectation(NamedTuple):
     moments: Floats
     moves: Floats
     trust: Floats
+    of_moments: Ints | slice = slice(None)
+    of_moves: Ints | slice = slice(None)
+    left_out: float = 0.0
 
     def chains(self, corpus: Corpus, at: Floats) -> Floats:
         """Return orientations of the chains [K, L, 4] at some times [K]: a C2 curve through those of the half steps."""
@@ -68,18 +75,27 @@ def expect(
             corpus takes for that.
     """
     moving = any(stop.rates is not None for stop in stops.values())
-    rates = moments_rates(corpus, carriage) if moving else None
+    rates = partial(moments_rates, corpus, carriage) if moving else None
     walk = mean_walk(corpus.skeleton, carriage, rates, stops, half_steps, path)
     # Each half step leads to the middle of a move or from there.
-    known = len(carriage.turn)
-    moves = walk.moments[:-1, -known:] + walk.moments[1:, -known:]
+    middles, of = _middles(walk.of, len(carriage.weights), len(carriage.turn))
+    moves = walk.moments[:-1, middles] + walk.moments[1:, middles]
     moves /= moves.sum(axis=1, keepdims=True)
     if corpus.facing == "free":
         first, *_, last = stops.values()
         ends = tuple(None if stop.rates is None else float(stop.rates.turn) for stop in (first, last))
         facing = {move: stop.chains[-1] for move, stop in stops.items()}
-        turn, spread = moves @ carriage.turn, moves @ carriage.turn**2
+        turned = carriage.turn[of]
+        turn, spread = moves @ turned, moves @ turned**2
         headings = turn_with_walks(turn, spread, walk.trust[:, 0], half_steps, facing, (ends[0], ends[1]), near)
     else:
         headings = rot.heading(walk.poses[:, 0])
-    return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust)
+    return Expectation(half_steps, walk.poses, headings, walk.moments, moves, walk.trust, walk.of, of, walk.left_out)
+
+
+def _middles(moments: Ints | slice, count: int, moves: int) -> tuple[Ints | slice, Ints | slice]:
+    """Return which of some moments are middles of moves, and of which moves, of a corpus with `count` moments."""
+    if isinstance(moments, slice):
+        return slice(count - moves, None), moments
+    middles = np.flatnonzero(moments >= count - moves)
+    return middles, moments[middles] - (count - moves)

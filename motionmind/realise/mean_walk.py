@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.minimal import LASTS, departure, minimal_movement, trust
+from motionmind.realise.sparse import Chosen, all_of, choose
 from motionmind.realise.stops import Rates, Stop
 from motionmind.realise.walks import (
     FOLLOWS_WITHIN,
@@ -42,24 +43,29 @@ class MeanWalk(NamedTuple):
 
     Attributes:
         poses: orientations of the joints [2 T + 1, J, 4].
-        moments: probabilities of the corpus's moments [2 T + 1, N].
+        moments: probabilities of moments of the corpus [2 T + 1, n].
+        of: which moments these are [n]; all of them in a small corpus.
         trust: how far each joint is trusted to the walks in each half step [2 T, J], from 0 to 1 (`minimal.trust`).
+        left_out: share of walks that begin or end in moments that were not looked at, about, in the part of the body
+            where it is greatest; 0 in a small corpus.
     """
 
     poses: Floats
     moments: Floats
+    of: Ints | slice
     trust: Floats
+    left_out: float
 
 
 def mean_walk(
     skeleton: Skeleton,
     carriage: Carriage,
-    rates: Rates | None,
+    rates: Callable[[Ints | slice], Rates] | None,
     stops: Mapping[int, Stop],
     half_steps: Floats,
     path: Floats | None,
 ) -> MeanWalk:
-    """Return the mean over walks from each stop to the next, and how likely each of the corpus's moments is.
+    """Return the mean over walks from each stop to the next, and how likely moments of the corpus are.
 
     Walks of limbs count as much as those of larger parts together. The moments, by which the body travels and stands,
     are those of walks of the whole and of the part that carries it. The mean is taken as a departure from the minimal
@@ -70,45 +76,81 @@ def mean_walk(
     Args:
         skeleton: the body.
         carriage: the corpus's N moments and its steps between them.
-        rates: velocities in the moments; None where no stop has any.
+        rates: returns the velocities in moments; None where no stop has any.
         stops: what the walk passes, by the number of moves that lead there; increasing, with the first and the last.
         half_steps: times of the moves and midway between them [2 T + 1], seconds.
         path: orientations to follow at the moves [T + 1, J, 4], or None.
     """
     joints, parts = len(skeleton), parts_of(skeleton)
-    poses = np.empty((len(half_steps), joints, 4))
-    moments = np.empty((len(half_steps), len(carriage.weights)))
-    trusted = np.empty((len(half_steps) - 1, joints))
+    poses, trusted = np.empty((len(half_steps), joints, 4)), np.empty((len(half_steps) - 1, joints))
+    segments = {}
     for start, end in pairwise(stops):
         here, ends = slice(2 * start, 2 * end + 1), (stops[start], stops[end])
         between = path[start + 1 : end] if path is not None and end > start + 1 else None
         walk = _mean_between(parts, carriage, rates, ends, half_steps[here], between)
-        poses[here], moments[here], trusted[2 * start : 2 * end] = walk
+        poses[here], trusted[2 * start : 2 * end], segments[start] = walk.poses, walk.trust, walk
     for move, stop in stops.items():
         poses[2 * move] = stop.chains[:joints]
-    return MeanWalk(poses, moments, trusted)
+    left_out = max(walk.left_out for walk in segments.values())
+    return MeanWalk(poses, *_joined(segments, len(half_steps), len(carriage.weights)), trusted, left_out)
+
+
+class _Walk(NamedTuple):
+    """The mean over the walks from one stop to the next in S steps.
+
+    Attributes:
+        poses: orientations [S + 1, J, 4].
+        moments: probabilities of moments [S + 1, n] in walks of the whole body, and in those of what carries it, each
+            with the moments that these are.
+        trust: how far each joint is trusted to the walks [J].
+        left_out: as in `MeanWalk`.
+    """
+
+    poses: Floats
+    moments: tuple[tuple[Floats, Ints | slice], ...]
+    trust: Floats
+    left_out: float
+
+
+def _joined(segments: Mapping[int, _Walk], count: int, moments: int) -> tuple[Floats, Ints | slice]:
+    """Return the probabilities of moments at each of so many half steps, and which moments of the corpus these are.
+
+    Args:
+        segments: by the number of moves that lead to their first stop.
+        count: 2 T + 1.
+        moments: N, of the corpus.
+    """
+    kept = [of for walk in segments.values() for _, of in walk.moments if not isinstance(of, slice)]
+    chosen = np.unique(np.concatenate(kept)) if kept else slice(None)
+    out = np.zeros((count, moments if isinstance(chosen, slice) else len(chosen)))
+    for start, walk in segments.items():
+        rows = out[2 * start : 2 * start + len(walk.poses)]
+        rows[0] = 0.0  # of the segment before
+        for share, of in walk.moments:
+            if isinstance(of, slice) or isinstance(chosen, slice):
+                rows += 0.5 * share
+            else:
+                rows[:, np.searchsorted(chosen, of)] += 0.5 * share
+    return out, chosen
 
 
 def _mean_between(
     parts: tuple[Ints, ...],
     carriage: Carriage,
-    rates: Rates | None,
+    rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
     times: Floats,
     path: Floats | None,
-) -> tuple[Floats, Floats, Floats]:
-    """Return the mean over walks from one stop to the next, the moments' probabilities, and how far it is trusted.
+) -> _Walk:
+    """Return the mean over walks from one stop to the next.
 
     Args:
         parts: of the body, as in `parts_of`.
         carriage: the corpus's N moments and its steps between them.
-        rates: velocities in the moments, or None.
+        rates: returns the velocities in moments; or None.
         ends: both stops.
         times: of the steps' ends [S + 1], seconds.
         path: orientations to follow at every other step between [S / 2 - 1, J, 4], or None.
-
-    Returns:
-        Orientations [S + 1, J, 4], probabilities [S + 1, N], trust [J].
     """
     joints = max(int(part.max()) for part in parts) + 1
     orientations = np.stack([stop.chains[:joints] for stop in ends])
@@ -124,38 +166,57 @@ def _mean_between(
     for joint, numbers in enumerate(members.tolist()):
         groups.setdefault(tuple(numbers), []).append(joint)
     passed = orientations if path is None else np.concatenate([orientations, path])
+    shown, trees = carriage.orientations, carriage.trees
 
     def off(postures: Floats) -> Floats:
-        return squared_distances(carriage.orientations, members, len(parts), postures)
+        return squared_distances(shown, members, len(parts), postures)
 
     larger = sorted({number for numbers in groups for number in numbers[:-1]})
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
     with ThreadPoolExecutor(threads) as pool:
-        distances = [*pool.map(off, np.array_split(passed, threads))]
+        distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
 
-        def walk(number: int) -> tuple[Floats, float]:
-            own = np.concatenate([of_parts[number] for of_parts in distances])
-            return _part_marginals(number, parts[number], carriage, rates, ends, times, own)
+        def walk(number: int) -> tuple[Chosen, Floats, float, float]:
+            part = parts[number]
+            if trees is None:
+                chosen = all_of(carriage, number)
+                own = np.concatenate([of_parts[number] for of_parts in distances])
+            else:
+                chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
+                here = shown[chosen.moments][:, part]
+                whole = np.zeros((len(part), 1), dtype=np.int64)
+                own = squared_distances(here, whole, 1, np.ascontiguousarray(passed[:, part]))[0]
+            return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, pool.map(walk, larger), strict=True))
 
-        def move(number: int) -> None:
-            mine, trust_in_mine = known[number] if number in known else walk(number)
+        def move(number: int) -> float:
+            mine = known[number] if number in known else walk(number)
             for numbers, here in groups.items():
                 if numbers[-1] != number:
                     continue
-                (whole, _), (half, _) = (known[n] for n in numbers[:-1])
-                weights = SIZES[0] * whole + SIZES[1] * half + SIZES[2] * mine
+                walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
-                off = rot.log(rot.inv_mul(about, mean_rotations(weights, carriage.orientations, np.array(here), about)))
+                if trees is None:
+                    whole, half, limb = (marginals for _, marginals, *_ in walks)
+                    weights = SIZES[0] * whole + SIZES[1] * half + SIZES[2] * limb
+                    mean = mean_rotations(weights, shown, np.array(here), about)
+                else:
+                    weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
+                    of = np.concatenate([chosen.moments for chosen, *_ in walks])
+                    mean = mean_rotations(weights, shown[of][:, here], np.arange(len(here)), about)
+                off = rot.log(rot.inv_mul(about, mean))
                 off = _without_ends(off, times, leaving is not None, arriving is not None)
-                trusted[here] = np.dot(SIZES, [*(known[n][1] for n in numbers[:-1]), trust_in_mine])
+                trusted[here] = np.dot(SIZES, [trust_in_part for _, _, trust_in_part, _ in walks])
                 poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
+            return mine[-1]
 
-        list(pool.map(move, sorted({numbers[-1] for numbers in groups})))
-    return poses, 0.5 * (known[0][0] + known[1][0]), trusted
+        lost = [*pool.map(move, sorted({numbers[-1] for numbers in groups}))]
+    lost += [left_out for *_, left_out in known.values()]
+    moments = tuple((marginals, chosen.moments) for chosen, marginals, *_ in (known[0], known[1]))
+    return _Walk(poses, moments, trusted, max(lost))
 
 
 def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> Floats:
@@ -168,28 +229,32 @@ def _without_ends(off: Floats, times: Floats, leaving: bool, arriving: bool) -> 
 
 
 def _part_marginals(
-    number: int,
     part: Ints,
-    carriage: Carriage,
-    rates: Rates | None,
+    chosen: Chosen,
+    rates: Callable[[Ints | slice], Rates] | None,
     ends: tuple[Stop, Stop],
     times: Floats,
     off: Floats,
-) -> tuple[Floats, float]:
-    """Return the posterior marginals [S + 1, N] of walks of one part of the body, and how far to trust them.
+) -> tuple[Floats, float, float]:
+    """Return the posterior marginals [S + 1, n] of walks of one part of the body, how far to trust them, and the share
+    of their ends that is left out, by the moments that stand for these.
 
-    Arguments are those of `_mean_between`, but for how far `off` the moments are from the two ends, and then from the
-    postures of the path, if there is one: squared distances of the part [K, N], radians^2.
+    Arguments are those of `_mean_between`, but for the moments that are `chosen`, and how far `off` they are from the
+    two ends, and then from the postures of the path, if there is one: squared distances of the part [K, n], radians^2.
     """
-    near = np.ones((len(times), len(carriage.weights)))
+    near = np.ones((len(times), len(chosen.weights)))
     if len(off) > len(ends):
         near[2:-2:2] = likelihood(off[len(ends) :] / FOLLOWS_WITHIN**2)
     nearest = np.sqrt(off[: len(ends)].min(axis=1))
+    known, left_out = None if rates is None else rates(chosen.moments), 0.0
     for k, stop in enumerate(ends):
-        near[-k] = likelihood(off[k] / variance_at_ends(off[k]), *_rate_terms(part, rates, stop))
-    clusters = np.ascontiguousarray(carriage.clusters[:, number])
-    marginals = posterior_marginals(carriage.begins, carriage.ends, carriage.shares, clusters, carriage.weights, near)
-    return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0])))
+        near[-k] = likelihood(off[k] / variance_at_ends(off[k]), *_rate_terms(part, known, stop))
+        if chosen.near is not None:
+            mass = chosen.weights @ near[-k]
+            near[-k] *= chosen.near[k]
+            left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
+    marginals = posterior_marginals(chosen.begins, chosen.ends, chosen.shares, chosen.clusters, chosen.weights, near)
+    return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:

@@ -20,7 +20,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.grammar import Grammar
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
-from motionmind.realise.detail import detail_of, likest_moves, share_of_detail
+from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
@@ -114,7 +114,7 @@ def realise(
     within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
     walk = _bend_to_states(walk, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
-    travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel), walk.headings)
+    travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
     if length is None:
         longer = np.full(len(travel), slower)
         if fastest is not None:
@@ -133,11 +133,12 @@ def realise(
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     trust = walk.trust[:, 0]
-    aloft = walk.moments @ carriage.aloft
+    in_air, clearance = carriage.aloft[walk.of_moments], carriage.clearance[walk.of_moments]
+    aloft = walk.moments @ in_air
     trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
     given = [0, *(2 * move for move in through), -1]
     flies = trusted * aloft
-    leaps = size * (walk.moments @ (carriage.aloft * carriage.clearance)) / np.maximum(aloft, 1e-9)
+    leaps = size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9)
     most = None
     if peaks is not None:
         most = ENDS_AT * pace * peaks(pace * LONGER * float(clock.frames[-1]))
@@ -145,9 +146,9 @@ def realise(
     flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
-        size * (walk.moments @ carriage.clearance),
+        size * (walk.moments @ clearance),
         trusted,
-        walk.moments @ carriage.stands,
+        walk.moments @ carriage.stands[walk.of_moments],
         flies,
         leaps,
         size * travel,
@@ -276,9 +277,9 @@ def _detail(
     between, joints = corpus.detail.shape[1], walk.poses.shape[1]
     if not between:
         return np.zeros((len(clock.frames), joints, 3)), np.zeros(0, dtype=np.int64)
-    orientations, poses, at = carriage.orientations[: len(corpus), :joints], walk.poses[::2], walk.half_steps[::2]
-    moves = likest_moves(corpus.moves, orientations, poses)
-    of_legs, of_others = share_of_detail(corpus.moves, orientations, moves, poses, np.diff(at))
+    orientations, poses, at = carriage.orientations[: len(corpus)], walk.poses[::2], walk.half_steps[::2]
+    moves = likest_moves(corpus.moves, orientations, poses, moves_near(corpus.moves, carriage, poses))
+    of_legs, of_others = share_of_detail(corpus.moves, orientations[:, :joints], moves, poses, np.diff(at))
     times, own = subdivide_times(at, between), detail_of(corpus, moves)
 
     def scaled(share: Floats) -> Floats:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Posture, Velocity
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.carriage import Carriage
+from motionmind.realise.steps import steps_at
 
+_ALL = slice(None)
 _SOON = 1e-3  # seconds over which a velocity of the body is taken apart into its chains'
 
 
@@ -62,18 +65,45 @@ def stop_at(corpus: Corpus, posture: Posture, velocity: Velocity | None = None) 
     return Stop(chains, place, Rates.of_chains(turned, rot.mul_vec(ahead, velocity.root), len(posture.skeleton)))
 
 
+def moments_rates(corpus: Corpus, carriage: Carriage, moments: Ints | slice = _ALL) -> Rates:
+    """Return the velocities in moments of the corpus: means of the steps that lead there and on, in `Rates`.
+
+    Args:
+        corpus: the movement that was learned from.
+        carriage: its moments.
+        moments: numbers of moments [n]; all of them where they are a slice.
+    """
+    if isinstance(moments, slice):
+        return _all_rates(corpus, carriage)
+    chain = carriage.begins, carriage.ends, len(carriage.weights) - len(carriage.turn)
+    leaving, arriving = (steps_at(moments, ahead, *chain) for ahead in (True, False))
+    return _mean_rates(corpus, carriage, len(moments), [(at, steps) for at, _, steps in (leaving, arriving)])
+
+
 @lru_cache(maxsize=1)
-def moments_rates(corpus: Corpus, carriage: Carriage) -> Rates:
-    """Return the velocities in the corpus's N moments: means of the steps that lead there and on, in `Rates`."""
-    steps = np.concatenate([0.5 * corpus.moves.seconds] * 2)[:, None]
-    begins, ends = carriage.begins, carriage.ends
-    turned = rot.log(rot.inv_mul(carriage.orientations[begins], carriage.orientations[ends])) / steps[..., None]
-    travelled = np.concatenate([carriage.travel] * 2) / steps
-    counts = np.bincount(np.concatenate([begins, ends]), minlength=len(carriage.weights))
-    means = []
-    for of_steps in (turned, travelled):
-        sums = np.zeros((len(counts), *of_steps.shape[1:]))
-        np.add.at(sums, begins, of_steps)
-        np.add.at(sums, ends, of_steps)
-        means.append(sums / np.maximum(counts, 1).reshape(-1, *(1,) * (of_steps.ndim - 1)))
+def _all_rates(corpus: Corpus, carriage: Carriage) -> Rates:
+    """Return the velocities in all of the corpus's moments."""
+    steps = np.arange(len(carriage.begins))
+    return _mean_rates(
+        corpus, carriage, len(carriage.weights), [(at, steps) for at in (carriage.begins, carriage.ends)]
+    )
+
+
+def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[tuple[Ints, Ints]]) -> Rates:
+    """Return the velocities in so many moments, means of those of steps: at which moment each is, and its number."""
+    moves, means = len(carriage.turn), []
+    counts = np.bincount(np.concatenate([at for at, _ in steps]), minlength=count)
+    of_steps = [_velocities(corpus, carriage, numbers, moves) for _, numbers in steps]
+    for k in range(2):
+        sums = np.zeros((count, *of_steps[0][k].shape[1:]))
+        for (at, _), velocities in zip(steps, of_steps, strict=True):
+            np.add.at(sums, at, velocities[k])
+        means.append(sums / np.maximum(counts, 1).reshape(-1, *(1,) * (sums.ndim - 1)))
     return Rates.of_chains(means[0], means[1], len(corpus.skeleton))
+
+
+def _velocities(corpus: Corpus, carriage: Carriage, steps: Ints, moves: int) -> tuple[Floats, Floats]:
+    """Return the velocities of the chains [m, L, 3] and of the root [m, 3] in some of the steps."""
+    seconds, shown = 0.5 * corpus.moves.seconds[steps % moves][:, None], carriage.orientations
+    turned = rot.log(rot.inv_mul(shown[carriage.begins[steps]], shown[carriage.ends[steps]]))
+    return turned / seconds[..., None], carriage.travel[steps % moves] / seconds

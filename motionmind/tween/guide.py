@@ -107,7 +107,8 @@ def find_detour(
     expected = expect(learned.corpus, learned.carriage, {0: stops[0], walked: stops[1]}, half_steps)
     if creeps(learned, expected.poses, half_steps) <= CREEPING:
         return None
-    return detour(learned.corpus, (stops[0].chains, stops[1].chains), walked, max(1, round(own / seconds)))
+    ways = stops[0].chains, stops[1].chains
+    return detour(learned.corpus, learned.carriage, ways, walked, max(1, round(own / seconds)))
 
 
 def creeps(learned: LearnedCorpus, poses: Floats, times: Floats) -> float:

@@ -28,7 +28,8 @@ from motionmind._typing import Floats
 from motionmind.body.motion import Motion, Posture
 from motionmind.display import displayed
 from motionmind.learned.model import LearnedCorpus
-from motionmind.learned.pace import over_seconds, way_between, way_of
+from motionmind.learned.neighbours import postures_near
+from motionmind.learned.pace import ALIKE, over_seconds, way_between, way_of
 from motionmind.realise.timeline import usual
 
 A_CHAIN = 10.0  # w: how often the duration's density counts for each chain
@@ -70,8 +71,12 @@ def usual_times(learned: LearnedCorpus, stops: Sequence[Posture]) -> tuple[Usual
 def lulls_of(learned: LearnedCorpus, rotations: Floats) -> Floats:
     """Return the lulls of postures of rotations [n, J, 4], as far as the corpus knows them [n] (`Pace.lulls_of`)."""
     corpus, joints = learned.corpus, len(learned.corpus.skeleton)
-    shown = learned.carriage.orientations[: len(corpus), :joints]
-    return learned.pace.lulls_of(corpus.to_chains(rotations)[:, :joints], shown)
+    shown, trees = learned.carriage.orientations, learned.carriage.trees
+    postures = corpus.to_chains(rotations)[:, :joints]
+    if trees is None:
+        return learned.pace.lulls_of(postures, shown[: len(corpus), :joints])
+    near = (postures_near(trees, shown, posture, ALIKE, len(corpus)) for posture in postures)
+    return np.array([learned.pace.lull_of(numbers) for numbers in near])
 
 
 class FasterPart(msgspec.Struct, frozen=True):

@@ -240,7 +240,7 @@ def test_a_detour_goes_on_from_its_beginning_and_comes_to_its_end_as_the_corpus_
     clip = max(corpus.clips, key=len)
     chains = corpus.to_chains(corpus.rotations)
     first, last = clip.start, clip.stop - 1
-    path = detour(corpus, (chains[first], chains[last]), 12, 4)
+    path = detour(corpus, engine.carriage, (chains[first], chains[last]), 12, 4)
     assert path.shape == (13, joints, 4)
     shown = chains[:, :joints]
     off = [float(rot.angle(shown, pose).mean(axis=1).min()) for pose in path]

@@ -1,0 +1,121 @@
+"""How a tween's time grows with the corpus: recordings, and then other performances of them made from these.
+
+python experiments/scale/tweens.py PATH/TO/cmu-05 [--times 1 10 100] [--pairs 60] [--keep FOLDER]
+
+A copy is mirrored or not, has a tempo of its own, and every joint but the root is turned by an angle that drifts with
+time, so that no two postures are the same. Copies are made one after another and never held together.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from motionmind import Engine, Motion, Posture, make_discretization, own_skeleton, read_motion
+from motionmind.body.mirror import mirrored
+from motionmind.corpus.gather import gather
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import natural_spline
+
+FPS, RATE = 30.0, 5.0  # frames a second of the copies, and postures a second that are learned from
+TEMPI = 0.8, 1.25
+DRIFT = 1.0  # seconds between the angles through which a joint's drift goes
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="recordings, BVH")
+    parser.add_argument("--times", type=int, nargs="+", default=[1, 10, 100])
+    parser.add_argument("--degrees", type=float, default=3.0, help="that joints of a copy are turned by, in the mean")
+    parser.add_argument("--pairs", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--keep", type=Path, help="where corpora are kept, and found again")
+    parser.add_argument("--part", choices=["build", "ask"], help="in this process; each runs in one of its own")
+    options = parser.parse_args()
+    if options.part:
+        {"build": build, "ask": ask}[options.part](options)
+        return
+    print("times postures | load ms  MB more | first ms  median    95th | guide+search  realise", flush=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        home = options.keep or Path(scratch)
+        for times in options.times:
+            words = [str(options.folder), "--times", str(times), "--keep", str(home)]
+            for name in ("degrees", "pairs", "seed"):
+                words += [f"--{name}", str(getattr(options, name))]
+            if not (home / "corpora" / name_of(times)).exists():
+                subprocess.run([sys.executable, __file__, *words, "--part", "build"], check=True)
+            subprocess.run([sys.executable, __file__, *words, "--part", "ask"], check=True)
+
+
+def name_of(times: int) -> str:
+    return f"times{times}"
+
+
+def build(options: argparse.Namespace) -> None:
+    """Learn a corpus of so many times the recordings, and keep it."""
+    (times,) = options.times
+    clips = [own_skeleton(read_motion(path)) for path in sorted(options.folder.glob("*.bvh"))]
+    clips = [clip.slice(1, len(clip)).resample(FPS) for clip in clips]
+    corpus = gather(name_of(times), performances(clips, times, options.degrees, options.seed), rate=RATE)
+    Engine.learn(corpus, make_discretization("codebook", 15.0)).save(options.keep / "corpora" / name_of(times))
+
+
+def performances(clips: list[Motion], times: int, degrees: float, seed: int) -> Iterator[Motion]:
+    """Yield the clips as they are, then other performances of each."""
+    yield from clips
+    rng = np.random.default_rng(seed)
+    for number in range(1, times):
+        for clip in clips:
+            other = mirrored(clip) if number % 2 else clip
+            other = replace(other, skeleton=clip.skeleton, times=other.times * rng.uniform(*TEMPI)).resample(FPS)
+            knots = np.arange(0.0, other.times[-1] + 2.0 * DRIFT, DRIFT)
+            drift = rng.normal(0.0, np.radians(degrees) / 1.6, (len(knots), len(clip.skeleton), 3))
+            drift[:, 0] = 0.0
+            turned = rot.mul(rot.exp(natural_spline(knots, drift, other.times)), other.rotations)
+            yield replace(other, rotations=rot.normalise(turned), name=f"{clip.name} {number}")
+
+
+def ask(options: argparse.Namespace) -> None:
+    """Load the corpus, and join random pairs of its postures."""
+    (times,) = options.times
+    Engine.load("ballet")  # imports what loading takes
+    before, began = resident(), perf_counter()
+    engine = Engine.load(name_of(times), options.keep)
+    loaded, more = perf_counter() - began, resident() - before
+    drawn = np.random.default_rng(options.seed).integers(len(engine.corpus), size=(options.pairs + 1, 2))
+    seconds, parts = [], []
+    for a, b in drawn:
+        began = perf_counter()
+        tween = engine.tween(posture(engine, a), posture(engine, b))
+        seconds.append(perf_counter() - began)
+        spent = tween.seconds
+        parts.append((spent["problem"] + spent["bound"] + spent["search"], spent["realise"]))
+    ms = 1e3 * np.array(seconds)
+    searching, realising = 1e3 * np.median(parts[1:], axis=0)
+    print(
+        f"{times:5} {len(engine.corpus):8} | {1e3 * loaded:7.1f} {more:8.1f} | {ms[0]:8.0f} {np.median(ms[1:]):7.1f} "
+        f"{np.percentile(ms[1:], 95):7.1f} | {searching:12.1f} {realising:8.1f}",
+        flush=True,
+    )
+
+
+def posture(engine: Engine, index: int) -> Posture:
+    """Return a posture of the corpus."""
+    return Posture(engine.corpus.skeleton, engine.corpus.rotations[index], engine.corpus.root[index])
+
+
+def resident() -> float:
+    """Return the memory that this process holds now, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 2**20
+
+
+if __name__ == "__main__":
+    main()

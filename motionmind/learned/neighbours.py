@@ -1,0 +1,235 @@
+"""Neighbours: a tree over a corpus's moments for each part of the body, by which a search looks at few of them.
+
+The distance of two postures of a part is the root mean square over its joints of 2 sin(angle / 2), radians: that of
+their rotation matrices, up to a factor. A node of a tree is a ball that holds its moments, and its children halve these
+by which of two that lie far apart they are nearer to. Source: Omohundro, "Five balltree construction algorithms", ICSI
+TR-89-063 (1989).
+
+Bodies have so many joints that balls overlap, and a search that is to be certain of the nearest moment looks at most of
+them. This one looks at a fixed number of leaves, those first whose nearest moment is likely to be nearest.
+
+All parts' trees halve the same numbers of moments, so one table says where nodes begin and end: node n has the children
+2 n + 1 and 2 n + 2, and a node of the last level is a leaf.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind._typing import Floats, Int32s, Ints, Singles
+from motionmind.body.limbs import parts_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.geometry.distances import squared_distance
+from motionmind.jit import jit
+
+MANY = 8000  # moments of a corpus that has no trees, at most: all of them are looked at
+LEAF = 32  # moments of a leaf, at most
+SAMPLE = 64  # moments of a node by which it is halved, and of which its centre is the mean
+LEAVES = 96  # of a tree that are searched for near moments
+INSIDE = 0.6  # of a ball's radius: how much nearer than its centre its nearest moment is likely to be
+_SLACK = 1e-6  # radians: centres are rounded
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """The trees of P parts of the body over N moments, each of K nodes.
+
+    Attributes:
+        parts: joints of each part.
+        order: the moments of each part's tree, leaf after leaf [P, N].
+        ranks: where each moment is in that order [P, N].
+        bounds: first moment in the order of each node, and the one after its last [K, 2].
+        centres: centres of the nodes, one part's joints after another's [K, W, 4].
+        radii: their radii [P, K], radians.
+        weights: sums of their moments' weights [P, K].
+    """
+
+    parts: tuple[Ints, ...]
+    order: Int32s
+    ranks: Int32s
+    bounds: Int32s
+    centres: Singles
+    radii: Floats
+    weights: Floats
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "parts"}
+
+    def centres_of(self, number: int) -> Singles:
+        """Return the centres of the nodes of a part's tree [K, m, 4]."""
+        start = sum(len(part) for part in self.parts[:number])
+        return self.centres[:, start : start + len(self.parts[number])]
+
+
+def build_neighbours(skeleton: Skeleton, orientations: Floats, weights: Floats) -> Neighbours:
+    """Build the trees of all parts of a body (`parts_of`).
+
+    Args:
+        skeleton: the body.
+        orientations: of the chains in N moments, the joints' first [N, L, 4].
+        weights: of the moments [N].
+    """
+    parts, bounds = parts_of(skeleton), node_bounds(len(orientations))
+    order = np.empty((len(parts), len(orientations)), dtype=np.int32)
+    ranks = np.empty_like(order)
+    radii, sums = np.empty((2, len(parts), len(bounds)))
+    centres = np.empty((len(bounds), sum(map(len, parts)), 4), dtype=np.float32)
+    trees = Neighbours(parts, order, ranks, bounds, centres, radii, sums)
+    for number, part in enumerate(parts):
+        shown = np.asarray(orientations[:, part], dtype=np.float32)
+        _grow(shown, bounds, order[number], trees.centres_of(number), radii[number])
+        ranks[number, order[number]] = np.arange(len(orientations), dtype=np.int32)
+        total = np.concatenate([np.zeros(1), np.cumsum(weights[order[number]])])
+        sums[number] = total[bounds[:, 1]] - total[bounds[:, 0]]
+    return trees
+
+
+def find_near(
+    trees: Neighbours, number: int, orientations: Floats, posture: Floats, leaves: int = LEAVES
+) -> tuple[Ints, Floats]:
+    """Return moments near a posture in one part of the body, the nearest first, and their squared distances, radians^2.
+
+    They are all moments of the leaves that promise most.
+
+    Args:
+        trees: of the corpus.
+        number: of the part.
+        orientations: of the corpus's moments [N, L, 4].
+        posture: orientations of the chains [L, 4].
+        leaves: how many to search.
+    """
+    part = trees.parts[number]
+    found, squared = _search(
+        orientations,
+        part,
+        np.ascontiguousarray(posture[part]),
+        trees.order[number],
+        trees.bounds,
+        trees.centres_of(number),
+        trees.radii[number],
+        leaves,
+    )
+    order = np.argsort(np.round(squared, 9), kind="stable")
+    return found[order].astype(np.int64), squared[order]
+
+
+def postures_near(
+    trees: Neighbours, orientations: Floats, posture: Floats, count: int, below: int, leaves: int = LEAVES
+) -> Ints:
+    """Return so many of the corpus's postures near to one, the nearest first, by the whole body.
+
+    Args:
+        trees: of the corpus.
+        orientations: of the corpus's moments [N, L, 4]; the postures come before the middles of its moves.
+        posture: orientations of the chains [L, 4].
+        count: how many, or as many as are found.
+        below: number of the corpus's postures.
+        leaves: how many to search.
+    """
+    found = find_near(trees, 0, orientations, posture, leaves)[0]
+    return found[found < below][:count]
+
+
+def node_bounds(count: int) -> Int32s:
+    """Return where the nodes of a tree over so many moments begin and end [K, 2]."""
+    levels = [np.array([[0, count]])]
+    while (np.diff(levels[-1]) > LEAF).any():
+        start, stop = levels[-1].T
+        middle = (start + stop) // 2
+        levels.append(np.stack([start, middle, middle, stop], axis=1).reshape(-1, 2))
+    return np.concatenate(levels).astype(np.int32)
+
+
+@jit
+def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii: Floats) -> None:
+    """Grow the tree of a part that moments show [N, m, 4]: write its order [N], and its nodes' centres and radii."""
+    order[:] = np.arange(len(order))
+    keys, joints = np.empty(len(order)), shown.shape[1]
+    for node in range(len(bounds)):
+        start, stop = bounds[node]
+        stride = max(1, (stop - start) // SAMPLE)
+        _centre(shown, order[start:stop:stride], centres[node])
+        radius = 0.0
+        for k in range(start, stop):
+            radius = max(radius, squared_distance(shown[order[k]], centres[node]))
+        radii[node] = np.sqrt(radius / joints) + _SLACK
+        if 2 * node + 2 < len(bounds):
+            one = _farthest(shown, order[start:stop:stride], centres[node])
+            other = _farthest(shown, order[start:stop:stride], shown[one])
+            for k in range(start, stop):
+                here = shown[order[k]]
+                keys[k] = squared_distance(here, shown[one]) - squared_distance(here, shown[other])
+            order[start:stop] = order[start:stop][np.argsort(keys[start:stop], kind="mergesort")]
+
+
+@jit
+def _centre(shown: Singles, moments: Int32s, out: Singles) -> None:
+    """Write the normalised means of joints' orientations in some moments, of the first one's sign [m, 4]."""
+    first = shown[moments[0]]
+    for j in range(len(out)):
+        mean = np.zeros(4)
+        for moment in moments:
+            one = shown[moment, j]
+            cosine = one[0] * first[j, 0] + one[1] * first[j, 1] + one[2] * first[j, 2] + one[3] * first[j, 3]
+            for c in range(4):
+                mean[c] += one[c] if cosine >= 0.0 else -one[c]
+        length = np.sqrt(np.sum(mean**2))
+        for c in range(4):
+            out[j, c] = mean[c] / length if length > 1e-6 else first[j, c]
+
+
+@jit
+def _farthest(shown: Singles, moments: Int32s, posture: Singles) -> int:
+    """Return which of some moments is farthest from a posture of the part [m, 4]."""
+    far, farthest = -1.0, moments[0]
+    for moment in moments:
+        away = squared_distance(shown[moment], posture)
+        if away > far:
+            far, farthest = away, moment
+    return int(farthest)
+
+
+@jit
+def _apart(chains: Floats, part: Ints, posture: Floats) -> float:
+    """Return the squared distance of a part of `chains` [L, 4] from a posture of it [m, 4], sum over joints."""
+    total = 0.0
+    for j in range(len(part)):
+        a, b = chains[part[j]], posture[j]
+        cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+        total += max(1.0 - cosine * cosine, 0.0)
+    return 4.0 * total
+
+
+@jit
+def _search(
+    orientations: Floats,
+    part: Ints,
+    posture: Floats,
+    order: Int32s,
+    bounds: Int32s,
+    centres: Singles,
+    radii: Floats,
+    leaves: int,
+) -> tuple[Int32s, Floats]:
+    """Return the moments in the leaves that are searched, and their squared distances."""
+    found, squared, many = np.empty(leaves * LEAF, np.int32), np.empty(leaves * LEAF), 0
+    heap = [(0.0, 0)]
+    while heap and leaves:
+        _, node = heapq.heappop(heap)
+        if 2 * node + 2 < len(bounds):
+            for child in (2 * node + 1, 2 * node + 2):
+                away = np.sqrt(squared_distance(centres[child], posture) / len(part))
+                heapq.heappush(heap, (away - INSIDE * radii[child], child))
+            continue
+        leaves -= 1
+        for k in range(bounds[node, 0], bounds[node, 1]):
+            found[many], squared[many] = order[k], _apart(orientations[order[k]], part, posture) / len(part)
+            many += 1
+    return found[:many], squared[:many]

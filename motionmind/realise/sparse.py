@@ -1,0 +1,150 @@
+"""Few of a corpus's moments that stand for all of them in the walks of a part of the body.
+
+The sums over all walks (`motionmind.realise.marginals`) take time in proportion to the corpus. Of a large corpus they
+are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
+
+- those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
+  the last, where walks end, and those that lead there; those nearest to each posture of a path to follow;
+- for all others, one moment of each of a few hundred balls into which the tree is cut: they are the smaller, the nearer
+  to the path that walks are to follow.
+
+What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
+the weights add up to those of the corpus. A step to a moment that is not chosen leads to one that stands for its ball:
+no walk is lost.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats, Int32s, Ints, Singles
+from motionmind.geometry.distances import squared_distance
+from motionmind.jit import jit
+from motionmind.learned.carriage import Carriage
+from motionmind.learned.neighbours import INSIDE, Neighbours, find_near
+from motionmind.realise.steps import follow, steps_at
+from motionmind.realise.walks import FOLLOWS_WITHIN
+
+SPLITS = 640  # balls that are cut in two
+ENDS = 96  # moments near each end, with those that follow on them or lead to them
+ALONG = 8  # steps for which these are followed
+NEAREST, BY_PATH = 24, 16  # of those at the ends, that are followed half the way; moments near each posture of a path
+PATH_LEAVES = 12  # of a tree that are searched for these
+EVERYWHERE = 0.01  # of what following a path counts, what any ball does
+
+
+class Chosen(NamedTuple):
+    """Few of the corpus's moments for the walks of one part of the body, and the steps between them.
+
+    Attributes:
+        moments: their numbers, rising [n]; all of them where they are a slice.
+        weights: of the moments [n].
+        begins: which of them each step leads from [m].
+        ends: which it leads to [m].
+        shares: share of each step among those that leave the same moment [m].
+        clusters: their clusters, numbered from 0 [n].
+        near: which of them are near the first posture and the last, where walks begin and end [n] each; None for all.
+    """
+
+    moments: Ints | slice
+    weights: Floats
+    begins: Ints
+    ends: Ints
+    shares: Floats
+    clusters: Int32s
+    near: tuple[Bools, Bools] | None
+
+
+def all_of(carriage: Carriage, number: int) -> Chosen:
+    """Return all of the corpus's moments, for the walks of the part of that number."""
+    clusters = np.ascontiguousarray(carriage.clusters[:, number])
+    steps = carriage.begins, carriage.ends, carriage.shares
+    return Chosen(slice(None), carriage.weights, *steps, clusters, None)
+
+
+def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, path: Floats | None, steps: int) -> Chosen:
+    """Choose moments for the walks of one part of the body.
+
+    Args:
+        trees: of the corpus.
+        number: of the part.
+        carriage: the corpus's moments.
+        ends: orientations of the joints in both given postures [2, J, 4].
+        path: those that walks are to follow [K, J, 4], or None.
+        steps: of a walk.
+    """
+    part, shown, order = trees.parts[number], carriage.orientations, trees.order[number]
+    first, last = (find_near(trees, number, shown, end)[0][:ENDS] for end in ends)
+    middle = ends[:0] if path is None else path
+    by_path = [find_near(trees, number, shown, posture, PATH_LEAVES)[0][:BY_PATH] for posture in middle]
+    nodes = _cut(
+        np.ascontiguousarray(middle[:, part]),
+        trees.bounds,
+        trees.centres_of(number),
+        trees.radii[number],
+        trees.weights[number],
+    )
+    starts, stops = trees.bounds[nodes].T.astype(np.int64)
+    chain = carriage.begins, carriage.ends, len(shown) - len(carriage.turn)
+    runs = [follow(*run, *chain) for run in ((first, True, ALONG), (last, False, ALONG))]
+    runs += [follow(end[:NEAREST], end is first, steps // 2 + 1, *chain) for end in (first, last)]
+    runs += [follow(near, True, 2, *chain) for near in by_path]
+    singles = np.unique(np.concatenate([first, last, *by_path]))
+    moments = np.unique(np.concatenate([singles, *runs, order[(starts + stops) // 2]]))
+
+    def ball_of(some: Ints) -> Ints:
+        return np.asarray(np.searchsorted(starts, trees.ranks[number][some], side="right") - 1)
+
+    ball, own, whole = ball_of(moments), carriage.weights[moments], trees.weights[number][nodes]
+    alone = np.isin(moments, singles)
+    alone &= (np.bincount(ball, ~alone, len(nodes)) > 0.0)[ball]  # else nothing stands for what is left of the ball
+    rest = whole - np.bincount(ball, alone * own, len(nodes))
+    share = rest / np.bincount(ball, ~alone * own, len(nodes))
+    weights = np.where(alone, own, own * share[ball])
+    stands = np.empty(len(nodes), dtype=np.int64)
+    stands[ball[~alone][::-1]] = np.flatnonzero(~alone)[::-1]
+    begins, to, numbers = steps_at(moments, True, *chain)
+    goal = np.minimum(np.searchsorted(moments, to), len(moments) - 1)
+    missing = moments[goal] != to
+    goal[missing] = stands[ball_of(to[missing])]
+    _, clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)
+    return Chosen(
+        moments,
+        weights,
+        begins,
+        goal,
+        np.asarray(carriage.shares[numbers]),
+        clusters.reshape(-1).astype(np.int32),
+        (np.isin(moments, first), np.isin(moments, last)),
+    )
+
+
+@jit
+def _cut(path: Floats, bounds: Int32s, centres: Singles, radii: Floats, weights: Floats) -> Ints:
+    """Cut a tree into balls that are the smaller, the more they matter: return their nodes in its order [n].
+
+    Args:
+        path: the part in the postures to follow [K, m, 4].
+        bounds, centres, radii, weights: of the nodes.
+    """
+    heap, leaves = [(-1.0, 0)], [0][:0]
+    for _ in range(SPLITS):
+        if not heap:
+            break
+        _, node = heapq.heappop(heap)
+        if 2 * node + 2 >= len(bounds):
+            leaves.append(node)
+            continue
+        for child in (2 * node + 1, 2 * node + 2):
+            worth = EVERYWHERE
+            for k in range(len(path)):
+                away = np.sqrt(squared_distance(centres[child], path[k]) / path.shape[1])
+                worth += np.exp(-(max(away - INSIDE * radii[child], 0.0) ** 2) / (2.0 * FOLLOWS_WITHIN**2))
+            heapq.heappush(heap, (-weights[child] * worth * radii[child] ** 2, child))
+    for _, node in heap:
+        leaves.append(node)
+    nodes = np.array(leaves, np.int64)
+    return nodes[np.argsort(bounds[nodes, 0])]

@@ -1,0 +1,86 @@
+"""Steps between a corpus's moments, found from some of them without a look at the others.
+
+A corpus with N postures and M moves has N + M moments, the postures and then the middles of its moves, and 2 M steps:
+those from postures to middles, then those from middles to postures. Moves that lead on in their clips come first, and
+then those that lead back; in either the postures that they leave, and those that they lead to, rise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionmind._typing import Ints
+from motionmind.jit import jit
+
+
+@jit
+def _edges(numbers: Ints, first: int, last: int, wanted: int) -> int:
+    """Return which of rising numbers, from the first up to the last, is the wanted one; -1 for none."""
+    stop = last
+    while first < last:
+        middle = (first + last) // 2
+        if numbers[middle] < wanted:
+            first = middle + 1
+        else:
+            last = middle
+    return first if first < stop and numbers[first] == wanted else -1
+
+
+@jit
+def _backward(begins: Ints, ends: Ints, moves: int) -> int:
+    """Return the number of the first move that leads backward in its clip; all those after it do."""
+    first, last = 0, moves
+    while first < last:
+        middle = (first + last) // 2
+        if ends[moves + middle] > begins[middle]:
+            first = middle + 1
+        else:
+            last = middle
+    return first
+
+
+@jit
+def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, postures: int) -> Ints:
+    """Return moments and those to which so many steps lead from them; or from which they lead there, if not `ahead`."""
+    moves = len(begins) // 2
+    turns = _backward(begins, ends, moves)
+    out = [0][:0]
+    for moment in moments:
+        here = [int(moment)]
+        for _ in range(steps):
+            on = [0][:0]
+            for one in here:
+                if one >= postures:
+                    on.append(ends[moves + one - postures] if ahead else begins[one - postures])
+                    continue
+                for first, last in ((0, turns), (turns, moves)):
+                    numbers = begins[:moves] if ahead else ends[moves:]
+                    move = _edges(numbers, first, last, one)
+                    if move >= 0:
+                        on.append(postures + move)
+            here = on
+            out.extend(on)
+    return np.array(out, np.int64)
+
+
+@jit
+def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int) -> tuple[Ints, Ints, Ints]:
+    """Return the steps that leave moments, or that lead to them if not `ahead`: at which of the moments [m], the moment
+    at each one's other end [m], and its number [m]."""
+    moves = len(begins) // 2
+    turns = _backward(begins, ends, moves)
+    at, other, steps = np.empty((3, 2 * len(moments)), np.int64)
+    count = 0
+    for k in range(len(moments)):
+        one = moments[k]
+        if one >= postures:
+            step = one - postures + (moves if ahead else 0)
+            at[count], other[count], steps[count] = k, ends[step] if ahead else begins[step], step
+            count += 1
+            continue
+        for first, last in ((0, turns), (turns, moves)):
+            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one)
+            if move >= 0:
+                at[count], other[count], steps[count] = k, postures + move, move + (0 if ahead else moves)
+                count += 1
+    return at[:count], other[:count], steps[:count]

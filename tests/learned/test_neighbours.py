@@ -1,0 +1,99 @@
+"""Trees over a corpus's moments: what they promise of their balls, and what is found by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionmind.corpus import store
+from motionmind.errors import FormatError
+from motionmind.geometry import rotations as rot
+from motionmind.learned import persistence
+from motionmind.learned.neighbours import LEAF, Neighbours, build_neighbours, find_near, node_bounds, postures_near
+from motionmind.tween.engine import Engine
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return Engine.load("ballet")
+
+
+@pytest.fixture(scope="module")
+def trees(engine: Engine) -> Neighbours:
+    return build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
+
+
+def distances(engine: Engine, part: np.ndarray, posture: np.ndarray) -> np.ndarray:
+    """Squared distances of all moments from a posture of a part [m, 4]."""
+    cosines = np.einsum("njc,jc->nj", engine.carriage.orientations[:, part], posture)
+    return np.asarray(4.0 * np.maximum(1.0 - cosines**2, 0.0).mean(axis=1))
+
+
+def test_each_ball_holds_its_moments_and_their_weights(engine: Engine, trees: Neighbours) -> None:
+    count = len(engine.carriage.weights)
+    assert np.diff(trees.bounds[(len(trees.bounds) - 1) // 2 :]).max() <= LEAF
+    for number, part in enumerate(trees.parts):
+        order = trees.order[number]
+        np.testing.assert_array_equal(np.sort(order), np.arange(count))
+        np.testing.assert_array_equal(trees.ranks[number][order], np.arange(count))
+        for node, (start, stop) in enumerate(trees.bounds):
+            off = distances(engine, part, trees.centres_of(number)[node].astype(np.float64))[order[start:stop]]
+            assert np.sqrt(off.max()) <= trees.radii[number, node] + 1e-3  # of single precision
+            assert trees.weights[number, node] == pytest.approx(engine.carriage.weights[order[start:stop]].sum())
+
+
+def test_children_halve_their_parents() -> None:
+    for count in (1, 32, 33, 1000, 1025):
+        bounds = node_bounds(count)
+        assert bounds[0].tolist() == [0, count]
+        for node in range(len(bounds) // 2):
+            (start, stop), (first, middle), (again, last) = bounds[[node, 2 * node + 1, 2 * node + 2]].tolist()
+            assert (start, middle, stop) == (first, again, last)
+            assert abs((middle - first) - (last - middle)) <= 1
+
+
+def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(engine: Engine, trees: Neighbours) -> None:
+    rng, shown = np.random.default_rng(0), engine.carriage.orientations
+    leaves, nearly = len(trees.bounds) // 2 + 1, []
+    for number, part in enumerate(trees.parts):
+        for _ in range(4):
+            posture = rot.mul(shown[rng.integers(len(shown))], rot.exp(rng.normal(0.0, 0.1, (shown.shape[1], 3))))
+            off = np.sort(distances(engine, part, posture[part]))
+            found, squared = find_near(trees, number, shown, posture, leaves)
+            assert len(found) == len(shown)
+            np.testing.assert_allclose(squared, off, atol=1e-12)
+            few, nearest = find_near(trees, number, shown, posture, leaves // 8)
+            assert len(few) <= leaves // 8 * LEAF
+            nearly.append(np.sqrt(nearest[0] / off[0]))
+    assert np.median(nearly) < 1.01
+    assert np.quantile(nearly, 0.9) < 1.5
+
+
+def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighbours) -> None:
+    count, shown = len(engine.corpus), engine.carriage.orientations
+    found = postures_near(trees, shown, shown[7], 5, count)
+    assert found[0] == 7
+    assert len(found) == 5
+    assert found.max() < count
+
+
+def test_trees_are_kept_with_the_corpus_and_checked(engine: Engine, trees: Neighbours, tmp_path: Path) -> None:
+    learned = replace(engine, carriage=replace(engine.carriage, trees=trees))
+    folder = tmp_path / "large"
+    persistence.save(learned, folder)
+    loaded = persistence.load(str(folder)).carriage.trees
+    assert loaded is not None
+    for name, array in trees.arrays.items():
+        np.testing.assert_array_equal(loaded.arrays[name], array)
+    place = store.load(folder).place
+    for name, value in (("order", 10**6), ("ranks", 3), ("bounds", 3), ("radii", -1.0), ("weights", np.nan)):
+        file = place / f"neighbours.{name}.npy"
+        whole, array = file.read_bytes(), np.load(file)
+        array.reshape(-1)[2] = value
+        np.save(file, array)
+        with pytest.raises(FormatError, match=r"neighbours\.\w+ .*corpus build"):
+            persistence.load(str(folder))
+        file.write_bytes(whole)
