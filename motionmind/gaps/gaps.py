@@ -1,4 +1,4 @@
-"""What a corpus lacks: which joint graphs hang together worst, and which transitions would help its tweens most."""
+"""Gaps of a corpus: which joint graphs hang together worst, and which transitions would help its tweens most."""
 
 from __future__ import annotations
 
@@ -32,8 +32,14 @@ class Energy(msgspec.Struct, frozen=True):
 
 
 class JointGap(msgspec.Struct, frozen=True):
-    """How badly a joint graph hangs together: its states, the share of the sample's pairs that attested moves cannot
-    join, and the bridges of a tween."""
+    """The gaps of a joint graph.
+
+    Attributes:
+        joint: the joint.
+        states: number of its states.
+        apart: share of the sample's pairs that attested moves cannot join.
+        bridges: bridges of a tween, on average.
+    """
 
     joint: str
     states: int
