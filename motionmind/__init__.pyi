@@ -28,6 +28,8 @@ from .formats import write_motion as write_motion
 from .formats import write_posture as write_posture
 from .formats.added import MotionReader as MotionReader
 from .formats.added import MotionWriter as MotionWriter
+from .gaps.gaps import Gaps as Gaps
+from .gaps.gaps import find_gaps as find_gaps
 from .learned.plausibility import Sighting as Sighting
 from .metrics.measure import Figure as Figure
 from .metrics.measure import measure as measure
@@ -70,6 +72,7 @@ __all__ = [
     "Figure",
     "Flow",
     "FormatError",
+    "Gaps",
     "Insertion",
     "Motion",
     "MotionMindError",
@@ -94,6 +97,7 @@ __all__ = [
     "compose",
     "contact_sheet",
     "explain",
+    "find_gaps",
     "flow_of",
     "human23",
     "human44",

@@ -17,7 +17,19 @@ from motionmind import MotionMindError, WrongTypeError
 from motionmind.corpus.gather import Gathering
 
 # Made by MotionMind and given to its users, who make none; errors and warnings take any message.
-ANSWERS = {"Bridge", "Credit", "Explanation", "Figure", "Seam", "Sighting", "Source", "Tween", "TweenReport", "Wait"}
+ANSWERS = {
+    "Bridge",
+    "Credit",
+    "Explanation",
+    "Figure",
+    "Gaps",
+    "Seam",
+    "Sighting",
+    "Source",
+    "Tween",
+    "TweenReport",
+    "Wait",
+}
 PROTOCOLS = {"Discretization", "MotionReader", "MotionWriter"}  # which others implement
 SCORE = """title  Two bends of the knees
 body   human23
@@ -71,6 +83,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
         "compose": (mm.compose, {"path": folder / "bends.score", "clip": "bends"}),
         "contact_sheet": (mm.contact_sheet, {"motion": motion, "frames": [0]}),
         "explain": (mm.explain, {"tween": known["tween"]}),
+        "find_gaps": (mm.find_gaps, {"learned": engine, "pairs": 2, "count": 0, "named": {}}),
         "flow_of": (mm.flow_of, {"name": "lorenz", "rho": 28.0}),
         "list_corpora": (mm.list_corpora, {"folder": folder}),
         "lossy_fields": (mm.lossy_fields, {"motion": motion, "path": "rest.bvh"}),

@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 SUBJECTS = {
     "Tweens": ("Engine", "TweenRequest", "Tween", "Bridge", "Wait", "Source", "Credit", "Sighting", "list_corpora"),
-    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure"),
+    "Reports": ("TweenReport", "read_report", "explain", "Explanation", "measure", "Figure", "find_gaps", "Gaps"),
     "Movement": ("Posture", "Motion", "Insertion", "Skeleton", "human23", "human44"),
     "Files": (
         "read_motion",
@@ -62,6 +62,7 @@ SCHEMAS = {
     "built-manifest": "motionmind.corpus.manifest.BuiltManifest",
     "corpus-summary": "motionmind.learned.summary.CorpusSummary",
     "corpus-check": "motionmind.learned.summary.CorpusCheck",
+    "gaps": "motionmind.gaps.gaps.Gaps",
     "measure-report": "motionmind.metrics.measure.MeasureReport",
     "variation-report": "motionmind.variation.report.VariationReport",
 }

@@ -14,6 +14,7 @@ from motionmind.cli.catalogue import postures
 from motionmind.cli.conversion import convert, posture
 from motionmind.cli.corpora import corpora
 from motionmind.cli.credits import credits as credit
+from motionmind.cli.gaps import gaps
 from motionmind.cli.looks import explain, graph
 from motionmind.cli.measures import measure
 from motionmind.cli.options import group, show_help_without_command
@@ -52,6 +53,7 @@ for _command in (
     *(vary, review, attractor, studio, serve, warm, completion),
 ):
     app.add_command(_command)
+corpora.add_command(gaps)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -68,6 +68,7 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "corpus list",
             "corpus info",
             "corpus check",
+            "corpus gaps",
             "corpus rename",
             "corpus delete",
             "corpus publish",
@@ -141,7 +142,7 @@ def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 28
+    assert len(EXAMPLES) == 29
     for line in EXAMPLES:
         if line.startswith(("motionmind serve", "motionmind studio")):  # which do not end
             continue

@@ -1,0 +1,59 @@
+"""A transition that could be recorded: from one posture of a corpus to another in one move; and learning with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motionmind._typing import Ints, States
+from motionmind.corpus.corpus import FACING
+from motionmind.grammar.grammar import learn
+from motionmind.learned.model import LearnedCorpus
+from motionmind.realise.timeline import usual
+
+
+class Transition(NamedTuple):
+    """A move from posture `begin` of a corpus to its posture `end`, by their numbers.
+
+    Where the facing is free, the body keeps the direction that it faces.
+    """
+
+    begin: int
+    end: int
+
+
+def with_transitions(learned: LearnedCorpus, transitions: list[Transition]) -> LearnedCorpus:
+    """Return a learned corpus with the grammar that it would have with some transitions recorded, each as a clip.
+
+    The clips have the weight of the heaviest clips, and their moves the usual duration. The states stay what they are,
+    and so does all but the grammar: the movement, the carriage and the pace.
+    """
+    if not transitions:
+        return learned
+    corpus, moves = learned.corpus, learned.corpus.moves
+    states = np.concatenate([np.asarray(learned.states), *(states_of(learned, one) for one in transitions)])
+    begins: Ints = len(corpus) + 2 * np.arange(len(transitions))
+    ones = np.ones(len(transitions))
+    grammar = learn(
+        corpus.chains,
+        corpus.chain_parents,
+        learned.space.centres,
+        states,
+        learned.space.sizes,
+        np.concatenate([moves.begins, begins]),
+        np.concatenate([moves.seconds, ones * usual(learned.grammar.transitions)]),
+        ends=np.concatenate([moves.ends, begins + 1]),
+        weights=np.concatenate([moves.weights, ones]),
+        posture_weights=np.concatenate([corpus.weights, ones, ones]),
+    )
+    return replace(learned, grammar=grammar)
+
+
+def states_of(learned: LearnedCorpus, transition: Transition) -> States:
+    """Return the states of a transition's two postures [2, L]."""
+    states = np.array(learned.states[[transition.begin, transition.end]])
+    if learned.corpus.chains[-1] == FACING:
+        states[1, -1] = states[0, -1]
+    return states
