@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 from command_line import Run
 from file_server import Files, serving_files
+from saved_corpora import kill_before
 
 from motionmind.corpus import store
 from motionmind.corpus.versions import locked
@@ -358,3 +361,32 @@ def test_no_network_is_an_error_in_a_line(run: Run) -> None:
 def test_an_index_that_is_not_there_is_named(run: Run) -> None:
     result = run("corpus", "list", "--remote", "--index", "none.json")
     assert (result.code, result.err) == (2, "error: none.json: cannot be read: there is no such file or folder\n")
+
+
+# --- kills ----------------------------------------------------------------------------------------------------------
+
+EVERY = 7  # of the changes of the disk, one is the last of a process
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_a_kill_before_a_change_of_the_disk_leaves_no_corpus_or_the_whole(published: Path, tmp_path: Path) -> None:
+    index, home = str(published / "index.json"), tmp_path / "home"
+    fetched("insect", tmp_path / "other", index)
+    whole = store.load(tmp_path / "other" / "corpora" / "insect")
+    for change in range(1, 10_000, EVERY):
+        if (child := os.fork()) == 0:
+            with suppress(BaseException):
+                kill_before(change)
+                fetched("insect", home, index)
+            os._exit(0)
+        _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status):  # there are no more changes
+            break
+        assert "insect" not in store.list_corpora(home) or store.load(home / "corpora" / "insect").arrays.keys() == (
+            whole.arrays.keys()
+        )
+    assert change > 10 * EVERY
+    assert store.load(home / "corpora" / "insect").manifest["arrays"] == whole.manifest["arrays"]
+    assert Engine.load("insect", home).corpus.name == "insect"
+    fetched("insect", home, index, name="second")  # which clears away what is left of the first
+    assert names(tmp_path / "archives") == []
