@@ -22,7 +22,7 @@ from motionmind.registry.download import Progress, check_address, download, file
 from motionmind.registry.index import Entry, Recipe, Source, find, is_address, open_index
 
 _ARCHIVE = "archive.tar"
-_TOLD = ("title", "author", "source", "licence")  # by the index and the corpus, which must agree
+_TOLD = ("title", "author", "source", "licence", "citation", "origins")  # by the index and the corpus, which must agree
 
 
 def archives() -> Path:

@@ -43,7 +43,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def published(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("public")
-    publish("insect", folder, home=built, citation="Cite us.", **ABOUT)
+    publish("insect", folder, home=built, **ABOUT)
     return folder
 
 
