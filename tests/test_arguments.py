@@ -75,7 +75,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     tween_asked = {"a": posture, "b": motion.posture(3), "moves": 3}
     gathering: dict[str, Any] = {"rate": None, "skip": 0, "facing": "free", "flips": "repair", "flip_degrees": 60.0}
     gathering |= {"mirror": False, "reverse": None, "about": None}
-    gathering |= dict.fromkeys(("title", "author", "source", "licence", "performer"), "")
+    gathering |= dict.fromkeys(("title", "author", "source", "licence", "citation", "performer"), "")
     assert gathering.keys() == Gathering.__annotations__.keys()
     path = folder / "out"
     return {

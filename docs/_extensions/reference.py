@@ -60,6 +60,7 @@ SCHEMAS = {
     "diagnosis": "motionmind.tween.diagnosis.Diagnosis",
     "source-manifest": "motionmind.corpus.manifest.SourceManifest",
     "built-manifest": "motionmind.corpus.manifest.BuiltManifest",
+    "index": "motionmind.registry.index.Index",
     "corpus-summary": "motionmind.learned.summary.CorpusSummary",
     "corpus-check": "motionmind.learned.summary.CorpusCheck",
     "gaps": "motionmind.gaps.gaps.Gaps",

@@ -132,6 +132,7 @@ def corpora(context: click.Context) -> None:
     help="Name who performs the movement, if not the author: credits name them.",
 )
 @option("--licence", section=Section.ABOUT, default="", show_default=False, help="State the licence of the movement.")
+@option("--citation", section=Section.ABOUT, default="", show_default=False, help="State how to cite the corpus.")
 @HOME
 def build(
     name: str,
@@ -251,7 +252,7 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
     if as_json:
         click.echo(json.dumps(found))
         return
-    for key in ("name", "title", "author", "source", "licence", "skeleton", "facing", "rate"):
+    for key in ("name", "title", "author", "source", "licence", "citation", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
     if found["repairs"]:

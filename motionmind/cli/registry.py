@@ -66,13 +66,20 @@ def fetch(name: str, new_name: str | None, index: str | None, home: Path | None)
 
 def _print_terms(entry: Entry) -> None:
     """Print what a corpus is, and under which terms it may be used."""
+    from motionmind.credits.licences import find_licence
+
     size = f"{entry.archive.size / 10**6:,.1f} MB"
     click.echo(f"{displayed(entry.title, _LINE)} ({entry.clips} clips, {entry.postures} postures, {size})")
-    for label, text in (("performed by", ", ".join(entry.performers)), ("source", entry.source)):
-        click.echo(f"{label:12} {displayed(text, _LINE)}")
-    click.echo(f"{'licence':12} {displayed(entry.licence, _LINE)}")
-    if entry.citation:
-        click.echo(f"{'cite':12} {displayed(entry.citation, _LINE)}")
+    rows = [
+        ("performed by", ", ".join(entry.performers)),
+        ("source", entry.source),
+        ("licence", f"{entry.licence}: {find_licence(entry.licence).terms}"),
+        *(("part of it", f"{one.name}, {one.source}, {one.licence or 'no licence'}") for one in entry.origins),
+        ("cite", entry.citation),
+    ]
+    for label, text in rows:
+        if text:
+            click.echo(f"{label:12} {displayed(text, _LINE)}")
 
 
 def _print_recipe(recipe: Recipe) -> None:
@@ -148,7 +155,6 @@ def print_index(place: str | None, *, as_json: bool) -> None:
 @option(
     "--licence-url", section=Section.ABOUT, metavar="ADDRESS", help="State the address by which the licence is known."
 )
-@option("--citation", section=Section.ABOUT, default="", show_default=False, help="State how to cite the corpus.")
 @HOME
 def publish(
     folder: str,

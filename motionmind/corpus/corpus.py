@@ -155,6 +155,7 @@ class Corpus:
         faults: joint flips in the corpus's own recordings.
         skip: frames that were dropped at each recording's start, such as an added T-pose.
         origins: the corpora that its other clips were taken from.
+        citation: how to cite it; "" if nobody asks for that.
     """
 
     name: str
@@ -173,6 +174,7 @@ class Corpus:
     faults: tuple[JointFlip, ...] = ()
     skip: int = 0
     origins: tuple[Origin, ...] = ()
+    citation: str = ""
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:
@@ -274,7 +276,7 @@ class Corpus:
     @cached_property
     def own_origin(self) -> Origin:
         """Where its own clips come from."""
-        return Origin(self.name, self.title, self.author, self.source, self.licence)
+        return Origin(self.name, self.title, self.author, self.source, self.licence, self.citation)
 
     @cached_property
     def clip_origins(self) -> dict[str, Origin]:

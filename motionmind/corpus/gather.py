@@ -62,6 +62,7 @@ class Gathering(TypedDict, total=False):
     author: str
     source: str
     licence: str
+    citation: str
     performer: str | Mapping[str, str]
 
 
@@ -82,6 +83,7 @@ def gather(
     author: str = "",
     source: str = "",
     licence: str = "",
+    citation: str = "",
     performer: str | Mapping[str, str] = "",
 ) -> Corpus:
     """Gather `motions`, and the corpora to `mix` with them, into a corpus; all are on the same joints.
@@ -109,6 +111,7 @@ def gather(
         author: who made it.
         source: where it comes from.
         licence: the licence for its use.
+        citation: how to cite it.
         performer: who performs the recordings: one for all, or each by the recording's name. Where it is not known, the
             author is credited.
 
@@ -129,7 +132,8 @@ def gather(
     check_text("facing", facing)
     check_flag("mirror", mirror)
     check_mapping("about", about, or_none=True)
-    for key, value in (("title", title), ("author", author), ("source", source), ("licence", licence)):
+    texts = {"title": title, "author": author, "source": source, "licence": licence, "citation": citation}
+    for key, value in texts.items():
         check_text(key, value)
     if not isinstance(performer, str):
         check_mapping("performer", performer)
@@ -177,6 +181,7 @@ def gather(
         own.faults,
         skip,
         gather_origins(other for other, _ in mix),
+        citation,
     )
     if mix:
         warn_of_licences(corpus)

@@ -35,6 +35,7 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
     facing: Facing
     rate: float | None
     skip: int = 0
+    citation: str = ""
 
 
 class SourceManifest(Provenance, frozen=True, kw_only=True):

@@ -20,6 +20,7 @@ class Origin:
     author: str = ""
     source: str = ""
     licence: str = ""
+    citation: str = ""
 
 
 @dataclass(frozen=True)

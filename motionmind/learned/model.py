@@ -49,8 +49,8 @@ class LearnedCorpus(Learned):
             mix: other corpora to learn from as well, by name or folder, each with the weight of its postures and moves,
                 those of `clips` having weight 1.
             home: where corpora that `mix` names are.
-            options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source and licence:
-                see `motionmind.corpus.gather.gather`.
+            options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source, licence,
+                citation: see `motionmind.corpus.gather.gather`.
 
         Raises:
             CorpusError: there is nothing to learn from, clips are on different joints, there are more states than can

@@ -42,7 +42,7 @@ from motionmind.retarget.retarget import own_skeleton
 
 _Part = TypeVar("_Part", Transitions, Bridges, Coordination, Carriage, Pace, Plausibility)
 
-_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip")
+_CORPUS_KEYS = ("name", "title", "author", "source", "licence", "facing", "rate", "skip", "citation")
 _PARTS = {
     "transitions": Transitions,
     "bridges": Bridges,
@@ -106,7 +106,7 @@ def _manifest(learned: Learned) -> dict[str, Any]:
     """Return a built corpus's entries in its manifest."""
     corpus, space, skeleton = learned.corpus, learned.space, learned.corpus.skeleton
     manifest: dict[str, Any] = {
-        **{key: getattr(corpus, key) for key in _CORPUS_KEYS},
+        **{key: getattr(corpus, key) for key in _CORPUS_KEYS if key != "citation" or corpus.citation},
         "skeleton": {
             "name": skeleton.name,
             "names": skeleton.names,

@@ -106,6 +106,7 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
         author: its author.
         source: where it comes from.
         licence: the licence of its use.
+        citation: how to cite it; "" if nobody asks for that.
         clips: its clips.
         origins: the corpora that it was made of.
         postures: number of postures.
@@ -124,6 +125,7 @@ class CorpusSummary(msgspec.Struct, frozen=True, kw_only=True):
     author: str
     source: str
     licence: str
+    citation: str
     clips: list[ClipSummary]
     origins: list[OriginSummary]
     postures: int
@@ -214,6 +216,7 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         "author": corpus.author,
         "source": corpus.source,
         "licence": corpus.licence,
+        "citation": corpus.citation,
         "clips": [
             ClipSummary(clip.label, len(clip), clip.about, corpus.credit_of(clip).performer) for clip in corpus.clips
         ],

@@ -22,7 +22,7 @@ from motionmind.registry.download import Progress, check_address, download, file
 from motionmind.registry.index import Entry, Recipe, Source, find, is_address, open_index
 
 _ARCHIVE = "archive.tar"
-_TOLD = ("title", "author", "source", "licence")  # by the index and the corpus, which must agree
+_TOLD = ("title", "author", "source", "licence", "citation", "origins")  # by the index and the corpus, which must agree
 
 
 def archives() -> Path:
@@ -118,6 +118,8 @@ def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | 
         download(where, kept, wanted.size, wanted.sha256, on_progress)
     elif not is_address(where) and file_hash(kept) != wanted.sha256:
         raise CorpusError(f"{kept}: is not the file that the index names: its SHA-256 is not {wanted.sha256}")
+    if on_progress:
+        on_progress(wanted.size)
     return kept
 
 

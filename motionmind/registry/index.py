@@ -10,6 +10,7 @@ from urllib.parse import urljoin
 
 import msgspec
 
+from motionmind.credits.credit import Origin
 from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import read_bytes
 
@@ -52,7 +53,8 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
         source: where the movement comes from.
         licence: the name of the licence for its use.
         licence_text: the licence itself.
-        citation: how to cite it; "" if nothing is asked for.
+        citation: how to cite it; "" if nobody asks for that.
+        origins: the corpora that parts of it were taken from, with their licences.
         corpus_version: the version of the form in which it is stored.
         clips, postures: how many there are.
         archive: the archive to fetch.
@@ -72,6 +74,7 @@ class Entry(msgspec.Struct, frozen=True, kw_only=True):
     postures: Annotated[int, msgspec.Meta(ge=1)]
     archive: Archive
     files: Annotated[tuple[File, ...], msgspec.Meta(min_length=1, max_length=256)]
+    origins: Annotated[tuple[Origin, ...], msgspec.Meta(max_length=1000)] = ()
 
     def __post_init__(self) -> None:
         """Check that files are listed once, and take no more than the archive."""

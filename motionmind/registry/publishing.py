@@ -14,6 +14,7 @@ import msgspec
 from motionmind.arguments import check_text
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.origins import warn_of_licences
 from motionmind.corpus.versions import locked
 from motionmind.errors import CorpusError
 from motionmind.files import all_or_none, make_folder, sync_folder, write_atomically
@@ -43,7 +44,6 @@ def publish(
     date: str,
     licence_text: str,
     licence_url: str | None = None,
-    citation: str = "",
     home: str | os.PathLike[str] | None = None,
 ) -> Published:
     """Write a corpus's archive, its Croissant metadata, and its entry in the index of a folder.
@@ -57,8 +57,10 @@ def publish(
         date: the day of publication, as "2026-11-23".
         licence_text: the licence itself.
         licence_url: its address, for those who know it by that.
-        citation: how to cite the corpus.
         home: the user's home (`motionmind.corpus.store.home`).
+
+    Warns:
+        MotionMindWarning: the licences of its parts stand against passing it on.
 
     Raises:
         CorpusError: there is no such corpus, it does not say whose it is or under which licence, or the folder cannot
@@ -72,6 +74,7 @@ def publish(
         raise CorpusError("the licence's text is empty; give the licence itself")
     learned, target = load(name, home), Path(folder)
     _check_origin(learned.corpus)
+    warn_of_licences(learned.corpus)
     staged = target / _STAGED
     try:
         make_folder(target)
@@ -82,7 +85,7 @@ def publish(
             try:
                 save_movement(learned, staged / "corpus")
                 (staged / "corpus" / "LICENCE.txt").write_text(licence_text, "utf-8", newline="\n")
-                entry = _pack(learned.corpus, staged, licence_text, citation)
+                entry = _pack(learned.corpus, staged, licence_text)
                 written = _write(entry, target, staged, describe(entry, url, date, licence_url))
             finally:
                 shutil.rmtree(staged, ignore_errors=True)
@@ -108,7 +111,7 @@ def _check_origin(corpus: Corpus) -> None:
         raise CorpusError(f"corpus {corpus.name!r} states no {', '.join(missing)}; build it again with {options}")
 
 
-def _pack(corpus: Corpus, staged: Path, licence_text: str, citation: str) -> Entry:
+def _pack(corpus: Corpus, staged: Path, licence_text: str) -> Entry:
     """Pack the staged corpus, and return its entry."""
     root = staged / "corpus"
     paths = {path.relative_to(root).as_posix(): path for path in sorted(root.rglob("*")) if path.is_file()}
@@ -119,16 +122,17 @@ def _pack(corpus: Corpus, staged: Path, licence_text: str, citation: str) -> Ent
         name=corpus.name,
         title=corpus.title,
         author=corpus.author,
-        performers=(corpus.author,),
+        performers=tuple(sorted({corpus.credit_of(clip).performer for clip in corpus.clips} - {""})),
         source=corpus.source,
         licence=corpus.licence,
         licence_text=licence_text,
-        citation=citation,
+        citation=corpus.citation,
         corpus_version=store.VERSIONS[store.BUILT][-1],
         clips=len(corpus.clips),
         postures=len(corpus),
         archive=Archive(url=f"{corpus.name}-{sha256[:12]}.tar", size=archive.stat().st_size, sha256=sha256),
         files=tuple(File(name=name, size=path.stat().st_size, sha256=file_hash(path)) for name, path in paths.items()),
+        origins=corpus.origins,
     )
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import re
 import shutil
+import signal
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +17,7 @@ import numpy as np
 import pytest
 from command_line import Run
 from file_server import Files, serving_files
+from saved_corpora import kill_before
 
 from motionmind.corpus import store
 from motionmind.corpus.versions import locked
@@ -40,7 +45,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def published(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("public")
-    publish("insect", folder, home=built, citation="Cite us.", **ABOUT)
+    publish("insect", folder, home=built, **ABOUT)
     return folder
 
 
@@ -358,3 +363,59 @@ def test_no_network_is_an_error_in_a_line(run: Run) -> None:
 def test_an_index_that_is_not_there_is_named(run: Run) -> None:
     result = run("corpus", "list", "--remote", "--index", "none.json")
     assert (result.code, result.err) == (2, "error: none.json: cannot be read: there is no such file or folder\n")
+
+
+# --- kills ----------------------------------------------------------------------------------------------------------
+
+EVERY = 13  # of the changes of the disk, one is the last of a process
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_a_kill_before_a_change_of_the_disk_leaves_no_corpus_or_the_whole(published: Path, tmp_path: Path) -> None:
+    index, home = str(published / "index.json"), tmp_path / "home"
+    fetched("insect", tmp_path / "other", index)
+    whole = store.load(tmp_path / "other" / "corpora" / "insect")
+    for change in range(1, 10_000, EVERY):
+        if (child := os.fork()) == 0:
+            with suppress(BaseException):
+                kill_before(change)
+                fetched("insect", home, index)
+            os._exit(0)
+        _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status):  # there are no more changes
+            break
+        assert "insect" not in store.list_corpora(home) or store.load(home / "corpora" / "insect").arrays.keys() == (
+            whole.arrays.keys()
+        )
+    assert change > 5 * EVERY
+    assert store.load(home / "corpora" / "insect").manifest["arrays"] == whole.manifest["arrays"]
+    assert Engine.load("insect", home).corpus.name == "insect"
+    fetched("insect", home, index, name="second")  # which clears away what is left of the first
+    assert names(tmp_path / "archives") == []
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+@pytest.mark.parametrize("most", [1_000, 60_000, 300_000])
+def test_a_full_disk_is_an_error_and_leaves_no_corpus(most: int, files: Files, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    index = f"{files.address}/index.json"
+    reading, writing = os.pipe()
+    if (child := os.fork()) == 0:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))  # no file may become longer
+        try:
+            fetched("insect", tmp_path, index)
+        except CorpusError as error:
+            os.write(writing, str(error).encode())
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        message = pipe.read().decode()
+    assert re.search("bytes have come: File too large|cannot be unpacked: |cannot be written: ", message)
+    assert "\n" not in message
+    assert "insect" not in store.list_corpora(tmp_path)
+    assert not [name for name in names(tmp_path / "archives") if "unpacked" in name]
+    fetched("insect", tmp_path, index)
+    assert Engine.load("insect", tmp_path).corpus.name == "insect"

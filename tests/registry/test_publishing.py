@@ -7,17 +7,22 @@ import json
 import os
 import re
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin
 
 import pytest
+from bundled_clips import ballet_clip
 
 from motionmind.corpus import store
 from motionmind.corpus.versions import locked
-from motionmind.errors import CorpusError, FormatError
+from motionmind.credits.credit import Origin
+from motionmind.errors import CorpusError, FormatError, MotionMindWarning
+from motionmind.registry.fetching import fetch, look_up
 from motionmind.registry.index import parse_index
 from motionmind.registry.publishing import publish
+from motionmind.tween.engine import Engine
 
 ABOUT = {"url": "https://example.org/dances", "date": "2026-11-23", "licence_text": "Do what you like."}
 INSECT = "walk-hexapod"
@@ -26,7 +31,7 @@ INSECT = "walk-hexapod"
 @pytest.fixture(scope="module")
 def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("public")
-    publish(INSECT, folder, citation="Cite us.", **ABOUT)
+    publish(INSECT, folder, **ABOUT)
     return folder
 
 
@@ -37,7 +42,7 @@ def content(folder: Path) -> dict[str, bytes]:
 def test_the_same_corpus_gives_the_same_bytes(published: Path, tmp_path: Path) -> None:
     mask = os.umask(0o077)
     try:
-        publish(INSECT, tmp_path / "a" / "b", citation="Cite us.", **ABOUT)
+        publish(INSECT, tmp_path / "a" / "b", **ABOUT)
     finally:
         os.umask(mask)
     assert content(tmp_path / "a" / "b") == content(published)
@@ -87,14 +92,45 @@ def test_what_cannot_be_published_leaves_nothing(change: dict[str, Any], message
 
 
 def test_a_corpus_that_does_not_say_whose_it_is_is_not_published(tmp_path: Path) -> None:
-    from motionmind.tween.engine import Engine
-
     Engine.load(INSECT).save(tmp_path / "mine")
     manifest = tmp_path / "mine" / store.MANIFEST
     manifest.write_text(json.dumps(json.loads(manifest.read_text("utf-8")) | {"licence": "", "author": ""}), "utf-8")
     with pytest.raises(CorpusError, match="states no author, licence; build it again with --author --licence"):
         publish(str(tmp_path / "mine"), tmp_path / "public", **ABOUT)
     assert not (tmp_path / "public").exists()
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a corpus of two performers, with a part under a licence that forbids changes."""
+    folder = tmp_path_factory.mktemp("mixed")
+    clips = [replace(ballet_clip("plies"), name=name) for name in ("one", "two")]
+    other = Engine.fit(clips[:1], name="other", source="there", licence="CC BY-ND 4.0", citation="Cite them.")
+    other.save(folder / "corpora" / "other")
+    by = {"one": "Ada", "two": "Bea"}
+    about = {"title": "Plies", "author": "Us", "source": "here", "licence": "CC0", "citation": "Cite us."}
+    with pytest.warns(MotionMindWarning, match="other forbids derivatives"):
+        engine = Engine.fit(clips, name="mixed", mix={"other": 1.0}, home=folder, performer=by, **about)
+    engine.save(folder / "corpora" / "mixed")
+    return folder
+
+
+def test_performers_citation_and_parts_go_with_a_corpus(mixed: Path, tmp_path: Path) -> None:
+    with pytest.warns(MotionMindWarning, match="other forbids derivatives"):
+        entry = publish("mixed", tmp_path / "public", home=mixed, **ABOUT).entry
+    assert entry.performers == ("Ada", "Bea")
+    assert entry.citation == "Cite us."
+    assert entry.origins == (Origin("other", source="there", licence="CC BY-ND 4.0", citation="Cite them."),)
+    described = json.loads((tmp_path / "public" / "mixed.croissant.json").read_text("utf-8"))
+    assert described["citeAs"] == "Cite us."
+    assert [one["name"] for one in described["creator"]] == ["Us", "Ada", "Bea"]
+    found, source = look_up("mixed", str(tmp_path / "public" / "index.json"))
+    assert found == entry
+    fetch(entry, source, home=tmp_path)
+    fetched = Engine.load("mixed", tmp_path).corpus
+    assert fetched.origins == entry.origins
+    assert fetched.citation == "Cite us."
+    assert {clip.performer for clip in fetched.clips} == {"Ada", "Bea", ""}
 
 
 def test_an_index_that_cannot_be_read_is_not_replaced(tmp_path: Path) -> None:
@@ -123,7 +159,6 @@ def test_metadata_holds_what_croissant_requires(published: Path) -> None:
     assert described["conformsTo"] == "http://mlcommons.org/croissant/1.0"
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", described["datePublished"])
     assert re.fullmatch(r"\d+\.\d+\.\d+", described["version"])
-    assert described["citeAs"] == "Cite us."
     assert all(one["@type"] in ("sc:Person", "sc:Organization") and one["name"] for one in described["creator"])
 
 

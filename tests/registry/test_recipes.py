@@ -10,6 +10,7 @@ import pytest
 
 from motionmind.cli import app
 from motionmind.corpus.store import place_for
+from motionmind.credits.licences import UNKNOWN, find_licence
 from motionmind.registry.index import Recipe, open_index
 
 RECIPES = open_index(None).index.recipes
@@ -43,3 +44,12 @@ def test_the_commands_of_a_recipe_are_commands_of_this_version(recipe: Recipe) -
         assert left == []
         assert all(values[key] for key in ("title", "author", "source", "licence"))
         assert values["source"] == recipe.source
+        assert values["citation"] == recipe.citation.replace('"', "'")
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_the_licence_of_a_recipe_is_one_whose_terms_are_known(recipe: Recipe) -> None:
+    known = find_licence(recipe.licence)
+    assert known.allows_derivatives == (recipe.name != "lafan1")
+    assert known.is_open == (recipe.name not in ("amass", "motorica"))
+    assert (known is UNKNOWN) == (recipe.name == "cmu")  # terms of its own, which no licence has

@@ -44,6 +44,9 @@ from motionmind.formats.papers import read_papers
 from motionmind.geometry import rotations as rot
 from motionmind.notation import compose as notation
 from motionmind.notation.read import read_score
+from motionmind.registry.archive import unpack
+from motionmind.registry.index import open_index
+from motionmind.registry.publishing import publish
 from motionmind.retarget.joint_mapping import read_joint_mapping
 from motionmind.tween.narrative import explain
 from motionmind.tween.report import encode_report, read_report
@@ -220,6 +223,17 @@ def _built_corpus(path: Path) -> None:
     Engine.load(str(path.parent if path.suffix == ".json" else path.parents[1])).info()
 
 
+def _index(path: Path) -> None:
+    open_index(str(path))
+
+
+def _archive(path: Path) -> None:
+    """Unpack an archive, of which the index beside it is true."""
+    (entry,) = open_index(str(path.with_name("index.json"))).index.corpora
+    with tempfile.TemporaryDirectory() as folder:
+        unpack(path, entry.files, Path(folder) / "unpacked")
+
+
 def _moving(frames: int) -> Motion:
     """A body that turns and travels."""
     body = human23()
@@ -272,6 +286,9 @@ def readers(folder: Path) -> list[Reader]:
     manifest = (folder / "built" / "manifest.json").read_bytes()
     arrays = [name for name in built if "." not in Path(name).stem or "targets" in name]
     insect = ROOT / "corpora" / "walk-hexapod"
+    archive, _, index = publish(
+        "walk-hexapod", folder / "public", url="https://example.org/", date="2026-11-23", licence_text="CC0"
+    ).files
     return [
         Reader("BVH", "a.bvh", [seeds["small.bvh"], made["bvh"]], _movement),
         Reader("JSON movement", "a.json", [made["json"], (folder / "posture.json").read_bytes()], _movement),
@@ -320,6 +337,8 @@ def readers(folder: Path) -> list[Reader]:
             Reader(f"array {Path(name).stem}", name, [built[name]], _built_corpus, {**built, "manifest.json": manifest})
             for name in sorted(arrays)[:4]
         ),
+        Reader("index of corpora", "index.json", [index.read_bytes()], _index),
+        Reader("archive of a corpus", "a.tar", [archive.read_bytes()], _archive, {"index.json": index.read_bytes()}),
     ]
 
 
