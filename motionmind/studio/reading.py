@@ -8,19 +8,20 @@ answer.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
-from unicodedata import normalize
 
 import msgspec
 import numpy as np
 
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError
+from motionmind.studio.score_files import take_together
 
 if TYPE_CHECKING:
     from motionmind.body.motion import Motion
@@ -50,6 +51,7 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         unit: its unit of length; None guesses it.
         fps: its frames a second; None takes what it states.
         asf: name of the file with an AMC's skeleton.
+        scores: files of other scores that were brought, by their names where they came from.
     """
 
     file: str
@@ -57,6 +59,7 @@ class Order(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: str | None = None
     fps: float | None = None
     asf: str | None = None
+    scores: dict[str, str] = {}
 
 
 class Fault(msgspec.Struct, frozen=True):
@@ -232,24 +235,18 @@ def _read(order: Order) -> list[Motion]:
         from motionmind.notation.compose import motions
         from motionmind.notation.read import read_score
 
-        _check_alone(path)
-        found = motions(read_score(path))
+        taken = take_together(order.file, displayed(order.name), order.scores)
+        try:
+            found = motions(read_score(next(iter(taken))))
+        except MotionMindError as error:
+            message = re.sub("|".join(map(re.escape, taken)), lambda match: taken[match[0]], str(error))
+            raise MotionMindError(message) from error
         if not found:
             raise FormatError("holds no clip: a clip is what moves", path=path)
         if len(found) > _MOST_CLIPS:
             raise FormatError(f"holds {len(found)} clips; {_MOST_CLIPS} are the most", path=path)
         return [replace(one, name=displayed(one.name)) for one in found]
     return [replace(read_motion(path, unit=order.unit, asf=order.asf, fps=order.fps), name=stem)]
-
-
-def _check_alone(path: Path) -> None:
-    """Raise a FormatError if a score takes in other files: a stranger's is not to name files of this machine."""
-    from motionmind.formats.text import read_lines
-
-    for number, line in enumerate(read_lines(path), start=1):
-        word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").strip().partition(" ")
-        if word == "include" or (word == "body" and rest.strip().endswith(".toml")):
-            raise FormatError("takes in another file: bring a score that stands alone", path=path, line=number)
 
 
 def _understand(order: Order, motions: list[Motion]) -> Facts:

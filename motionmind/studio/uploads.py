@@ -164,7 +164,9 @@ class Uploads:
         if own.kind == "amc" and asf is None:
             answer = Answer(error=f"{own.name}: bring the .asf that belongs to it, too: an .amc holds no body")
         else:
-            order = Order(f"upload.{own.kind}", own.name, choices.unit, choices.fps, asf)
+            scores = {one.name: str(self._place(one.id) / "upload.score") for one in self.list() if one.kind == "score"}
+            others = scores if own.kind == "score" else {}
+            order = Order(f"upload.{own.kind}", own.name, choices.unit, choices.fps, asf, others)
             async with self._reading:
                 answer = await _read(folder, order)
         facts = answer.facts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,18 +20,19 @@ from motionmind.corpus.gather import RECORDED_RATE
 from motionmind.errors import MotionMindError
 from motionmind.render.page import base64_of
 from motionmind.studio import api
+from motionmind.studio.attractor_map import drawn, map_of
 from motionmind.studio.edits import Block
 from motionmind.studio.piece import State
 from motionmind.studio.varying import (
     EVERY,
     Clock,
     Clocks,
+    Estimates,
     Kept,
     Proposal,
+    Unit,
     Wanted,
-    drawn,
     kept_in,
-    map_of,
     units_of,
     vary_blocks,
 )
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from motionmind.studio.studio import Studio
 
 _WORDS = "vary the piece"
+_MOST_ESTIMATED = 800  # units between each two of which insertions are estimated, in a second and a half
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -50,12 +53,13 @@ class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     nudge: float | None = None
     start: tuple[float, float, float] | None = None
     stretch: Annotated[int, msgspec.Meta(ge=1, le=100)] = 1
+    inserted: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
     kept: Annotated[tuple[Kept, ...], msgspec.Meta(max_length=1_000)] = ()
     stay: Annotated[tuple[str, ...], msgspec.Meta(max_length=1_000)] = ()
 
     def wanted(self, kept: tuple[Kept, ...]) -> Wanted:
         """Return the wish with all that is kept."""
-        return Wanted(self.flow, self.depart, self.nudge, self.start, self.stretch, kept)
+        return Wanted(self.flow, self.depart, self.nudge, self.start, self.stretch, self.inserted, kept)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:
@@ -102,8 +106,39 @@ async def propose(studio: Studio, wish: Wish) -> dict[str, Any]:
         present=state.blocks,
         total=total,
         used=state.used,
+        insertions=None if wish.inserted is None else lambda units: _estimates(studio, units, clocks.__getitem__),
     )
     return _shown(studio, state, base, found, locked, wish)
+
+
+def _estimates(studio: Studio, units: Sequence[Unit], clocks: Clocks) -> Estimates:
+    """Estimate what seams between units insert."""
+    from motionmind.variation.insertion_times import estimate_insertions
+    from motionmind.variation.piece import Piece
+    from motionmind.variation.seams import TransitionTest
+
+    if len(units) > _MOST_ESTIMATED:
+        raise MotionMindError(
+            f"insertions are limited in pieces of up to {_MOST_ESTIMATED} postures, not of {len(units):,}: vary a part"
+        )
+    test = TransitionTest(studio.engine(studio.project.state.corpus))
+    keys = ["~" * unit.mirrored + unit.source for unit in units]
+    motions = [studio.project.movements.get(key) for key in keys]
+    for motion in motions:
+        test.check_skeleton(motion.posture(0))
+    firsts = [unit.first for unit in units]
+    times = [clocks(unit.source).times for unit in units]
+    durations = np.array(
+        [own[min(unit.last + 1, len(own) - 1)] - own[unit.first] for own, unit in zip(times, units, strict=True)]
+    )
+    durations = np.maximum(durations, 1e-3)  # the last frame of a movement leads nowhere
+    postures = Motion(
+        motions[0].skeleton,
+        np.stack([motion.rotations[first] for motion, first in zip(motions, firsts, strict=True)]),
+        np.stack([motion.root[first] for motion, first in zip(motions, firsts, strict=True)]),
+        np.append(0.0, np.cumsum(durations[:-1])),
+    )
+    return Estimates(estimate_insertions(Piece(postures, np.arange(len(units))), test), durations)
 
 
 def _shown(

@@ -12,28 +12,25 @@ import hashlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats, Ints, Singles
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import Itinerary, reorder
 from motionmind.chaos.trajectories import trajectory
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.studio.edits import Block
 from motionmind.variation.departure import departure, find_nudge
-from motionmind.variation.limits import check_departure, check_limits
+from motionmind.variation.limits import Limits, check_departure, check_limits, keep_within
 from motionmind.variation.stretches import cheapest_order
 from motionmind.variation.variation import SKIP
 
 MOST = 4_000  # units of a piece: stretches of more than one unit hold the square of them in memory
 EVERY = SKIP + 1  # steps of a trajectory from one place to the next
 _COARSELY = 5  # each of so many nudges is tried where stretches are long
-_SHEETS = 12_000  # points that show an attractor
-_MOST_DRAWN = 6_000  # points of a trajectory that a map is sent
-_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not in their own order
 
 
 class Clock(NamedTuple):
@@ -72,6 +69,7 @@ class Wanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         nudge: the offset of the variation's trajectory, in place of `depart`, in the flow's first coordinate.
         start: where the piece's trajectory begins, on the attractor [3]; None for the flow's own start.
         stretch: units that each stretch has at least, but for those beside kept ones.
+        inserted: the greatest share of the time that insertions are to take, as they are estimated; None for no limit.
         kept: the stretches that stay, in their order.
     """
 
@@ -80,6 +78,7 @@ class Wanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     nudge: float | None = None
     start: tuple[float, float, float] | None = None
     stretch: Annotated[int, msgspec.Meta(ge=1, le=100)] = 1
+    inserted: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
     kept: Annotated[tuple[Kept, ...], msgspec.Meta(max_length=1_000)] = ()
 
 
@@ -99,6 +98,21 @@ class Unit(NamedTuple):
     mirrored: bool
     first: int
     last: int
+
+
+class Estimates(NamedTuple):
+    """Estimates of what seams between N units insert.
+
+    Attributes:
+        seconds: of the insertion from each unit to each [N, N].
+        durations: seconds from each unit to the next one [N].
+    """
+
+    seconds: Singles
+    durations: Floats
+
+
+Insertions = Callable[[Sequence[Unit]], Estimates]
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +195,7 @@ def vary_blocks(
     present: Sequence[Block] | None = None,
     total: int | None = None,
     used: Collection[str] = (),
+    insertions: Insertions | None = None,
 ) -> Proposal:
     """Vary a piece.
 
@@ -191,6 +206,7 @@ def vary_blocks(
         present: the piece as it stands, whose stretches keep their ids; None if it is `blocks`.
         total: units that the variation has; None for as many as `present`.
         used: ids that no other stretch may take.
+        insertions: estimates insertions; for a wish that limits them.
 
     Raises:
         MotionMindError: there is nothing to vary, or the wish cannot be met.
@@ -214,7 +230,7 @@ def vary_blocks(
         raise MotionMindError(
             f"a piece of {max(len(free), total):,} postures is too long to vary: {MOST:,} are the most"
         )
-    order = find_order(wanted, len(free), len(places))
+    order = find_order(wanted, len(free), len(places), insertions(free) if insertions else None)
     naming = _Naming(present, used, [one.block for one in wanted.kept])
     found = [(place, naming.block(run)) for place, run in _runs(order.indices, places, free)]
     found = sorted([*found, *((one.place, one.block) for one in wanted.kept)], key=lambda entry: entry[0])
@@ -222,21 +238,24 @@ def vary_blocks(
     return Proposal(tuple(block for _, block in found), tuple(place for place, _ in found), total, names, order)
 
 
-def find_order(wanted: Wanted, count: int, length: int) -> Order:
-    """Order `count` units at `length` places.
+def find_order(wanted: Wanted, count: int, length: int, insertions: Estimates | None = None) -> Order:
+    """Order `count` units at `length` places; `insertions` are the estimates for a wish that limits them.
 
     Raises:
         MotionMindError: no flow has this name, or the wish cannot be met.
     """
     stretch = min(wanted.stretch, count, length)
-    course = _course(_flow(wanted.flow).name, wanted.start, count, length, stretch)
+    course = _course(flow_of(wanted.flow).name, wanted.start, count, length, stretch)
     nudge = wanted.nudge
     if nudge is None:
         limits = check_limits(None, stretch, count, length) if stretch > 1 else None
         depart = min(wanted.depart, 1.0 / stretch)
         check_departure(depart, limits)
         nudge = find_nudge(course.order, depart, every=1 if stretch == 1 else _COARSELY)
-    return Order(course.order(nudge), nudge, course.piece, course.follow(nudge))
+    order = course.order(nudge)
+    if wanted.inserted is not None and insertions is not None:
+        order = course.within(Limits(wanted.inserted, stretch), nudge, insertions)
+    return Order(order, nudge, course.piece, course.follow(nudge))
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,17 +292,25 @@ class _Course:
             self.found[nudge] = indices
         return self.found[nudge]
 
+    def within(self, limits: Limits, nudge: float, insertions: Estimates) -> Ints:
+        """Return the unit at each place, with as little insertion as limits say [L]."""
+        sites, points = self.piece[::EVERY], self.follow(nudge)[::EVERY]
+        itinerary = Itinerary(sites, points, reorder(sites, points))
+        kept, _ = keep_within(limits, itinerary, insertions.durations, insertions.seconds, None)
+        return np.array(kept.order)
+
 
 @lru_cache(maxsize=8)
 def _course(flow: str, start: tuple[float, float, float] | None, count: int, length: int, stretch: int) -> _Course:
     """Return the course of a wish; a start that a hand set is on the attractor, so nothing is dropped after it."""
-    own = _flow(flow)
+    own = flow_of(flow)
     transient = own.transient if start is None else 0
     piece = trajectory(own, start, count=(count - 1) * EVERY + 1, every=1, transient=transient)
     return _Course(own, piece, length, stretch, {})
 
 
-def _flow(name: str) -> Flow:
+def flow_of(name: str) -> Flow:
+    """Return the flow of a name; MotionMindError if no flow in three dimensions has it."""
     if name not in FLOWS or len(FLOWS[name].start) != 3:
         known = [known for known, flow in FLOWS.items() if len(flow.start) == 3]
         raise MotionMindError(f"no attractor {name!r:.60}{suggestion(name, known)}")
@@ -332,14 +359,18 @@ class _Naming:
 
     def __init__(self, present: Sequence[Block], used: Collection[str], kept: Sequence[Block]) -> None:
         self._taken = {block.id for block in kept}
-        self._present = {_frames(block): block.id for block in present if block.id not in self._taken}
+        self._present: dict[tuple[str, int, int, bool], list[str]] = {}  # of equal stretches, in their order
+        for block in present:
+            if block.id not in self._taken:
+                self._present.setdefault(_frames(block), []).append(block.id)
         self._used = set(used)
 
     def block(self, run: Sequence[Unit]) -> Block:
         """The stretch that a run of units is."""
         unit = run[0]
         bare = Block("", unit.source, unit.first, run[-1].last, unit.mirrored)
-        name = self._present.pop(_frames(bare), None) or self._new(bare)
+        here = self._present.get(_frames(bare))
+        name = here.pop(0) if here else self._new(bare)
         self._taken.add(name)
         return msgspec.structs.replace(bare, id=name)
 
@@ -355,30 +386,3 @@ class _Naming:
 
 def _frames(block: Block) -> tuple[str, int, int, bool]:
     return block.source, block.first, block.last, block.mirrored
-
-
-# --- the map ----------------------------------------------------------------------------------------------------------
-
-
-def axes_of(flow: Flow) -> tuple[int, int, int]:
-    """Return the coordinates to the right, up and towards the viewer on a map of a flow."""
-    return _USUAL.get(flow.name, (0, 1, 2))
-
-
-@lru_cache(maxsize=4)
-def map_of(name: str) -> dict[str, Any]:
-    """Return what a map of an attractor shows, whatever the piece: points all over it [M][3], and its axes.
-
-    Raises:
-        MotionMindError: no flow in three dimensions has this name.
-    """
-    flow = _flow(name)
-    points = trajectory(flow, count=_SHEETS, every=3)
-    return {"flow": name, "axes": axes_of(flow), "points": points.round(4).tolist(), "about": flow.about}
-
-
-def drawn(points: Floats) -> list[list[float]]:
-    """Thin a trajectory out, but for its sites, to what a map is sent [M][3]."""
-    every = EVERY if len(points) > _MOST_DRAWN else 1
-    thinned: list[list[float]] = points[::every].round(4).tolist()
-    return thinned

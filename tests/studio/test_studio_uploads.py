@@ -230,10 +230,41 @@ def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
     assert time.monotonic() - before < 60.0
 
 
-@pytest.mark.parametrize("line", ["include secret.score", "include\t../secret.score as x", "body secret.toml"])
-def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str) -> None:
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("include secret.score", "takes in secret.score: bring that score, too"),
+        ("include\t../secret.score as x", "takes in secret.score: bring that score, too"),
+        ("include\u00a0/etc/secret.score", "takes in secret.score: bring that score, too"),
+        ("include /etc/passwd", "takes in passwd: bring that score, too"),
+        ("body secret.toml", "takes in a body: bring a score of a body that is known"),
+        ("body\u00a0../secret.toml", "takes in a body: bring a score of a body that is known"),
+    ],
+)
+def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str, words: str) -> None:
     found = bring(uploads, "nosy.score", f"{line}\n{SCORE}".encode())
-    assert found.error == "nosy.score:1: takes in another file: bring a score that stands alone"
+    assert found.error == f"nosy.score:1: {words}"
+
+
+def test_scores_take_in_others_that_were_brought(uploads: Uploads) -> None:
+    words, phrases = SCORE.partition("clip")[0], "include words.score\nphrase dip\n  1 | bend\n"
+    top = "include ../steps/phrases.score\nclip two\n  start | stand\n  dip\n  1 | stand\n"
+    first = bring(uploads, "top.score", top.encode())
+    assert first.error == "top.score:1: takes in phrases.score: bring that score, too"
+    bring(uploads, "phrases.score", phrases.encode())
+    assert (
+        asyncio.run(uploads.read(first.id, Choices())).error
+        == "phrases.score:1: takes in words.score: bring that score, too"
+    )
+    bring(uploads, "words.score", words.encode())
+    found = asyncio.run(uploads.read(first.id, Choices()))
+    assert found.error == ""
+    assert found.facts is not None
+    assert [one.name for one in found.facts.clips] == ["two"]
+    wrong = bring(uploads, "wrong.score", b"include words.score\nclip three\n  start | leap\n")
+    assert wrong.error.startswith("wrong.score:3: ")
+    itself = bring(uploads, "itself.score", b"include itself.score\n" + SCORE.encode())
+    assert "includes itself" in itself.error
 
 
 @pytest.mark.parametrize(

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from motionmind.errors import MotionMindError
+from motionmind.studio.attractor_map import drawn, map_of
 from motionmind.studio.edits import Arrange, Block, Insert
 from motionmind.studio.piece import State, apply
 from motionmind.studio.varying import (
     Clock,
+    Estimates,
     Kept,
     Proposal,
+    Unit,
     Wanted,
-    drawn,
     find_order,
     kept_in,
-    map_of,
     units_of,
     vary_blocks,
 )
+from motionmind.variation.limits import inserted_share
 
 PIECE = (Block("b1", "ballet/adagio", 0, 59), Block("b2", "m-0011223344556677", 10, 250, mirrored=True))
 
@@ -142,3 +146,36 @@ def test_a_start_on_the_map_is_where_the_piece_begins() -> None:
 def test_what_cannot_be_varied(wanted: Wanted, words: str) -> None:
     with pytest.raises(MotionMindError, match=words):
         vary(wanted)
+
+
+def test_insertions_are_limited_as_they_are_estimated() -> None:
+    """Between the first half and the second seams insert much: with a limit there are fewer of them."""
+
+    def insertions(units: Sequence[Unit]) -> Estimates:
+        halves = np.arange(len(units)) < len(units) // 2
+        return Estimates(np.where(halves[:, None] == halves, 0.1, 5.0).astype(np.float32), np.full(len(units), 0.2))
+
+    def inserted(proposal: Proposal) -> float:
+        estimates = insertions(units_of(PIECE, clocks))
+        order = proposal.order.indices
+        steps = np.diff(order)
+        seams = np.where((steps != 0) & (steps != 1), estimates.seconds[order[:-1], order[1:]], 0.0)
+        return inserted_share(seams, estimates.durations[order[:-1]])
+
+    free, limited = (
+        vary_blocks(PIECE, Wanted(depart=0.2, stretch=2, inserted=share), clocks, insertions=insertions)
+        for share in (None, 0.2)
+    )
+    assert inserted(free) > 0.3
+    assert 0.0 < inserted(limited) <= 0.2
+    assert limited.order.nudge == free.order.nudge
+
+
+def test_a_variation_that_has_become_the_piece_is_found_again() -> None:
+    """Also where a stretch comes several times: each keeps its id."""
+    wanted = Wanted(depart=0.3)
+    first = vary(wanted)
+    assert len({(b.source, b.first, b.last) for b in first.blocks}) < len(first.blocks)
+    ids = {"b1", "b2", *(block.id for block in first.blocks)}
+    again = vary_blocks(PIECE, wanted, clocks, present=first.blocks, total=first.count, used=ids)
+    assert again.blocks == first.blocks

@@ -76,6 +76,7 @@ export class Imports extends EventTarget {
       this.files = [...this.files, upload];
       this.coming = this.coming.filter((other) => other !== coming);
       if (upload.kind === "asf") await this.#dress(upload.id);
+      if (upload.kind === "score") await this.#complete(upload);
     } catch (error) {
       this.coming = this.coming.map((other) => (other === coming ? { ...coming, error: /** @type {Error} */ (error).message } : other));
     }
@@ -85,6 +86,11 @@ export class Imports extends EventTarget {
   /** Read the files again that lacked a skeleton. @param {string} asf */
   async #dress(asf) {
     for (const file of this.files) if (file.kind === "amc" && !file.facts) await this.choose(file, { asf });
+  }
+
+  /** Read the scores again that another one lacked. @param {Upload} score */
+  async #complete(score) {
+    for (const file of this.files) if (file.error.includes(`takes in ${score.name}:`)) await this.choose(file, {});
   }
 
   /** Read a file again with other answers to what it leaves open. @param {Upload} file @param {Partial<Choices>} change */

@@ -6,10 +6,16 @@ import { useChange } from "../shell/hooks.js";
 import { Composed, Movements } from "../timeline/composed.js";
 import { AttractorMap } from "./map.js";
 import { Tiles } from "./tiles.js";
-import { alike, departure, Varying } from "./varying.js";
+import { alike, departure, insertedShare, Varying } from "./varying.js";
 
 const FARTHEST = 0.4; // share of the steps: no attractor departs farther
 const STRETCHES = [1, 2, 4, 8]; // postures
+const INSERTED = [
+  [0.5, "half of the time"],
+  [0.33, "a third of it"],
+  [0.2, "a fifth of it"],
+  [0.1, "a tenth of it"],
+];
 const FLOWS = [
   ["lorenz", "Lorenz"],
   ["rossler", "Rössler"],
@@ -63,6 +69,13 @@ export function Panel({ studio }) {
         aria-valuetext=${proposal ? departure(proposal.departs) : ""}
         onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
     </label>
+    <label class="row"><span class="grow">Insertions take at most</span>
+      <select data-testid="inserted" value=${wish.inserted ?? ""} title="As the engine expects before it has found them"
+        onChange=${(/** @type {any} */ event) => varying.want({ inserted: Number(event.target.value) || null })}>
+        <option value="">what it takes</option>
+        ${INSERTED.map(([share, words]) => html`<option value=${share}>${words}</option>`)}
+      </select>
+    </label>
     <div class="row">
       <button class="button primary" data-testid="vary" disabled=${!proposal || isPiece} title="Make this order the piece" onClick=${vary}>Vary</button>
       <button class="button" data-testid="another" disabled=${!proposal} title="Begin elsewhere on the attractor" onClick=${() => varying.another()}>Another</button>
@@ -86,7 +99,7 @@ function Order({ studio, varying, shown, isPiece, view }) {
     <div class="row">
       <h3 class="grow" aria-live="polite">${count} stretch${count === 1 ? "" : "es"}, ${shown.seconds.toFixed(0)} s${
         isPiece && waiting ? ` · ${waiting} seam${waiting > 1 ? "s" : ""} to smooth` : ""
-      }${isPiece ? " · this is the piece" : ""}</h3>
+      }${isPiece && !waiting ? ` · ${Math.round(100 * insertedShare(shown))} % inserted` : ""}${isPiece ? " · this is the piece" : ""}</h3>
       ${wish.kept.length + wish.stay.length > 0 &&
       html`<button class="button quiet" data-testid="let-go" onClick=${() => varying.letGo()}>Let all go</button>`}
     </div>

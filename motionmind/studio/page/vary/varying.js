@@ -5,7 +5,7 @@ import { points } from "./chart.js";
 /**
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean}} Block
  * @typedef {{block: Block, place: number}} Kept
- * @typedef {{flow: string, depart: number, nudge: number | null, start: [number, number, number] | null, stretch: number, kept: Kept[], stay: string[]}} Wish
+ * @typedef {{flow: string, depart: number, nudge: number | null, start: [number, number, number] | null, stretch: number, inserted: number | null, kept: Kept[], stay: string[]}} Wish
  * @typedef {object} Proposal
  * @property {{seconds: number, parts: any[], blocks: any[], seams: any[]}} piece the variation, as a project tells its piece
  * @property {any[]} original parts of what it varies
@@ -24,7 +24,7 @@ import { points } from "./chart.js";
 
 /** The wish that a page begins with. @returns {Wish} */
 export function firstWish() {
-  return { flow: "lorenz", depart: 0.2, nudge: null, start: null, stretch: 2, kept: [], stay: [] };
+  return { flow: "lorenz", depart: 0.2, nudge: null, start: null, stretch: 2, inserted: null, kept: [], stay: [] };
 }
 
 /** Fires "change" when the wish or the proposal has changed. */
@@ -139,6 +139,12 @@ export function alike(one, other) {
 export function departure(share) {
   if (share < 0.005) return "as it is";
   return `1 step in ${Math.max(Math.round(1 / share), 1)}`;
+}
+
+/** The share of its time that insertions take. @param {{seconds: number, seams: any[]}} piece */
+export function insertedShare({ seconds, seams }) {
+  const inserted = seams.filter(({ state }) => state === "inserted");
+  return inserted.reduce((sum, seam) => sum + seam.seconds, 0) / Math.max(seconds, 1e-9);
 }
 
 /** The place among all postures at a time, with its fraction. @param {Proposal} proposal @param {number} time */

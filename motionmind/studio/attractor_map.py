@@ -1,0 +1,39 @@
+"""The map of an attractor: points all over it, and trajectories thinned out to what is drawn."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from motionmind._typing import Floats
+from motionmind.chaos.flows import Flow
+from motionmind.chaos.trajectories import trajectory
+from motionmind.studio.varying import EVERY, flow_of
+
+_SHEETS = 12_000  # points that show an attractor
+_MOST_DRAWN = 6_000  # points of a trajectory that a map is sent
+_USUAL = {"lorenz": (0, 2, 1)}  # coordinates to the right, up and towards the viewer, if not in their own order
+
+
+def axes_of(flow: Flow) -> tuple[int, int, int]:
+    """Return the coordinates to the right, up and towards the viewer on a map of a flow."""
+    return _USUAL.get(flow.name, (0, 1, 2))
+
+
+@lru_cache(maxsize=4)
+def map_of(name: str) -> dict[str, Any]:
+    """Return what a map of an attractor shows, whatever the piece: points all over it [M][3], and its axes.
+
+    Raises:
+        MotionMindError: no flow in three dimensions has this name.
+    """
+    flow = flow_of(name)
+    points = trajectory(flow, count=_SHEETS, every=3)
+    return {"flow": name, "axes": axes_of(flow), "points": points.round(4).tolist(), "about": flow.about}
+
+
+def drawn(points: Floats) -> list[list[float]]:
+    """Thin a trajectory out, but for its sites, to what a map is sent [M][3]."""
+    every = EVERY if len(points) > _MOST_DRAWN else 1
+    thinned: list[list[float]] = points[::every].round(4).tolist()
+    return thinned

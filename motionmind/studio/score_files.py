@@ -1,0 +1,65 @@
+"""Scores that take in one another, as somebody brought them: by name among those that were brought, never by a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from unicodedata import normalize
+
+from motionmind.errors import FormatError
+
+_MOST = 100  # scores that one takes in, with theirs
+
+
+def take_together(file: str, name: str, others: Mapping[str, str]) -> dict[str, str]:
+    """Put a score and those that it takes in into this folder, under names of our own.
+
+    Args:
+        file: the score.
+        name: its name where it came from.
+        others: the files of other scores that were brought, by their names there.
+
+    Returns:
+        The names where they came from, by those here; the score itself is the first.
+
+    Raises:
+        FormatError: it takes in what was not brought, or a body of its own; names the file and the line.
+    """
+    here = {name: "score-0.score"}  # by their own names
+    files = {name: file, **{other: path for other, path in others.items() if other != name}}
+    waiting = [name]
+    while waiting:
+        own = waiting.pop(0)
+        text = []
+        for number, line in enumerate(_lines(Path(files[own])), start=1):
+            kept = line
+            word, *rest = _heading(line).split(maxsplit=1) or [""]
+            if word == "include" and rest:
+                wanted, mark, alias = rest[0].partition(" as ")
+                # A path within its owner's folders: what was brought has but a name.
+                included = PurePosixPath(wanted.strip().replace("\\", "/")).name
+                if included not in files:
+                    raise FormatError(f"takes in {included:.60}: bring that score, too", path=Path(own), line=number)
+                if included not in here:
+                    if len(here) == _MOST:
+                        raise FormatError(f"takes in more than {_MOST} scores", path=Path(own), line=number)
+                    here[included] = f"score-{len(here)}.score"
+                    waiting.append(included)
+                kept = f"include {here[included]}{mark}{alias}"
+            elif word == "body" and rest and rest[0].strip().endswith(".toml"):
+                raise FormatError("takes in a body: bring a score of a body that is known", path=Path(own), line=number)
+            text.append(kept)
+        Path(here[own]).write_text("\n".join([*text, ""]), encoding="utf-8")
+    return {place: own for own, place in here.items()}
+
+
+def _lines(path: Path) -> list[str]:
+    from motionmind.formats.text import read_lines
+
+    return list(read_lines(path))
+
+
+def _heading(line: str) -> str:
+    """A line as the reader of scores sees it, if it is a heading; else ""."""
+    text = normalize("NFC", line).replace("\t", " ").partition("#")[0].rstrip()
+    return "" if text[:1].isspace() else text
