@@ -14,64 +14,27 @@ Constants were chosen on random pairs of `cmu-05` and ballet.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from motionmind._typing import Bools, Floats, Ints
+from motionmind._typing import Bools, Floats
 from motionmind.body.anatomy import SIDES
-from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths, radius_at
+from motionmind.body.capsules import ARM, LEG, Capsules, capsules_of, pair_depths
 from motionmind.body.contact import limb_heights, lowest_height
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.segments import nearest_points
 from motionmind.jit import jit
 from motionmind.realise.least_squares import solve_rows
 from motionmind.realise.legs import find_legs, reach
+from motionmind.realise.limb_turns import LEAST, Limbs, Placed, least_turns, planes_between, turn
 
 ROUNDS = 12  # corrections, each of what those before it have left
 TOUCHES = 0.005  # metres that any two limbs may be in each other
-LEAST = 1e-3  # metres that are not corrected
 SPREADS = 0.12  # seconds in which a correction begins and ends
 FIRMLY = 100.0  # weight of a correction where it is needed, that of none being 1
 PLACE = 1000.0  # weight of a standing foot's place, and of that it does not slide
-LEVER = 0.1  # metres: touched so near to its joint, a limb turns half as far as it would have to
-MOST = 0.3  # radians that a limb turns in one correction
 STEADY = 0.08  # metres a second at which a foot stands half as firmly as one at rest
 LIFTS = 0.1  # seconds in which a foot begins and ends to be lifted off the floor
 LOW = 0.04  # metres above the body's lowest point at which it stands half as firmly as one there
-
-
-class _Limbs(NamedTuple):
-    """The limbs of a person that turn about their first joints: left and right leg, left and right arm.
-
-    Attributes:
-        first: the joint that each turns about [4].
-        last: the joint that keeps its orientation, a leg's ankle; an arm has its first joint here [4].
-        owner: the limb that each capsule belongs to, -1 for trunk and head [C].
-        carried: whether it belongs to what keeps its orientation: foot and toes [C].
-    """
-
-    first: Ints
-    last: Ints
-    owner: Ints
-    carried: Bools
-
-
-class _Placed(NamedTuple):
-    """A movement's limbs in the world, the root being in the origin; metres.
-
-    Attributes:
-        ends: of the capsules' axes [N, C, 2, 3].
-        pivots: places of the limbs' first joints [N, 4, 3].
-        anchors: places of their last [N, 4, 3].
-        held: how firmly each limb stands where a given posture has it [N, 4], from 0 to 1.
-    """
-
-    ends: Floats
-    pivots: Floats
-    anchors: Floats
-    held: Floats
 
 
 def keep_limbs_apart(
@@ -118,13 +81,13 @@ def keep_limbs_apart(
     of_legs = np.isin(limbs.owner[pairs], (0, 1)).all(axis=1)
     crossed = np.any(depths[:, of_legs] > allowed[:, of_legs] + LEAST, axis=1)
     firmly, still = _give_way(_held(still, frozen), still, crossed)
-    placed = _Placed(ends, places[:, limbs.first], places[:, limbs.last], firmly)
-    sides = _sides(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
+    placed = Placed(ends, places[:, limbs.first], places[:, limbs.last], firmly)
+    sides = planes_between(depths > allowed, directions, pairs, limbs.owner, placed.pivots)
     free = ~(fixed[limbs.first] | fixed[limbs.last])
     turned = best = np.tile(rot.IDENTITY, (len(rotations), 4, 1))
     least = np.inf
     for number in range(ROUNDS + 1):
-        deep, steps = _steps(placed, limbs, capsules.radii, pairs, allowed, sides)
+        deep, steps = least_turns(placed, limbs, capsules.radii, pairs, allowed, sides)
         needed = (deep > 0.0) & free & ~frozen[:, None]
         # Limbs that are turned out of each other may meet others: the best of all rounds counts, not the last.
         left = float(np.where(needed, deep, 0.0).max(axis=0).sum())
@@ -138,7 +101,7 @@ def keep_limbs_apart(
             axis /= np.maximum(rot.norm(axis), 1e-9)[:, None]
             own = steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
             turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
-        _turn(placed, limbs, turns)
+        turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)
     out = _with_turned(skeleton, rotations, limbs, best, ~frozen)
     if root is None:
@@ -148,7 +111,7 @@ def keep_limbs_apart(
     return _lift_feet(skeleton, out, root, floor, fixed, frozen, fps)
 
 
-def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> _Limbs:
+def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> Limbs:
     """Return the limbs of a person."""
     first = [skeleton.index(f"{side}_{joint}") for joint in ("hip", "shoulder") for side in SIDES]
     ankles = [skeleton.index(f"{side}_ankle") for side in SIDES]
@@ -156,7 +119,7 @@ def _limbs_of(skeleton: Skeleton, capsules: Capsules) -> _Limbs:
     for number, (parts, side) in enumerate((parts, side) for parts in (LEG, ARM) for side in SIDES):
         owner[[capsules.names.index(f"{side}_{part}") for part in parts]] = number
     carried = np.array([name.endswith(("foot", "toes")) for name in capsules.names])
-    return _Limbs(np.array(first), np.array(ankles + first[2:]), owner, carried)
+    return Limbs(np.array(first), np.array(ankles + first[2:]), owner, carried)
 
 
 def _standing(capsules: Capsules, places: Floats, fps: float) -> Floats:
@@ -178,7 +141,7 @@ def _standing(capsules: Capsules, places: Floats, fps: float) -> Floats:
     return np.asarray((1.0 / (1.0 + low**4) / (1.0 + (speed / STEADY) ** 4)).max(axis=2))
 
 
-def _with_turned(skeleton: Skeleton, rotations: Floats, limbs: _Limbs, turned: Floats, changes: Bools) -> Floats:
+def _with_turned(skeleton: Skeleton, rotations: Floats, limbs: Limbs, turned: Floats, changes: Bools) -> Floats:
     """Return local rotations [N, J, 4] with limbs turned in the world by `turned` [N, 4, 4] where a frame `changes`."""
     world, out = skeleton.global_rotations(rotations), rotations.copy()
     for limb, (first, last) in enumerate(zip(limbs.first, limbs.last, strict=True)):
@@ -326,146 +289,3 @@ def _give_way(held: Floats, still: Floats, crossed: Bools) -> tuple[Floats, Floa
             _, leg, frames = min(ways, key=lambda way: way[:2])
             held[frames, leg] = still[frames, leg] = 0.0
     return held, still
-
-
-@jit
-def _sides(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, pivots: Floats) -> Floats:
-    """Return normals of the planes that keep pairs apart, towards the first [N, P, 3]; 0 where no plane is needed.
-
-    Args:
-        inside: whether the pair is too deep in each other [N, P].
-        directions: of the first from the second [N, P, 3].
-        pairs: numbers of capsules [P, 2].
-        owner: the limb that each capsule belongs to, or -1 [C].
-        pivots: of the limbs [N, 4, 3], metres.
-    """
-    sides = np.zeros_like(directions)
-    for p in range(len(pairs)):
-        one, other = owner[pairs[p, 0]], owner[pairs[p, 1]]
-        end = 0
-        for begin in range(len(inside)):
-            if begin < end or not inside[begin, p]:
-                continue
-            end = begin
-            while end < len(inside) and inside[end, p]:
-                end += 1
-            before, after = max(begin - 1, 0), min(end, len(inside) - 1)
-            meet, part = directions[before, p], directions[after, p]
-            opposite = 1.0 - np.sum(meet * part)  # 0 where they meet and part on the same side, 2 on opposite ones
-            for t in range(begin, end):
-                share = (t - before) / max(after - before, 1)
-                side = (1.0 - share) * meet + share * part
-                if other >= 0:
-                    across = pivots[t, one] - pivots[t, other]
-                    side += 2.0 * share * (1.0 - share) * opposite * across / np.sqrt(np.sum(across**2))
-                sides[t, p] = side / max(np.sqrt(np.sum(side**2)), 1e-9)
-    return sides
-
-
-@jit
-def _steps(
-    placed: _Placed, limbs: _Limbs, radii: Floats, pairs: Ints, allowed: Floats, sides: Floats
-) -> tuple[Floats, Floats]:
-    """Return how deep limbs are that have to turn [N, 4], metres, and the least rotation vectors for it [N, 4, 3].
-
-    Of several pairs that a limb is in, the deepest counts. Where a pair has a plane, its ends are to be on either side
-    of it; elsewhere its nearest points are to move apart. Pairs that are apart stay as they are.
-
-    Args:
-        placed: the limbs as they are.
-        limbs: which limbs there are.
-        radii: of the capsules [C, 2], metres.
-        pairs: numbers of capsules [P, 2].
-        allowed: how deep each pair may be in each other [N, P], metres.
-        sides: normals of planes, 0 where there is none [N, P, 3].
-    """
-    count = len(placed.ends)
-    deep, steps = np.zeros((count, 4)), np.zeros((count, 4, 3))
-    points, levers, gives = np.empty((2, 3)), np.empty((2, 3)), np.empty(2, np.bool_)
-    for t in range(count):
-        worst = np.zeros(4)
-        for p in range(len(pairs)):
-            one, other = placed.ends[t, pairs[p, 0]], placed.ends[t, pairs[p, 1]]
-            gap, s, u = nearest_points(one, other)
-            reach = radius_at(radii[pairs[p, 0]], s) + radius_at(radii[pairs[p, 1]], u)
-            depth = reach - gap - allowed[t, p]
-            if depth <= LEAST:
-                continue
-            side = sides[t, p]
-            points[0] = one[0] + s * (one[1] - one[0])
-            points[1] = other[0] + u * (other[1] - other[0])
-            if side[0] != 0.0 or side[1] != 0.0 or side[2] != 0.0:
-                ahead, behind = _along(one, side), _along(other, side)
-                points[0], points[1] = one[ahead.argmin()], other[behind.argmax()]
-                gap = ahead.min() - behind.max()
-            else:
-                side = (points[0] - points[1]) / max(gap, 1e-9)
-            excess = reach - gap - allowed[t, p]
-            size = LEVER**2
-            for k in range(2):
-                limb, against = limbs.owner[pairs[p, k]], limbs.owner[pairs[p, 1 - k]]
-                gives[k] = limb > 1 or (limb >= 0 and against < 2)  # a leg does not give way to an arm
-                if not gives[k]:
-                    continue
-                touched = placed.anchors[t, limb] if limbs.carried[pairs[p, k]] else points[k]
-                lever = np.cross(touched - placed.pivots[t, limb], side) * (1.0 - 2.0 * k)
-                axis = placed.anchors[t, limb] - placed.pivots[t, limb]
-                along = np.sum(lever * axis) / max(np.sum(axis**2), 1e-9) * axis
-                held = placed.held[t, limb]
-                levers[k] = (1.0 - held) * lever + held * along
-                size += np.sum(lever * levers[k])
-            for k in range(2):
-                limb = limbs.owner[pairs[p, k]]
-                if not gives[k]:
-                    continue
-                deep[t, limb] = max(deep[t, limb], depth)
-                if excess > worst[limb]:
-                    worst[limb] = excess
-                    step = levers[k] * excess / size
-                    steps[t, limb] = step * min(1.0, MOST / max(np.sqrt(np.sum(step**2)), 1e-9))
-    return deep, steps
-
-
-@jit
-def _along(ends: Floats, direction: Floats) -> Floats:
-    """Return how far two points [2, 3] lie along a direction [3]: [2]."""
-    out = np.zeros(2)
-    for end in range(2):
-        for k in range(3):
-            out[end] += ends[end, k] * direction[k]
-    return out
-
-
-@jit
-def _turn(placed: _Placed, limbs: _Limbs, turns: Floats) -> None:
-    """Turn limbs about their first joints by rotation vectors [N, 4, 3]; what is carried moves along."""
-    for t in range(len(turns)):
-        for limb in range(4):
-            vector, pivot, anchor = turns[t, limb], placed.pivots[t, limb], placed.anchors[t, limb]
-            angle = np.sqrt(np.sum(vector**2))
-            if angle < 1e-12:
-                continue
-            moved = -anchor
-            _turn_point(anchor, pivot, vector, angle)
-            moved += anchor
-            for capsule in range(len(limbs.owner)):
-                if limbs.owner[capsule] != limb:
-                    continue
-                for end in range(2):
-                    point = placed.ends[t, capsule, end]
-                    if limbs.carried[capsule]:
-                        point += moved
-                    else:
-                        _turn_point(point, pivot, vector, angle)
-
-
-@jit
-def _turn_point(point: Floats, pivot: Floats, vector: Floats, angle: float) -> None:
-    """Turn a point [3] about a pivot [3] by a rotation vector [3] of some length, by Rodrigues' formula, in place."""
-    ax, ay, az = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
-    vx, vy, vz = vector[0], vector[1], vector[2]
-    sine, versine = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
-    bx, by, bz = vy * az - vz * ay, vz * ax - vx * az, vx * ay - vy * ax
-    point[0] = pivot[0] + (ax + sine * bx + versine * (vy * bz - vz * by))
-    point[1] = pivot[1] + (ay + sine * by + versine * (vz * bx - vx * bz))
-    point[2] = pivot[2] + (az + sine * bz + versine * (vx * by - vy * bx))
