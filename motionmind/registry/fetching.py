@@ -19,7 +19,7 @@ from motionmind.learned.learning import Learned
 from motionmind.learned.persistence import load_movement, save
 from motionmind.registry.archive import unpack
 from motionmind.registry.download import Progress, check_address, download, file_hash
-from motionmind.registry.index import Entry, Recipe, Source, find, is_address, open_index
+from motionmind.registry.index import Archive, Entry, Recipe, Source, find, is_address, open_index
 
 _ARCHIVE = "archive.tar"
 _TOLD = ("title", "author", "source", "licence", "citation", "origins")  # by the index and the corpus, which must agree
@@ -113,14 +113,20 @@ def _obtain(entry: Entry, source: Source, folder: Path, on_progress: Progress | 
     where, wanted = source.locate(entry.archive), entry.archive
     if is_address(where):
         check_address(where, source.place if is_address(source.place) else None)
-    kept = folder / _ARCHIVE if is_address(where) else Path(where)
-    if is_address(where) and not (kept.exists() and file_hash(kept) == wanted.sha256):
-        download(where, kept, wanted.size, wanted.sha256, on_progress)
-    elif not is_address(where) and file_hash(kept) != wanted.sha256:
-        raise CorpusError(f"{kept}: is not the file that the index names: its SHA-256 is not {wanted.sha256}")
+        kept = folder / _ARCHIVE
+        if not _is_archive(kept, wanted):
+            download(where, kept, wanted.size, wanted.sha256, on_progress)
+    elif not _is_archive(kept := Path(where), wanted):
+        message = f"there is no such file of {wanted.size:,} bytes with the SHA-256 {wanted.sha256}"
+        raise CorpusError(f"{kept}: is not the archive that the index names: {message}")
     if on_progress:
         on_progress(wanted.size)
     return kept
+
+
+def _is_archive(path: Path, wanted: Archive) -> bool:
+    """Return whether a file is the archive that an index names; a pipe or a device, which may have no end, is not."""
+    return path.is_file() and path.stat().st_size == wanted.size and file_hash(path) == wanted.sha256
 
 
 def _learn(entry: Entry, archive: Path, folder: Path) -> Learned:

@@ -70,6 +70,20 @@ def test_what_has_come_is_kept_and_the_next_process_goes_on_from_it(files: Files
     assert place.whole.read_bytes() == DATA
 
 
+def test_ctrl_c_keeps_what_has_come(files: Files, place: Place) -> None:
+    def press(here: int) -> None:
+        if here > len(DATA) // 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        download(f"{files.address}/file", place.whole, len(DATA), "", press)
+    kept = place.part.stat().st_size
+    assert kept > len(DATA) // 2
+    place.fetch(f"{files.address}/file")
+    assert files.asked[-1] == ("/file", f"bytes={kept}-")
+    assert place.whole.read_bytes() == DATA
+
+
 def test_a_server_that_sends_no_parts_sends_the_whole(files: Files, place: Place) -> None:
     place.part.write_bytes(DATA[:5000])
     files.ranges = False

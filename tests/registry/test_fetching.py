@@ -116,6 +116,26 @@ def test_an_index_on_disk_lies_beside_its_archives(published: Path, tmp_path: Pa
     assert names(tmp_path / "archives") == []
 
 
+@pytest.mark.parametrize("kind", ["none", "cut", "other", "endless", "folder"])
+def test_a_file_on_disk_that_is_not_the_archive_is_named(kind: str, published: Path, tmp_path: Path) -> None:
+    shutil.copytree(published, tmp_path / "copy")
+    (archive,) = (tmp_path / "copy").glob("*.tar")
+    data = archive.read_bytes()
+    archive.unlink()
+    match kind:
+        case "cut":
+            archive.write_bytes(data[:-1])
+        case "other":
+            archive.write_bytes(bytes(len(data)))
+        case "endless":
+            archive.symlink_to("/dev/zero")
+        case "folder":
+            archive.mkdir()
+    with pytest.raises(CorpusError, match=r"\.tar: is not the archive that the index names"):
+        fetched("insect", tmp_path, str(tmp_path / "copy" / "index.json"))
+    assert not (tmp_path / "corpora").exists()
+
+
 def test_what_a_killed_process_left_is_removed(files: Files, tmp_path: Path) -> None:
     entry, _ = look_up(f"{files.address}/index.json")
     assert isinstance(entry, Entry)
