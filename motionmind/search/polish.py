@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
 from motionmind.search.costs import coupling, edge_cost, path_cost
 from motionmind.search.trellis import Trellis, correction
@@ -15,17 +15,43 @@ from motionmind.search.trellis import Trellis, correction
 
 @jit
 def polish(trellis: Trellis, path: Ints) -> float:
-    """Improve a path [n] of positions in place, chain by chain and moment by moment, and return its cost in nats."""
-    cost = path_cost(trellis, path)
+    """Improve a path [n] of positions in place, chain by chain and moment by moment, and return its cost in nats.
+
+    What lies as it did when it was last minimised, between neighbours that do, is not minimised again.
+    """
+    chains, cost = trellis.chains, path_cost(trellis, path)
+    chain_waits, moment_waits = np.ones(chains, np.bool_), np.ones(trellis.moves + 2, np.bool_)
     while True:
-        for chain in range(trellis.chains):
-            minimise_chain(trellis, path, chain)
+        for chain in range(chains):
+            if chain_waits[chain]:
+                before = path[chain::chains].copy()
+                minimise_chain(trellis, path, chain)
+                chain_waits[chain] = False
+                for t in np.flatnonzero(path[chain::chains] != before):
+                    moment_waits[t - 1 : t + 2] = True
+                    _wake_neighbours(trellis, chain, chain_waits)
         for t in range(1, trellis.moves + 1):
-            minimise_moment(trellis, path, t)
+            if moment_waits[t]:
+                before = path[t * chains : (t + 1) * chains].copy()
+                minimise_moment(trellis, path, t)
+                moment_waits[t] = False
+                for chain in np.flatnonzero(path[t * chains : (t + 1) * chains] != before):
+                    moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[chain] = True
+                    _wake_neighbours(trellis, chain, chain_waits)
         better = path_cost(trellis, path)
         if not better < cost - 1e-9:
             return min(better, cost)
         cost = better
+
+
+@jit
+def _wake_neighbours(trellis: Trellis, chain: int, waits: Bools) -> None:
+    """Note that a chain's parent and children wait to be minimised, for it has changed."""
+    if trellis.parents[chain] >= 0:
+        waits[trellis.parents[chain]] = True
+    for child in range(chain + 1, trellis.chains):
+        if trellis.parents[child] == chain:
+            waits[child] = True
 
 
 @jit
