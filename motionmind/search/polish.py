@@ -27,17 +27,17 @@ def polish(trellis: Trellis, path: Ints) -> float:
                 before = path[chain::chains].copy()
                 minimise_chain(trellis, path, chain)
                 chain_waits[chain] = False
-                for t in np.flatnonzero(path[chain::chains] != before):
-                    moment_waits[t - 1 : t + 2] = True
+                for move in np.flatnonzero(path[chain::chains] != before):
+                    moment_waits[move - 1 : move + 2] = True
                     _wake_neighbours(trellis, chain, chain_waits)
         for t in range(1, trellis.moves + 1):
             if moment_waits[t]:
                 before = path[t * chains : (t + 1) * chains].copy()
                 minimise_moment(trellis, path, t)
                 moment_waits[t] = False
-                for chain in np.flatnonzero(path[t * chains : (t + 1) * chains] != before):
-                    moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[chain] = True
-                    _wake_neighbours(trellis, chain, chain_waits)
+                for changed in np.flatnonzero(path[t * chains : (t + 1) * chains] != before):
+                    moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[changed] = True
+                    _wake_neighbours(trellis, int(changed), chain_waits)
         better = path_cost(trellis, path)
         if not better < cost - 1e-9:
             return min(better, cost)
