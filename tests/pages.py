@@ -92,7 +92,7 @@ class Opened:
     def picture(self) -> Int16s:
         """The canvas's pixels [H, W, 3], when the picture is that of now."""
         self.get("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        shot = self.page.locator("#canvas").screenshot(style="#state, #legend { visibility: hidden }")
+        shot = self.page.locator("#canvas").screenshot(style="#state, #legend, #credits { visibility: hidden }")
         return np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
 
     @property

@@ -13,7 +13,9 @@ from motionmind.cli.options import HOME, JSON, command
 from motionmind.cli.sources import parse_movement, read_movement
 
 if TYPE_CHECKING:
+    from motionmind.credits.credit import Credit
     from motionmind.credits.ledger import Ledger
+    from motionmind.names.spelling import Source
 
 
 @command("motionmind credits tween.json")
@@ -45,5 +47,15 @@ def _ledger(source: str, home: Path | None) -> Ledger:
     named = parse_movement(source, home)
     if named.source.kind == "file" and (ledger := read_ledger(Path(named.source.place))) is not None:
         return ledger
+    if named.source.kind == "corpus" and named.source.name and (credit := _of_clip(named.source, home)) is not None:
+        return ledger_of([credit])
     reading = {"unit": None, "asf": None, "source_fps": None}
     return ledger_of(read_movement(named.source, None, home, raw=True, **reading).credits)
+
+
+def _of_clip(source: Source, home: Path | None) -> Credit | None:
+    """Return the credit of a clip of a corpus; None where it has no such clip."""
+    from motionmind.learned import persistence
+
+    corpus = persistence.load(source.place, home).corpus
+    return next((corpus.credit_of(clip) for clip in corpus.clips if clip.label == source.name), None)

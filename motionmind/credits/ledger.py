@@ -99,7 +99,7 @@ def sections_of(ledger: Ledger) -> dict[str, list[str]]:
         "corpora": [f"{_percent(share)}  {_attribution(name, about)}" for name, share in ledger.corpora.items()],
         "clips": [f"{_percent(one.share)}  {_clip(one)}" for one in ledger.clips],
     }
-    return sections | ({"beware": ledger.notes} if ledger.notes else {})
+    return ({"beware": ledger.notes} if ledger.notes else {}) | sections
 
 
 def lines_of(ledger: Ledger) -> Iterator[str]:

@@ -116,8 +116,6 @@ def _objection(strict: Licence, loose: Licence) -> str:
     if not strict.is_share_alike:
         return ""
     wants = f"{strict.name} wants the whole under {strict.name}"
-    if loose.is_share_alike:
-        return f"{wants}, and {loose.name} under {loose.name}"
     if not loose.is_open:
         return f"{wants}, for any use, and {loose.name} allows research alone"
     if strict.allows_commerce and not loose.allows_commerce:

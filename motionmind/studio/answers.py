@@ -336,6 +336,19 @@ class Opened(Posed):
     mirrors: bool = False
 
 
+class CreditSection(_Answer):
+    """Lines of credits under a heading."""
+
+    heading: str
+    lines: list[str]
+
+
+class Credited(_Answer):
+    """Whose movement the piece is made of."""
+
+    sections: list[CreditSection]
+
+
 class Lines(_Answer):
     """Lines of a score."""
 

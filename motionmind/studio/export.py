@@ -16,9 +16,12 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
+from motionmind.credits.credit import Credit, add_up
+from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.formats import write_motion
 from motionmind.render.page import page
+from motionmind.studio.api import json
 from motionmind.studio.placement import performance
 from motionmind.studio.view import layout_of
 
@@ -51,6 +54,22 @@ def composed(studio: Studio) -> Motion:
     return replace(performance(list(layout.parts), studio.movements.get), name=project.state.title or "piece")
 
 
+def credits_of(studio: Studio) -> tuple[Credit, ...]:
+    """Return whose movement the piece is made of: corpora's clips by name, insertions by their own credits, by time.
+
+    Raises:
+        MotionMindError: a movement is missing.
+    """
+    project, shares = studio.project, list[Credit]()
+    for part in layout_of(project.state, project.finding, project.marks).parts:
+        motion = studio.movements.get(part.key).slice(part.first, part.last + 1)
+        known = studio.movements.credit(part.key)
+        for credit in motion.credits:
+            one = known if known and credit.is_given else credit
+            shares.append(replace(one, share=credit.share * part.seconds))
+    return add_up(shares)
+
+
 def file_name(title: str, suffix: str) -> str:
     """Return a name that every system takes for a file.
 
@@ -65,7 +84,7 @@ def file_name(title: str, suffix: str) -> str:
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes of this part."""
     makers: dict[str, Callable[[Motion], bytes]] = {
-        "html": lambda motion: page(motion).encode(),
+        "html": lambda motion: page(motion, credited=credits_of(studio)).encode(),
         "glb": lambda motion: _written(motion, ".glb"),
         "bvh": lambda motion: _written(motion, ".bvh"),
         "json": lambda motion: _written(motion, ".json"),
@@ -81,7 +100,11 @@ def routes(studio: Studio) -> list[BaseRoute]:
         data = await run_in_threadpool(makers[form], composed(studio))
         return _saved(data, file_name(title, form))
 
-    return [Route("/api/export/{format}", export)]
+    async def credit(_: Request) -> Response:
+        sections = sections_of(ledger_of(await run_in_threadpool(credits_of, studio)))
+        return json({"sections": [{"heading": heading, "lines": lines} for heading, lines in sections.items()]})
+
+    return [Route("/api/export/{format}", export), Route("/api/credits", credit)]
 
 
 def _written(motion: Motion, suffix: str) -> bytes:

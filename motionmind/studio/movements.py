@@ -26,7 +26,7 @@ from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus, Facing
-from motionmind.credits.credit import Credit
+from motionmind.credits.credit import Credit, credit_clip
 from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, suggestion
 from motionmind.names.finding import Collection, open_collection
@@ -170,6 +170,14 @@ class Movements:
         self._hold(key, motion)
         return motion
 
+    def credit(self, key: str) -> Credit | None:
+        """Return the credit of a corpus's movement; None for what the project keeps."""
+        plain = key.lstrip(_MIRRORED)
+        if plain in self._kept or plain.startswith((f"{_OWN}/", _KEPT)):
+            return None
+        corpus, name = self._split(plain)
+        return corpus.credit(name)
+
     def title(self, key: str) -> str:
         """Return the words for a movement."""
         if key.startswith(_MIRRORED):
@@ -260,6 +268,11 @@ class _Corpus:
         """Which way the dancers may face."""
         found: Facing = store.read_manifest(store.locate(self._name, self._home)).get("facing", "free")
         return found
+
+    def credit(self, name: str) -> Credit:
+        """Return the credit of a clip, else of a posture: that of the whole corpus."""
+        clip = next((clip for clip in self._corpus.clips if clip.label == name), None)
+        return self._corpus.credit_of(clip) if clip else credit_clip(self._corpus.own_origin, name)
 
     def motion(self, name: str) -> Motion:
         """Return a clip as it was recorded, else a posture."""

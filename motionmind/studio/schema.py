@@ -12,6 +12,7 @@ import msgspec
 from motionmind.studio.answers import (
     Begun,
     CorpusView,
+    Credited,
     Entering,
     Failure,
     Gallery,
@@ -91,6 +92,7 @@ CALLS = (
     Call("POST", "/api/pose/change", Changing, Posed),
     Call("POST", "/api/pose/keep", Keeping, KeptView),
     Call("POST", "/api/pose/score", Keeping, Lines),
+    Call("GET", "/api/credits", None, Credited),
     Call("GET", "/api/export/{format}", None, "application/octet-stream"),
 )
 

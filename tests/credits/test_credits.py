@@ -316,6 +316,7 @@ def test_a_ledger_as_text_names_all_licences() -> None:
         Credit(0.3, "b", "", "two", licence="CC-BY-NC-4.0"),
     )
     text = "\n".join(lines_of(ledger_of((*parts, Credit(0.2)))))
+    assert text.startswith("beware\n")
     for words in ("CC-BY-SA-4.0: name the authors", "CC-BY-NC-4.0", UNSTATED, ENGINE, "cannot be combined"):
         assert words in text
     assert [*lines_of(Ledger())] == []
@@ -332,6 +333,10 @@ def test_the_command_says_the_same_of_movement_and_of_its_report(run: Run, tmp_p
     assert movement == report
     assert re.search(r"^   ?\d+%  ballet: plies, The MotionMind authors$", movement, re.MULTILINE)
     assert run("credits", tmp_path / "report.json", "--json").json["corpora"]["ballet"] > 0.5
+
+
+def test_a_clip_of_a_corpus_is_the_corpus_s(run: Run) -> None:
+    assert "100%  ballet: adagio, The MotionMind authors" in run("credits", "ballet/adagio").out
 
 
 def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.credits.credit import Credit
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import motions
@@ -523,6 +524,18 @@ def test_n_and_p_go_from_insertion_to_insertion_and_round(show: Callable[..., Op
     for key, time in (("n", 0.5), ("n", 1.5), ("n", 3.0), ("n", 0.5), ("p", 3.0), ("p", 1.5), ("End", 4.0), ("p", 3.0)):
         tab.press(key)
         assert tab.time == time
+
+
+def test_credits_are_shown_and_open_where_somebody_should_beware(show: Callable[..., Opened]) -> None:
+    free = Credit(1.0, "<b>plies", "Ada", "ballet", licence="CC0-1.0")
+    bound = Credit(1.0, "jump", "Eve", "other", licence="CC-BY-ND-4.0")
+    for credit, is_open in ((free, False), (bound, True)):
+        tab = show(still(12, (Insertion(np.array([0.1, 0.8]), credits=(credit,)),)))
+        assert not tab.get("document.querySelector('#credits').hidden")
+        assert tab.get("document.querySelector('#credits').open") == is_open
+        words = tab.get("document.querySelector('#credits dl').textContent")
+        assert f"{credit.corpus}: {credit.clip}, {credit.performer}" in words
+    assert show(still(3)).get("document.querySelector('#credits').hidden")
 
 
 # --- in a frame -------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from studio_server import Answer, Served
 
 from motionmind import read_motion
-from motionmind.studio.export import composed, file_name
+from motionmind.studio.export import composed, credits_of, file_name
 from motionmind.studio.project import Project
 
 
@@ -55,6 +55,32 @@ def test_the_project_opens_again(with_piece: Served, tmp_path: Path) -> None:
     project = Project.open(path)
     assert project.state == with_piece.studio.project.state
     project.close()
+
+
+def credited(server: Served) -> dict[str, list[str]]:
+    answer = server.send("GET", "/api/credits")
+    assert answer.status == 200, answer
+    return {one["heading"]: one["lines"] for one in answer.value["sections"]}
+
+
+def test_the_page_and_the_panel_credit_the_clips_of_the_piece(with_piece: Served) -> None:
+    assert credited(with_piece)["clips"] == ["100%  ballet: adagio, The MotionMind authors"]
+    assert "ballet: adagio, The MotionMind authors" in taken(with_piece, "html").body.decode()
+
+
+def test_insertions_are_credited_as_they_were_found(studio_server: Served) -> None:
+    ends = {"a": {"key": "ballet/arabesque", "frame": 0}, "b": {"key": "ballet/fifth", "frame": 0}}
+    job = studio_server.post("/api/between", {**ends, "options": {}})["job"]
+    assert studio_server.wait_for(job)["state"] == "done"
+    studio_server.post("/api/between/accept", {"job": job, "alternative": 1, "window": "w1"})
+    found = credits_of(studio_server.studio)
+    assert len(found) > 1
+    assert sum(one.share for one in found) == pytest.approx(1.0)
+    assert {one.corpus for one in found} <= {"ballet", ""}
+    assert any(one.clip == "plies" for one in found)
+    (insertion,) = composed(studio_server.studio).insertions
+    shares = {one.clip: one.share for one in found}
+    assert shares == pytest.approx({one.clip: one.share for one in insertion.credits})
 
 
 def test_nothing_is_taken_away_of_an_empty_piece(studio_server: Served) -> None:

@@ -1,7 +1,8 @@
 /** The credits: whose movement a motion is made of. */
 
 /**
- * Write the lines of each heading into a list; nothing is shown of a motion without credits.
+ * Write the lines of each heading into a list; nothing is shown of a motion without credits. What somebody should beware
+ * of is open at first.
  * @param {HTMLDetailsElement} details with a description list
  * @param {Object<string, string[]>} credits lines by heading
  */
@@ -17,5 +18,6 @@ export function writeCredits(details, credits) {
       list.append(description);
     }
   }
+  details.open = "beware" in credits;
   details.hidden = Object.keys(credits).length === 0;
 }

@@ -28,12 +28,32 @@ export function Panel({ studio }) {
               <${Save} studio=${studio} format=${format} testid=${testid} />
             <//>`,
           )}
-          <${Film} studio=${studio} />`
+          <${Film} studio=${studio} />
+          <${Credits} studio=${studio} />`
     }
     <${Way} name="The project" words="The piece with every edit, to open again with motionmind studio FILE. It is always saved: ${file}">
       <${Save} studio=${studio} format="project" testid="export-project" />
     <//>
   </div>`;
+}
+
+/** Whose movement the piece is made of, and what stands against passing it on. @param {any} props */
+function Credits({ studio }) {
+  const revision = useChange(studio.store, () => studio.store.state);
+  const [sections, setSections] = useState(/** @type {{heading: string, lines: string[]}[]} */ ([]));
+  useEffect(() => {
+    let here = true;
+    const known = (/** @type {any} */ found) => here && setSections(found.sections);
+    studio.api.get("/api/credits").then(known, () => known({ sections: [] }));
+    return () => (here = false);
+  }, [revision]);
+  return html`<details class="card credits" data-testid="credits" hidden=${sections.length === 0}
+    open=${sections.some(({ heading }) => heading === "beware")}>
+    <summary>Credits</summary>
+    <dl>
+      ${sections.map(({ heading, lines }) => html`<dt>${heading}</dt>${lines.map((line) => html`<dd>${line}</dd>`)}`)}
+    </dl>
+  </details>`;
 }
 
 /** @param {any} props */
