@@ -226,11 +226,52 @@ def test_insertions_are_chosen_by_keys_alone(page: Any) -> None:
         press("Tab")
         if page.evaluate("document.activeElement.dataset.testid") == "wish-joint":
             break
+    assert page.evaluate("document.activeElement.dataset.testid") == "wish-joint"
     press("ArrowDown")
     press("Tab", "Tab", "Enter")
     wait_for(page, "piece.seams[1].ask.pins.length === 1")
     press("Escape")
     assert page.get_by_test_id("wish-sheet").count() == 0
+
+
+def test_no_key_is_lost_between_the_tracks_and_the_wishes(page: Any) -> None:
+    """The sheet has the focus before the next key comes: from the tracks, that key closes it again."""
+    page.get_by_test_id("block-b3").focus()
+    page.keyboard.press("ArrowLeft")
+    assert (
+        page.evaluate(
+            """async () => {
+          const { activeElement: seam } = document;
+          seam.dispatchEvent(new KeyboardEvent("keydown", { key: "w", bubbles: true, cancelable: true }));
+          for (let turn = 0; turn < 100; turn++) await null; // neither a frame nor a timer comes in between
+          return document.activeElement.dataset.testid;
+        }"""
+        )
+        == "wish-seconds"
+    )
+
+
+def test_edits_come_in_the_order_in_which_they_were_made(page: Any) -> None:
+    """A request that is held up is overtaken by none, and one that fails keeps up none."""
+    titles: list[str] = []
+
+    def hold(route: Any) -> None:
+        edit = route.request.post_data_json["edit"]
+        if edit["title"] == "first":
+            page.wait_for_timeout(300)
+        titles.append(edit["title"])
+        route.continue_()
+
+    page.route("**/api/edits", hold)
+    last = page.evaluate(
+        """async () => {
+          const title = (title) => studio.api.edit({ edit: "title", title });
+          const all = await Promise.allSettled(["first", "second", "third"].map(title));
+          return all.at(-1).value.title;
+        }"""
+    )
+    assert titles == ["first", "second", "third"]
+    assert last == "third"
 
 
 def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:

@@ -13,6 +13,8 @@ export class Api extends EventTarget {
     sessionStorage.setItem("motionmind-window", this.window);
     /** @type {(state: any) => void} called with what every edit answers */
     this.taken = () => {};
+    /** @type {Promise<any>} over with the last change that was asked for: the next waits, for requests overtake others */
+    this.changed = Promise.resolve();
   }
 
   /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
@@ -44,22 +46,28 @@ export class Api extends EventTarget {
   }
 
   /** Edit the project: the new state, which the store has taken over. @param {object} edit */
-  async edit(edit) {
-    return this.#took(await this.post("/api/edits", { window: this.window, edit }));
+  edit(edit) {
+    return this.#change("/api/edits", { edit });
   }
 
-  async undo() {
-    return this.#took(await this.post("/api/undo", { window: this.window }));
+  undo() {
+    return this.#change("/api/undo");
   }
 
-  async redo() {
-    return this.#took(await this.post("/api/redo", { window: this.window }));
+  redo() {
+    return this.#change("/api/redo");
   }
 
-  /** @param {any} state */
-  #took(state) {
-    this.taken(state);
-    return state;
+  /** @param {string} path @param {object} body @returns {Promise<any>} */
+  #change(path, body = {}) {
+    const change = async () => {
+      const state = await this.post(path, { window: this.window, ...body });
+      this.taken(state);
+      return state;
+    };
+    const changed = this.changed.then(change);
+    this.changed = changed.catch(() => {}); // who asked hears of what failed
+    return changed;
   }
 
   /** @param {string} path @param {RequestInit} request */

@@ -1,6 +1,6 @@
 /** The corpora that there are: looked through as sheets, used for the piece, deleted. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { movement, thumbnail } from "../movements.js";
 import { useChange } from "../shell/hooks.js";
 
@@ -77,6 +77,6 @@ function Sheet({ studio, sheet, onClose }) {
 /** A dialog over the page; Escape closes it. @param {{label: string, wide?: boolean, onClose: () => void, children?: any}} props */
 function Modal({ label, wide = false, onClose, children }) {
   const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
-  useEffect(() => dialog.current?.showModal(), []);
+  useLayoutEffect(() => dialog.current?.showModal(), []);
   return html`<dialog ref=${dialog} class=${wide ? "wide" : ""} aria-label=${label} onClose=${onClose}>${children}</dialog>`;
 }

@@ -34,14 +34,13 @@ export function Panel({ studio }) {
   const does = useMemo(() => new Actions(studio, new Movements((key) => movement(studio.api, key)), show), [studio]);
   does.sight = sight;
   does.piece = piece;
-  usePlayed(studio, does.movements, piece);
+  const joints = usePlayed(studio, does.movements, piece).filter((name) => LIMBS.test(name));
   useEffect(() => {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
   const stopped = useRested(useStore(studio, ({ jobs }) => [...jobs.values()].some(atSeams)));
   useEffect(() => studio.keys.add(ROWS), [studio]);
   const seam = selected(piece, selection)?.seam;
-  const joints = (does.movements.at(piece.parts[0]?.key)?.joints ?? []).filter((name) => LIMBS.test(name));
   return html`<section
     class="timeline"
     data-testid="timeline"
@@ -107,9 +106,13 @@ function same(old, change) {
   return Object.entries(change).every(([name, value]) => old[name] === value) ? old : { ...old, ...change };
 }
 
-/** Show the piece in the viewer: as soon as the movement that it begins with is there, and again when all are. */
+/**
+ * Show the piece in the viewer: as soon as the movement that it begins with is there, and again when all are.
+ * Returns the names of its joints, none before they are known.
+ */
 function usePlayed(studio, movements, { parts }) {
   const told = JSON.stringify(parts);
+  const [joints, setJoints] = useState([]);
   useEffect(() => {
     if (parts.length === 0) return undefined;
     let stale = false;
@@ -117,6 +120,7 @@ function usePlayed(studio, movements, { parts }) {
       await movements.load(parts[0].key);
       if (stale) return;
       const composed = new Composed(parts, movements, studio.store.state.title ?? "");
+      setJoints(composed.joints);
       const { time } = studio.viewer.isHome ? studio.viewer.player : { time: 0 };
       studio.viewer.home(composed, { time });
       await composed.load();
@@ -128,6 +132,7 @@ function usePlayed(studio, movements, { parts }) {
     shown().catch((error) => studio.say(error.message, { kind: "error" }));
     return () => (stale = true);
   }, [told]);
+  return joints;
 }
 
 /** A posture's picture. @param {string} key @param {number} frame */

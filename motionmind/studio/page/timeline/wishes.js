@@ -1,6 +1,6 @@
 /** What is wished of an insertion: its length, postures that it passes, hands and feet that stay. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { plain } from "./blocks.js";
 import { pass, wish } from "./items.js";
 
@@ -14,7 +14,8 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   const [posture, setPosture] = useState("");
   const [joint, setJoint] = useState("");
   const [hold, setHold] = useState("start");
-  useEffect(() => element.current.querySelector("input").focus(), []);
+  // At once: a key that comes before would act on the tracks, and close the sheet again.
+  useLayoutEffect(() => element.current.querySelector("input").focus(), []);
   const locked = seam.decision === "locked";
   const escape = (event) => {
     if (event.key !== "Escape") return;
