@@ -1,4 +1,4 @@
-"""How limbs that are in each other turn apart: planes to pass each other on either side of, and the least turns for it.
+"""Turns of limbs that are in each other: planes to pass each other on either side of, and the least turns for it.
 
 For `motionmind.realise.limbs_apart`, which says in what order, how smoothly, and where feet then stand.
 """
