@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -98,7 +99,7 @@ def _print_recipe(recipe: Recipe) -> None:
     ]
     for label, text in rows:
         is_command = text.startswith("motionmind ")  # to be copied, in one line
-        lines = [text] if is_command else click.wrap_text(text, _WIDTH).splitlines()
+        lines = [text] if is_command else wrap(text, _WIDTH, break_on_hyphens=False, break_long_words=False)
         for first, line in zip([label, *[""] * len(lines)], lines, strict=False):
             click.echo(f"{first:12} {printable(line)}")
 

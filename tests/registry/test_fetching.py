@@ -371,7 +371,8 @@ def test_a_recipe_is_printed_and_is_no_corpus(run: Run) -> None:
     assert result.code == 2
     assert result.err == "error: lafan1 is not passed on; the steps above lead to it\n"
     assert "CC BY-NC-ND 4.0" in result.out
-    assert "motionmind corpus build lafan1 " in result.out
+    assert "\nstep 2       motionmind corpus build lafan1 " in result.out
+    assert "https://github.com/ubisoft/ubisoft-laforge-animation-dataset" in result.out.split()  # in one piece
 
 
 def test_no_network_is_an_error_in_a_line(run: Run) -> None:
