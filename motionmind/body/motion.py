@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from motionmind._cells import html_of
-from motionmind._typing import Bools, Floats, Indices
+from motionmind._typing import Bools, Floats
 from motionmind.arguments import (
     as_floats,
     check_flag,
@@ -24,6 +24,7 @@ from motionmind.arguments import (
     check_text,
     check_type,
 )
+from motionmind.body.frozen import freeze_checked
 from motionmind.body.rates import FASTEST, check_size
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.tables import data_frame, data_set
@@ -66,7 +67,7 @@ class Posture:
 
     def __post_init__(self) -> None:
         check_type("skeleton", self.skeleton, Skeleton)
-        _freeze_checked(self, (len(self.skeleton), 4), (3,))
+        freeze_checked(self, (len(self.skeleton), 4), (3,))
 
     def __repr__(self) -> str:
         x, y, z = self.root
@@ -163,7 +164,7 @@ class Motion:
             raise MotionMindError(f"{self.name or 'motion'}: no frames")
         if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
             raise MotionMindError(f"{self.name or 'motion'}: times must be finite and increasing")
-        _freeze_checked(self, (len(times), len(self.skeleton), 4), (len(times), 3))
+        freeze_checked(self, (len(times), len(self.skeleton), 4), (len(times), 3))
         times.setflags(write=False)
         object.__setattr__(self, "times", times)
         # A file's name may hold bytes that are not text, which no format can write.
@@ -389,32 +390,3 @@ class Velocity:
         weights = times / (times @ times)
         turned = rot.log(rot.inv_mul(motion.rotations[end], motion.rotations[near]))
         return cls(np.tensordot(weights, turned, axes=1), weights @ (motion.root[near] - motion.root[end]))
-
-
-def _freeze_checked(thing: Posture | Motion, rotations: tuple[int, ...], root: tuple[int, ...]) -> None:
-    """Check the shapes and values of a new object's arrays, then make them read-only."""
-    name = getattr(thing, "name", "") or type(thing).__name__.lower()
-    for what, shape in (("rotations", rotations), ("root", root)):
-        array = as_floats(what, getattr(thing, what))
-        if array.shape != shape:
-            raise MotionMindError(f"{name}: {what} must have the shape {shape}, not {array.shape}")
-        if not np.isfinite(array).all():
-            where = np.argwhere(~np.isfinite(array))[0]
-            raise MotionMindError(f"{name}: {_place(thing, what, where)} is not a finite number")
-        array.setflags(write=False)
-        object.__setattr__(thing, what, array)
-    with np.errstate(over="ignore"):  # a length beyond all numbers is not 1 either
-        length = np.linalg.norm(thing.rotations, axis=-1)
-    if np.any(np.abs(length - 1.0) > 1e-6):
-        where = np.argwhere(np.abs(length - 1.0) > 1e-6)[0]
-        raise MotionMindError(
-            f"{name}: {_place(thing, 'rotations', where)} has length {length[tuple(where)]:.6g}, not 1"
-        )
-
-
-def _place(thing: Posture | Motion, what: str, where: Indices) -> str:
-    moving = isinstance(thing, Motion)
-    frame = f" in frame {where[0]}" if moving else ""
-    if what == "root":
-        return f"the root's position{frame}"
-    return f"the rotation of {thing.skeleton.names[where[1 if moving else 0]]}{frame}"

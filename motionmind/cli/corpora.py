@@ -255,6 +255,10 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
     for key in ("name", "title", "author", "source", "licence", "citation", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
     click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    if performers := {
+        clip["performer"]: None for clip in found["clips"] if clip["performer"] not in ("", found["author"])
+    }:
+        click.echo(f"{'performers':10} {displayed(', '.join(performers), _LINE)}")
     if found["repairs"]:
         click.echo(f"{'repaired':10} {format_repairs(found)}")
     print_origins(found)

@@ -344,7 +344,7 @@ class CreditSection(_Answer):
 
 
 class Credited(_Answer):
-    """Whose movement the piece is made of."""
+    """Credits of the piece, by clip, performer, corpus and licence."""
 
     sections: list[CreditSection]
 

@@ -372,7 +372,9 @@ def test_exports_of_what_forbids_derivatives_say_so(run: Run, tmp_path: Path) ->
     assert "Ada" in run("credits", tmp_path / "out.glb").out
     mixed = run("corpus", "build", "mixed", "--mix", "fixed", "--mix", "ballet")
     assert "fixed forbids derivatives" in mixed.err
-    assert "CC-BY-NC-ND-4.0" in run("corpus", "info", "mixed").out
+    info = run("corpus", "info", "mixed").out
+    assert "CC-BY-NC-ND-4.0" in info
+    assert "performers Ada, The MotionMind authors" in info
 
 
 def test_the_page_shows_the_credits() -> None:
