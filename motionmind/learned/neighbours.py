@@ -92,32 +92,32 @@ def build_neighbours(skeleton: Skeleton, orientations: Floats, weights: Floats) 
 
 
 def find_near(
-    trees: Neighbours, number: int, orientations: Floats, posture: Floats, leaves: int = LEAVES
+    trees: Neighbours, number: int, orientations: Floats, postures: Floats, count: int, leaves: int = LEAVES
 ) -> tuple[Ints, Floats]:
-    """Return moments near a posture in one part of the body, the nearest first, and their squared distances, radians^2.
+    """Return moments near each of some postures in one part of the body, and their squared distances [K, n], radians^2.
 
-    They are all moments of the leaves that promise most.
+    They are the `count` nearest moments of the leaves that promise most, the nearest first, or all of these leaves.
 
     Args:
         trees: of the corpus.
         number: of the part.
         orientations: of the corpus's moments [N, L, 4].
-        posture: orientations of the chains [L, 4].
+        postures: orientations of the chains, the joints' first [K, J, 4].
+        count: how many moments for each posture.
         leaves: how many to search.
     """
     part = trees.parts[number]
-    found, squared = _search(
+    return _find(
         orientations,
         part,
-        np.ascontiguousarray(posture[part]),
+        np.ascontiguousarray(postures[:, part]),
         trees.order[number],
         trees.bounds,
         trees.centres_of(number),
         trees.radii[number],
+        count,
         leaves,
     )
-    order = np.argsort(np.round(squared, 9), kind="stable")
-    return found[order].astype(np.int64), squared[order]
 
 
 def postures_near(
@@ -133,8 +133,8 @@ def postures_near(
         below: number of the corpus's postures.
         leaves: how many to search.
     """
-    found = find_near(trees, 0, orientations, posture, leaves)[0]
-    return found[found < below][:count]
+    found = find_near(trees, 0, orientations, posture[None], leaves * LEAF, leaves)[0].ravel()
+    return np.asarray(found[found < below][:count])
 
 
 def node_bounds(count: int) -> Int32s:
@@ -205,6 +205,30 @@ def _apart(chains: Floats, part: Ints, posture: Floats) -> float:
         cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
         total += max(1.0 - cosine * cosine, 0.0)
     return 4.0 * total
+
+
+@jit
+def _find(
+    orientations: Floats,
+    part: Ints,
+    postures: Floats,
+    order: Int32s,
+    bounds: Int32s,
+    centres: Singles,
+    radii: Floats,
+    count: int,
+    leaves: int,
+) -> tuple[Ints, Floats]:
+    """Return moments near each posture of a part [K, m, 4], and their squared distances [K, n]."""
+    leaf = (len(bounds) + 1) // 2
+    least = (bounds[-leaf:, 1] - bounds[-leaf:, 0]).min()  # so that each posture has as many
+    count = min(count, leaves * least if leaves < leaf else len(order))
+    found, squared = np.empty((len(postures), count), np.int64), np.empty((len(postures), count))
+    for k in range(len(postures)):
+        moments, off = _search(orientations, part, postures[k], order, bounds, centres, radii, leaves)
+        nearest = np.argsort(off, kind="mergesort")[:count]
+        found[k], squared[k] = moments[nearest], off[nearest]
+    return found, squared
 
 
 @jit

@@ -185,7 +185,7 @@ def _mean_between(
                 own = np.concatenate([of_parts[number] for of_parts in distances])
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
-                here = shown[chosen.moments][:, part]
+                here = _taken(shown, np.asarray(chosen.moments), part)
                 whole = np.zeros((len(part), 1), dtype=np.int64)
                 own = squared_distances(here, whole, 1, np.ascontiguousarray(passed[:, part]))[0]
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
@@ -206,7 +206,7 @@ def _mean_between(
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
                     of = np.concatenate([chosen.moments for chosen, *_ in walks])
-                    mean = mean_rotations(weights, shown[of][:, here], np.arange(len(here)), about)
+                    mean = mean_rotations(weights, _taken(shown, of, np.array(here)), np.arange(len(here)), about)
                 off = rot.log(rot.inv_mul(about, mean))
                 off = _without_ends(off, times, leaving is not None, arriving is not None)
                 trusted[here] = np.dot(SIZES, [trust_in_part for _, _, trust_in_part, _ in walks])
@@ -285,6 +285,17 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
         terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
         terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
     return terms
+
+
+@jit
+def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
+    """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]."""
+    out = np.empty((len(moments), len(joints), 4))
+    for i in range(len(moments)):
+        for j in range(len(joints)):
+            for c in range(4):
+                out[i, j, c] = shown[moments[i], joints[j], c]
+    return out
 
 
 @jit

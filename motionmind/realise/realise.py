@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,20 @@ _SAME = 1e-9  # radians: two orientations no farther apart are the same but for 
 _UNSEEN = 2e-3  # radians: a joint that comes back to where it began, and goes no farther, does not move
 
 
+class Realised(NamedTuple):
+    """A realised path.
+
+    Attributes:
+        motion: the motion.
+        detail: the corpus's moves whose fine detail it has, one after another; none if the corpus keeps no detail.
+        left_out: share of walks that begin or end in moments that were not looked at (`mean_walk.MeanWalk`).
+    """
+
+    motion: Motion
+    detail: Ints
+    left_out: float
+
+
 def realise(
     path: Int32s,
     a: Posture,
@@ -60,7 +75,7 @@ def realise(
     pace: float = 1.0,
     fastest: Floats | None = None,
     peaks: Callable[[float], Floats] | None = None,
-) -> tuple[Motion, Ints]:
+) -> Realised:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
     Its first and last frames are `a` and `b`, exactly, and at the moves in `through` its joints and its facing are as
@@ -96,13 +111,10 @@ def realise(
         fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
             `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
         peaks: what the greatest speeds in so many seconds keep to, and that of the root's rise [J + 3]; as `fastest`.
-
-    Returns:
-        The motion, and the corpus's moves whose detail it has, one after another; none if the corpus keeps no detail.
     """
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
-        return still, np.zeros(0, dtype=np.int64)
+        return Realised(still, np.zeros(0, dtype=np.int64), 0.0)
     clock = timeline(path, grammar.transitions, fps, length)
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
@@ -186,7 +198,7 @@ def realise(
     motion = Motion(a.skeleton, rotations, root, clock.frames)
     if most is not None:
         motion, clock = slow_down(motion, clock, most, (leaving is not None, arriving is not None))
-    return replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed
+    return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 
 def _times(factor: float, velocity: Velocity | None) -> Velocity | None:

@@ -76,10 +76,10 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         path: those that walks are to follow [K, J, 4], or None.
         steps: of a walk.
     """
-    part, shown, order = trees.parts[number], carriage.orientations, trees.order[number]
-    first, last = (find_near(trees, number, shown, end)[0][:ENDS] for end in ends)
+    part, shown = trees.parts[number], carriage.orientations
+    near, _ = find_near(trees, number, shown, ends, ENDS)
     middle = ends[:0] if path is None else path
-    by_path = [find_near(trees, number, shown, posture, PATH_LEAVES)[0][:BY_PATH] for posture in middle]
+    by_path, _ = find_near(trees, number, shown, middle, BY_PATH, PATH_LEAVES)
     nodes = _cut(
         np.ascontiguousarray(middle[:, part]),
         trees.bounds,
@@ -87,39 +87,110 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         trees.radii[number],
         trees.weights[number],
     )
-    starts, stops = trees.bounds[nodes].T.astype(np.int64)
-    chain = carriage.begins, carriage.ends, len(shown) - len(carriage.turn)
-    runs = [follow(*run, *chain) for run in ((first, True, ALONG), (last, False, ALONG))]
-    runs += [follow(end[:NEAREST], end is first, steps // 2 + 1, *chain) for end in (first, last)]
-    runs += [follow(near, True, 2, *chain) for near in by_path]
-    singles = np.unique(np.concatenate([first, last, *by_path]))
-    moments = np.unique(np.concatenate([singles, *runs, order[(starts + stops) // 2]]))
-
-    def ball_of(some: Ints) -> Ints:
-        return np.asarray(np.searchsorted(starts, trees.ranks[number][some], side="right") - 1)
-
-    ball, own, whole = ball_of(moments), carriage.weights[moments], trees.weights[number][nodes]
-    alone = np.isin(moments, singles)
-    alone &= (np.bincount(ball, ~alone, len(nodes)) > 0.0)[ball]  # else nothing stands for what is left of the ball
-    rest = whole - np.bincount(ball, alone * own, len(nodes))
-    share = rest / np.bincount(ball, ~alone * own, len(nodes))
-    weights = np.where(alone, own, own * share[ball])
-    stands = np.empty(len(nodes), dtype=np.int64)
-    stands[ball[~alone][::-1]] = np.flatnonzero(~alone)[::-1]
-    begins, to, numbers = steps_at(moments, True, *chain)
-    goal = np.minimum(np.searchsorted(moments, to), len(moments) - 1)
-    missing = moments[goal] != to
-    goal[missing] = stands[ball_of(to[missing])]
-    _, clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)
-    return Chosen(
-        moments,
-        weights,
-        begins,
-        goal,
-        np.asarray(carriage.shares[numbers]),
-        clusters.reshape(-1).astype(np.int32),
-        (np.isin(moments, first), np.isin(moments, last)),
+    moments, weights, begins, leads, shares, clusters, first, last = _assemble(
+        near,
+        by_path.ravel(),
+        steps // 2 + 1,
+        trees.bounds[nodes],
+        trees.weights[number][nodes],
+        trees.order[number],
+        trees.ranks[number],
+        carriage.begins,
+        carriage.ends,
+        carriage.shares,
+        carriage.weights,
+        carriage.clusters[:, number],
     )
+    return Chosen(moments, weights, begins, leads, shares, clusters, (first, last))
+
+
+@jit
+def _assemble(
+    near: Ints,
+    by_path: Ints,
+    halfway: int,
+    bounds: Int32s,
+    balls: Floats,
+    order: Int32s,
+    ranks: Int32s,
+    begins: Ints,
+    ends: Ints,
+    shares: Floats,
+    counts: Floats,
+    clusters: Int32s,
+) -> tuple[Ints, Floats, Ints, Ints, Floats, Int32s, Bools, Bools]:
+    """Return the fields of `Chosen` but the last, which is parted in two.
+
+    Args:
+        near: moments near each end, the nearest first [2, n].
+        by_path: those near the path's postures.
+        halfway: steps for which those nearest to the ends are followed.
+        bounds: where the balls begin and end in the tree's order [B, 2], rising.
+        balls: their weights [B].
+        order, ranks: of the tree [N].
+        begins, ends, shares: of the corpus's steps [2 M].
+        counts: weights of its moments [N].
+        clusters: of its moments [N].
+    """
+    postures = len(counts) - len(begins) // 2
+    singles = np.unique(np.concatenate((near.ravel(), by_path)))
+    runs = [
+        singles,
+        order[(bounds[:, 0] + bounds[:, 1]) // 2].astype(np.int64),
+        follow(by_path, True, 2, begins, ends, postures),
+    ]
+    for end in range(2):
+        runs.append(follow(near[end], end == 0, ALONG, begins, ends, postures))
+        runs.append(follow(near[end, :NEAREST], end == 0, halfway, begins, ends, postures))
+    total = 0
+    for run in runs:
+        total += len(run)
+    every, total = np.empty(total, np.int64), 0
+    for run in runs:
+        every[total : total + len(run)] = run
+        total += len(run)
+    moments = np.unique(every)
+    starts = bounds[:, 0].copy()
+
+    ball, alone = np.empty(len(moments), np.int64), np.zeros(len(moments), np.bool_)
+    alone[np.searchsorted(moments, singles)] = True
+    shared, rest = np.zeros(len(balls)), balls.copy()
+    for k in range(len(moments)):
+        ball[k] = np.searchsorted(starts, ranks[moments[k]], side="right") - 1
+        if not alone[k]:
+            shared[ball[k]] += counts[moments[k]]
+    for k in range(len(moments)):
+        if alone[k] and shared[ball[k]] > 0.0:
+            rest[ball[k]] -= counts[moments[k]]
+    # Where none but what is near was chosen of a ball, that stands for what is left of it.
+    for k in range(len(moments)):
+        if alone[k] and shared[ball[k]] == 0.0:
+            alone[k] = False
+            for n in range(k, len(moments)):
+                if ball[n] == ball[k]:
+                    alone[n] = False
+                    shared[ball[k]] += counts[moments[n]]
+    weights, stands = np.empty(len(moments)), np.empty(len(balls), np.int64)
+    for k in range(len(moments) - 1, -1, -1):
+        weights[k] = counts[moments[k]]
+        if not alone[k]:
+            weights[k] *= rest[ball[k]] / shared[ball[k]]
+            stands[ball[k]] = k
+
+    leave, lead, steps = steps_at(moments, True, begins, ends, postures)
+    goal = np.empty(len(lead), np.int64)
+    for k in range(len(lead)):
+        at = np.searchsorted(moments, lead[k])
+        if at < len(moments) and moments[at] == lead[k]:
+            goal[k] = at
+        else:
+            goal[k] = stands[np.searchsorted(starts, ranks[lead[k]], side="right") - 1]
+    own = clusters[moments]
+    named = np.searchsorted(np.unique(own), own).astype(np.int32)
+    first, last = np.zeros(len(moments), np.bool_), np.zeros(len(moments), np.bool_)
+    first[np.searchsorted(moments, near[0])] = True
+    last[np.searchsorted(moments, near[1])] = True
+    return moments, weights, leave, goal, shares[steps], named, first, last
 
 
 @jit

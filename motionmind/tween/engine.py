@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from motionmind._typing import Bools, Ints
+from motionmind._typing import Bools
 from motionmind.arguments import check_function, check_integer, check_type
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import FACING
@@ -21,7 +21,7 @@ from motionmind.errors import InfeasibleError, MotionMindWarning, NoPathError
 from motionmind.geometry.splines import rotation_spline
 from motionmind.learned import graphs, summary
 from motionmind.learned.model import LearnedCorpus
-from motionmind.realise.realise import realise
+from motionmind.realise.realise import Realised, realise
 from motionmind.search.apart import TooAlikeError, difference, solve_apart
 from motionmind.search.problem import places
 from motionmind.search.sample import sample_path
@@ -115,7 +115,7 @@ class Engine(LearnedCorpus):
         if request.sample and len(certificate.path) > 1:
             certificate = sample_path(formulation.searched, certificate, request.seed)
         realising = perf_counter()
-        motion, detail = self._realise(formulation, certificate)
+        realised = self._realise(formulation, certificate)
         seconds = {
             "load": self.load_seconds,
             "problem": formulated - began + certificate.seconds["problem"],
@@ -123,7 +123,7 @@ class Engine(LearnedCorpus):
             "search": certificate.seconds["search"],
             "realise": perf_counter() - realising,
         }
-        return self._account_for(formulation, certificate, motion, detail, seconds, what_if)
+        return self._account_for(formulation, certificate, realised, seconds, what_if)
 
     def alternatives(
         self,
@@ -216,8 +216,8 @@ class Engine(LearnedCorpus):
         )
         return NoPathError(str(found), found.plain())
 
-    def _realise(self, formulation: Formulation, certificate: Certificate) -> tuple[Motion, Ints]:
-        """Return the motion of a path, and the corpus's moves whose fine detail it has."""
+    def _realise(self, formulation: Formulation, certificate: Certificate) -> Realised:
+        """Return the motion of a path."""
         request = formulation.request
         paced = request.paced and not request.fixes_length
         return realise(
@@ -245,8 +245,7 @@ class Engine(LearnedCorpus):
         self,
         formulation: Formulation,
         certificate: Certificate,
-        motion: Motion,
-        detail: Ints,
+        realised: Realised,
         seconds: dict[str, float],
         what_if: tuple[WhatIf, ...],
     ) -> Tween:
@@ -264,7 +263,7 @@ class Engine(LearnedCorpus):
         costs = break_down_cost(
             certificate.path, searched, self.grammar, self.space, formulation.coordination, request.coordination_factor
         )
-        motion = _with_bridges(motion, bridges)
+        motion = _with_bridges(realised.motion, bridges)
         tempo = tempo_of(self, formulation.times, formulation.usual_moves, formulation.detours, motion)
         if tempo.faster and (request.fixes_length or request.pace > 1.0):
             warnings.warn(
@@ -276,7 +275,7 @@ class Engine(LearnedCorpus):
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         shown = _shown(sources, followed)
-        found = tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in detail)
+        found = tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in realised.detail)
         return Tween(
             motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,
@@ -296,6 +295,7 @@ class Engine(LearnedCorpus):
             via_degrees=formulation.snap_degrees[1:-1],
             sources=shown,
             detail=found,
+            left_out=realised.left_out,
             expansions=certificate.expansions,
             peak_nodes=certificate.peak_nodes,
             costs=costs,

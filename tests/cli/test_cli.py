@@ -33,7 +33,8 @@ REPORT = {
     *("asked", "status", "cost", "lower_bound", "gap", "moves", "length", "tempo"),
     *("expansions", "peak_nodes", "node_budget", "seconds", "joints", "path"),
     *("attested", "bridges", "waits", "differs", "what_if", "vias", "snap_degrees", "path_degrees", "followed"),
-    *("sources", "detail", "shown", "times", "names", "degrees", "likelihood", "costs", "credits", "motion_sha256"),
+    *("sources", "detail", "left_out", "shown", "times", "names", "degrees", "likelihood", "costs", "credits"),
+    "motion_sha256",
 }
 INFO = {"clips", "postures", "joints", "states", "edges", "facing", "rate", "source", "licence"}
 

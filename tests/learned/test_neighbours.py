@@ -62,12 +62,12 @@ def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(engine: Engine,
         for _ in range(4):
             posture = rot.mul(shown[rng.integers(len(shown))], rot.exp(rng.normal(0.0, 0.1, (shown.shape[1], 3))))
             off = np.sort(distances(engine, part, posture[part]))
-            found, squared = find_near(trees, number, shown, posture, leaves)
-            assert len(found) == len(shown)
-            np.testing.assert_allclose(squared, off, atol=1e-12)
-            few, nearest = find_near(trees, number, shown, posture, leaves // 8)
-            assert len(few) <= leaves // 8 * LEAF
-            nearly.append(np.sqrt(nearest[0] / off[0]))
+            found, squared = find_near(trees, number, shown, posture[None], 50, leaves)
+            assert found.shape == (1, 50)
+            np.testing.assert_allclose(squared[0], off[:50], atol=1e-12)
+            few, nearest = find_near(trees, number, shown, posture[None], len(shown), leaves // 8)
+            assert few.shape[1] <= leaves // 8 * LEAF
+            nearly.append(np.sqrt(nearest[0, 0] / off[0]))
     assert np.median(nearly) < 1.01
     assert np.quantile(nearly, 0.9) < 1.5
 

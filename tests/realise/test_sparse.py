@@ -164,4 +164,5 @@ def test_a_tween_of_a_corpus_with_trees_is_near_that_without(engine: Engine, car
         few, whole = (
             one.tween(motion.posture(start), motion.posture(stop), duration=seconds) for one in (indexed, engine)
         )
-        assert np.sqrt(np.mean(rot.angle(few.motion.rotations, whole.motion.rotations) ** 2)) < 0.1
+        assert few.report()["left_out"] == few.left_out >= 0.0 == whole.left_out
+        assert np.sqrt(np.mean(rot.angle(few.motion.rotations, whole.motion.rotations) ** 2)) < 0.15

@@ -260,6 +260,7 @@ REPORT = [
     "followed",
     "sources",
     "detail",
+    "left_out",
     "shown",
     "times",
     "names",
