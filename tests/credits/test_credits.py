@@ -28,6 +28,8 @@ from motionmind.discretize.spec import make_discretization
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
 from motionmind.render.page import page
+from motionmind.tween.certificate import Source
+from motionmind.tween.crediting import credit_tween
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import TweenReport, plain
 from motionmind.tween.result import Tween, report_of
@@ -149,6 +151,14 @@ def test_fine_detail_counts_as_one_more_joint(cmu05: Engine) -> None:
     assert {name: share for name, share in shares(found.credits).items() if name != ": "} == pytest.approx(
         {name: lasts / whole for name, lasts in spent.items()}
     )
+
+
+def test_joints_by_their_time_and_detail_by_its_parts() -> None:
+    plies, tendus = (Source(name, posture=3, corpus="ballet") for name in ("plies", "tendus"))
+    rows = [[plies, plies], [tendus, None]]  # two joints in moves of one second and of three
+    found = credit_tween(ballet().corpus, rows, [plies, tendus, tendus, tendus], np.array([0.0, 1.0, 4.0]))
+    seconds = {"ballet: plies": 2.0 + 1.0, "ballet: tendus": 3.0 + 3.0, ": ": 3.0}
+    assert shares(found) == pytest.approx({name: lasts / 12.0 for name, lasts in seconds.items()})
 
 
 def test_a_tween_that_stays_where_it_is_credits_nobody() -> None:
