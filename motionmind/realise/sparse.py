@@ -87,71 +87,37 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         trees.radii[number],
         trees.weights[number],
     )
-    moments, weights, begins, leads, shares, clusters, first, last = _assemble(
-        near,
-        by_path.ravel(),
-        steps // 2 + 1,
-        trees.bounds[nodes],
-        trees.weights[number][nodes],
-        trees.order[number],
-        trees.ranks[number],
-        carriage.begins,
-        carriage.ends,
-        carriage.shares,
-        carriage.weights,
-        carriage.clusters[:, number],
-    )
-    return Chosen(moments, weights, begins, leads, shares, clusters, (first, last))
+    chain = carriage.begins, carriage.ends, len(shown) - len(carriage.turn)
+    runs = [follow(by_path.ravel(), True, 2, *chain)]
+    for end, ahead in zip(near, (True, False), strict=True):
+        runs += [follow(end, ahead, ALONG, *chain), follow(end[:NEAREST], ahead, steps // 2 + 1, *chain)]
+    order, ranks, bounds = trees.order[number], trees.ranks[number], trees.bounds[nodes]
+    singles = np.unique(np.concatenate([near.ravel(), by_path.ravel()]))
+    moments = np.unique(np.concatenate([singles, *runs, order[bounds.sum(axis=1) // 2]]))
+    starts = np.ascontiguousarray(bounds[:, 0])
+    weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
+    begins, leads, numbers = steps_at(moments, True, *chain)
+    goals = _goals(moments, leads, starts, stands, ranks)
+    _, clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)
+    first, last = (np.isin(moments, end) for end in near)
+    of_steps = np.asarray(carriage.shares[numbers])
+    return Chosen(moments, weights, begins, goals, of_steps, clusters.reshape(-1).astype(np.int32), (first, last))
 
 
 @jit
-def _assemble(
-    near: Ints,
-    by_path: Ints,
-    halfway: int,
-    bounds: Int32s,
-    balls: Floats,
-    order: Int32s,
-    ranks: Int32s,
-    begins: Ints,
-    ends: Ints,
-    shares: Floats,
-    counts: Floats,
-    clusters: Int32s,
-) -> tuple[Ints, Floats, Ints, Ints, Floats, Int32s, Bools, Bools]:
-    """Return the fields of `Chosen` but the last, which is parted in two.
+def _shares(
+    moments: Ints, singles: Ints, starts: Int32s, balls: Floats, ranks: Int32s, counts: Floats
+) -> tuple[Floats, Ints]:
+    """Return the weights of chosen moments [n], and the first of them that stands for each ball [B].
 
     Args:
-        near: moments near each end, the nearest first [2, n].
-        by_path: those near the path's postures.
-        halfway: steps for which those nearest to the ends are followed.
-        bounds: where the balls begin and end in the tree's order [B, 2], rising.
+        moments: their numbers, rising [n].
+        singles: those of them that stand for themselves, rising.
+        starts: where the balls begin in the tree's order [B], rising.
         balls: their weights [B].
-        order, ranks: of the tree [N].
-        begins, ends, shares: of the corpus's steps [2 M].
-        counts: weights of its moments [N].
-        clusters: of its moments [N].
+        ranks: of the tree [N].
+        counts: weights of all moments [N].
     """
-    postures = len(counts) - len(begins) // 2
-    singles = np.unique(np.concatenate((near.ravel(), by_path)))
-    runs = [
-        singles,
-        order[(bounds[:, 0] + bounds[:, 1]) // 2].astype(np.int64),
-        follow(by_path, True, 2, begins, ends, postures),
-    ]
-    for end in range(2):
-        runs.append(follow(near[end], end == 0, ALONG, begins, ends, postures))
-        runs.append(follow(near[end, :NEAREST], end == 0, halfway, begins, ends, postures))
-    total = 0
-    for run in runs:
-        total += len(run)
-    every, total = np.empty(total, np.int64), 0
-    for run in runs:
-        every[total : total + len(run)] = run
-        total += len(run)
-    moments = np.unique(every)
-    starts = bounds[:, 0].copy()
-
     ball, alone = np.empty(len(moments), np.int64), np.zeros(len(moments), np.bool_)
     alone[np.searchsorted(moments, singles)] = True
     shared, rest = np.zeros(len(balls)), balls.copy()
@@ -159,38 +125,34 @@ def _assemble(
         ball[k] = np.searchsorted(starts, ranks[moments[k]], side="right") - 1
         if not alone[k]:
             shared[ball[k]] += counts[moments[k]]
-    for k in range(len(moments)):
-        if alone[k] and shared[ball[k]] > 0.0:
-            rest[ball[k]] -= counts[moments[k]]
     # Where none but what is near was chosen of a ball, that stands for what is left of it.
+    crowded = shared > 0.0
     for k in range(len(moments)):
-        if alone[k] and shared[ball[k]] == 0.0:
+        if not crowded[ball[k]]:
             alone[k] = False
-            for n in range(k, len(moments)):
-                if ball[n] == ball[k]:
-                    alone[n] = False
-                    shared[ball[k]] += counts[moments[n]]
+            shared[ball[k]] += counts[moments[k]]
+        elif alone[k]:
+            rest[ball[k]] -= counts[moments[k]]
     weights, stands = np.empty(len(moments)), np.empty(len(balls), np.int64)
     for k in range(len(moments) - 1, -1, -1):
         weights[k] = counts[moments[k]]
         if not alone[k]:
             weights[k] *= rest[ball[k]] / shared[ball[k]]
             stands[ball[k]] = k
+    return weights, stands
 
-    leave, lead, steps = steps_at(moments, True, begins, ends, postures)
-    goal = np.empty(len(lead), np.int64)
-    for k in range(len(lead)):
-        at = np.searchsorted(moments, lead[k])
-        if at < len(moments) and moments[at] == lead[k]:
-            goal[k] = at
+
+@jit
+def _goals(moments: Ints, leads: Ints, starts: Int32s, stands: Ints, ranks: Int32s) -> Ints:
+    """Return which of the chosen moments [n] each step leads to [m]: its own, or what stands for the ball of that."""
+    out = np.empty(len(leads), np.int64)
+    for k in range(len(leads)):
+        at = np.searchsorted(moments, leads[k])
+        if at < len(moments) and moments[at] == leads[k]:
+            out[k] = at
         else:
-            goal[k] = stands[np.searchsorted(starts, ranks[lead[k]], side="right") - 1]
-    own = clusters[moments]
-    named = np.searchsorted(np.unique(own), own).astype(np.int32)
-    first, last = np.zeros(len(moments), np.bool_), np.zeros(len(moments), np.bool_)
-    first[np.searchsorted(moments, near[0])] = True
-    last[np.searchsorted(moments, near[1])] = True
-    return moments, weights, leave, goal, shares[steps], named, first, last
+            out[k] = stands[np.searchsorted(starts, ranks[leads[k]], side="right") - 1]
+    return out
 
 
 @jit
