@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import compileall
+import os
 import random
 import shutil
 import subprocess
@@ -40,19 +41,26 @@ SHARED_DATA = TESTS.parents[1] / "shared" / "data"
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile before all tests what each worker, or each process that a test starts, would else compile for itself.
 
-    These are the inner loops, which workers would come to at the same moment, and the bytecode of the package, which an
-    environment may keep Python from writing. A few tests compile what they need.
+    These are the inner loops, which workers would come to at the same moment, the bytecode of the package, which an
+    environment may keep Python from writing, and what pytest makes of the tests' assertions, which takes a worker half
+    the time in which it collects them. A few tests compile what they need.
     """
     config = session.config
     asked = {(config.invocation_params.dir / argument).resolve() for argument in config.args}
     is_whole = not asked.isdisjoint({TESTS, TESTS.parent})
     is_worker, only_lists = hasattr(config, "workerinput"), config.option.collectonly
-    if not is_whole or is_worker or only_lists:
+    if not is_whole or only_lists:
+        return
+    sys.dont_write_bytecode = False  # of tests that have changed, for the next time
+    if is_worker:
         return
     compileall.compile_dir(Path(motionmind.__file__).parent, quiet=1)
     if not is_all_compiled():
         config.pluginmanager.getplugin("terminalreporter").write_line(NOTICE)
-        subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
+        collect = [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-o", "addopts=", str(TESTS)]
+        environment = os.environ | {"PYTHONDONTWRITEBYTECODE": ""}
+        with subprocess.Popen(collect, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
+            subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scores import TITLED
 
 import motionmind as mm
 from motionmind import MotionMindError, WrongTypeError
@@ -31,16 +32,6 @@ ANSWERS = {
     "Wait",
 }
 PROTOCOLS = {"Discretization", "MotionReader", "MotionWriter"}  # which others implement
-SCORE = """title  Two bends of the knees
-body   human23
-legs
-  stand = stand out 10 turn 8
-  bend = stand out 10 turn 8, bend 30
-clip bends: Down and up
-  start | stand
-  1     | bend
-  1     | stand
-"""
 
 
 class Nothing:
@@ -62,7 +53,7 @@ def calls(folder: Path) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
     known = things()
     engine, motion, posture = known["engine"], known["motion"], known["posture"]
     variation, skeleton = known["variation"], posture.skeleton
-    (folder / "bends.score").write_text(SCORE)
+    (folder / "bends.score").write_text(TITLED)
     (folder / "rig.toml").write_text('Hips = "pelvis"')
     (folder / "report.json").write_text(json.dumps(known["tween"].report()))
     mm.write_motion(folder / "clip.bvh", motion)

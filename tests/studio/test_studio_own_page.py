@@ -9,19 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scores import BENDS
 from studio_server import Served, serving
 
 from motionmind.studio.project import Project
 
-SCORE = """body   human23
-legs
-  stand = stand out 10 turn 8
-  bend = stand out 10 turn 8, bend 30
-clip bends: Down and up
-  start | stand
-  1     | bend
-  1     | stand
-"""
 SIZES = {"large, light": (1440, 900, "light"), "small, dark": (1024, 768, "dark")}
 LONG = 60_000  # milliseconds: the machine may be busy
 
@@ -223,7 +215,7 @@ def test_nothing_to_vary_says_what_to_do(open_page: Open) -> None:
 
 
 def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) -> None:
-    (tmp_path / "bends.score").write_text(SCORE)
+    (tmp_path / "bends.score").write_text(BENDS)
     (tmp_path / "broken.bvh").write_text("HIERARCHY\nROOT Hips\n{\n")
     (tmp_path / "dance.fbx").write_bytes(b"anything")
     page = open_page()
@@ -266,7 +258,7 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
 
 
 def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Path) -> None:
-    (tmp_path / "bends.score").write_text(SCORE)
+    (tmp_path / "bends.score").write_text(BENDS)
     page = open_page(1024, 768, "dark")
     page.on("filechooser", lambda chooser: chooser.set_files(tmp_path / "bends.score"))
     to_panel(page, "movement")
@@ -294,7 +286,7 @@ def test_own_movement_by_keyboard(served: Served, open_page: Open, tmp_path: Pat
 
 
 def test_learning_is_cancelled(served: Served, open_page: Open, tmp_path: Path) -> None:
-    (tmp_path / "bends.score").write_text(SCORE)
+    (tmp_path / "bends.score").write_text(BENDS)
     page = open_page()
     page.get_by_test_id("open-movement").click()
     page.get_by_test_id("choose-files").set_input_files(tmp_path / "bends.score")

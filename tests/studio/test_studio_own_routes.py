@@ -8,19 +8,10 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from scores import BENDS
 from studio_server import Served, serving
 
 from motionmind.studio.project import Project
-
-SCORE = b"""body   human23
-legs
-  stand = stand out 10 turn 8
-  bend = stand out 10 turn 8, bend 30
-clip bends: Down and up
-  start | stand
-  1     | bend
-  1     | stand
-"""
 
 
 @pytest.fixture
@@ -117,7 +108,7 @@ def test_nothing_to_vary(studio_server: Served) -> None:
 
 
 def test_a_score_is_brought_looked_at_and_put_on_the_time_line(served: Served) -> None:
-    upload = bring(served, "Bends ☺.score", SCORE).value
+    upload = bring(served, "Bends ☺.score", BENDS.encode()).value
     assert (upload["name"], upload["facts"]["clips"][0]["name"]) == ("Bends ☺.score", "bends")
     assert "body" not in upload["facts"]
     assert served.get("/api/imports") == [upload]
@@ -133,7 +124,7 @@ def test_a_score_is_brought_looked_at_and_put_on_the_time_line(served: Served) -
 
 
 def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
-    upload = bring(served, "bends.score", SCORE).value
+    upload = bring(served, "bends.score", BENDS.encode()).value
     wish = {"name": "mine", "title": "Bends", "parts": [{"upload": upload["id"]}], "mix": [{"name": "ballet"}]}
     job = served.wait_for(served.post("/api/corpora", wish)["job"])
     assert job["state"] == "done", job
@@ -151,7 +142,7 @@ def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
 
 
 def test_learning_is_cancelled_and_leaves_nothing(served: Served) -> None:
-    upload = bring(served, "bends.score", SCORE).value
+    upload = bring(served, "bends.score", BENDS.encode()).value
     wish = {"name": "mine", "parts": [{"upload": upload["id"]}], "mix": [{"name": "ballet"}]}
     job = served.post("/api/corpora", wish)["job"]
     served.send("DELETE", f"/api/jobs/{job}")
@@ -160,7 +151,7 @@ def test_learning_is_cancelled_and_leaves_nothing(served: Served) -> None:
 
 
 def test_what_cannot_be_learned_says_why(served: Served) -> None:
-    upload = bring(served, "bends.score", SCORE).value
+    upload = bring(served, "bends.score", BENDS.encode()).value
     for wish, words in (
         ({"name": "ballet", "parts": [{"upload": upload["id"]}]}, "bundled"),
         ({"name": "../up", "parts": [{"upload": upload["id"]}]}, "cannot be a corpus's name"),

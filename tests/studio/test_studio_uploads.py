@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from scores import TITLED
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
@@ -25,16 +26,6 @@ from motionmind.studio.reading import is_posed_first
 from motionmind.studio.uploads import Choices, Upload, Uploads
 
 T = TypeVar("T")
-SCORE = """title  Two bends of the knees
-body   human23
-legs
-  stand = stand out 10 turn 8
-  bend = stand out 10 turn 8, bend 30
-clip bends: Down and up
-  start | stand
-  1     | bend
-  1     | stand
-"""
 
 
 @pytest.fixture
@@ -136,7 +127,7 @@ def test_names_joints_that_jump(uploads: Uploads, tmp_path: Path) -> None:
 
 
 def test_reads_a_score(uploads: Uploads) -> None:
-    found = bring(uploads, "bends.score", SCORE.encode())
+    found = bring(uploads, "bends.score", TITLED.encode())
     assert found.facts is not None
     assert [(clip.name, clip.frames, clip.fps) for clip in found.facts.clips] == [("bends", 3, None)]
     assert uploads.motion(found.id, 0).keyframed
@@ -167,14 +158,14 @@ def test_an_amc_needs_its_asf(uploads: Uploads, shared_data: Path) -> None:
 
 def test_goes_with_the_studio(tmp_path: Path) -> None:
     uploads = Uploads()
-    found = bring(uploads, "bends.score", SCORE.encode())
+    found = bring(uploads, "bends.score", TITLED.encode())
     folder = uploads.folder(found.id)
     assert folder.is_dir()
     uploads.forget(found.id)
     assert not folder.exists()
     with pytest.raises(MotionMindError, match="no longer here"):
         uploads.motion(found.id, 0)
-    other = uploads.folder(bring(uploads, "bends.score", SCORE.encode()).id)
+    other = uploads.folder(bring(uploads, "bends.score", TITLED.encode()).id)
     uploads.close()
     assert not other.exists()
 
@@ -207,7 +198,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
     "a score without end": (
         "endless.score",
         lambda: (
-            SCORE.partition("clip")[0].encode()
+            TITLED.partition("clip")[0].encode()
             + b"phrase q0 (W)\n  1 | W\n"
             + b"".join(b"phrase q%d (W)\n  q%d (W W)\n" % (i, i - 1) for i in range(1, 40))
             + b"clip c\n  start | stand\n  q39 (stand)\n"
@@ -242,12 +233,12 @@ def test_no_file_does_harm(uploads: Uploads, kind: str) -> None:
     ],
 )
 def test_a_score_names_no_files_of_this_machine(uploads: Uploads, line: str, words: str) -> None:
-    found = bring(uploads, "nosy.score", f"{line}\n{SCORE}".encode())
+    found = bring(uploads, "nosy.score", f"{line}\n{TITLED}".encode())
     assert found.error == f"nosy.score:1: {words}"
 
 
 def test_scores_take_in_others_that_were_brought(uploads: Uploads) -> None:
-    words, phrases = SCORE.partition("clip")[0], "include words.score\nphrase dip\n  1 | bend\n"
+    words, phrases = TITLED.partition("clip")[0], "include words.score\nphrase dip\n  1 | bend\n"
     top = "include ../steps/phrases.score\nclip two\n  start | stand\n  dip\n  1 | stand\n"
     first = bring(uploads, "top.score", top.encode())
     assert first.error == "top.score:1: takes in phrases.score: bring that score, too"
@@ -263,7 +254,7 @@ def test_scores_take_in_others_that_were_brought(uploads: Uploads) -> None:
     assert [one.name for one in found.facts.clips] == ["two"]
     wrong = bring(uploads, "wrong.score", b"include words.score\nclip three\n  start | leap\n")
     assert wrong.error.startswith("wrong.score:3: ")
-    itself = bring(uploads, "itself.score", b"include itself.score\n" + SCORE.encode())
+    itself = bring(uploads, "itself.score", b"include itself.score\n" + TITLED.encode())
     assert "includes itself" in itself.error
 
 
@@ -296,7 +287,7 @@ def test_a_file_that_is_too_large_leaves_nothing(uploads: Uploads, monkeypatch: 
 def test_a_file_that_takes_too_long_is_given_up(uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SECONDS", 0.01)
     monkeypatch.setattr(module, "_GRACE", 0.0)
-    found = bring(uploads, "bends.score", SCORE.encode())
+    found = bring(uploads, "bends.score", TITLED.encode())
     assert "took longer" in found.error
 
 

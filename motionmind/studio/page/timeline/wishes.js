@@ -64,22 +64,17 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     </label>
     <div class="stack">
       <h3>Passes these postures</h3>
-      <ul class="wishes-list">
-        ${ask.passing.map(
-          (one, i) => html`<li key=${`${i} ${one.posture}`} class="row">
-            <img alt="" src=${thumbnail(one.posture, one.frame)} />
-            <span class="grow cut">${postures.find(({ key }) => key === one.posture)?.name ?? nameOf(one)}</span>
-            <button
-              class="button"
-              aria-label=${`Remove posture ${i + 1}`}
-              disabled=${locked}
-              onClick=${() => does.edit(wish(seam, { passing: without(ask.passing, i) }))}
-            >
-              Remove
-            </button>
-          </li>`,
-        )}
-      </ul>
+      <${Wished}
+        rows=${ask.passing.map((one, i) => ({
+          key: one.posture,
+          picture: thumbnail(one.posture, one.frame),
+          words: postures.find(({ key }) => key === one.posture)?.name ?? nameOf(one),
+          label: `Remove posture ${i + 1}`,
+        }))}
+        action="Remove"
+        locked=${locked}
+        onAction=${(index) => does.edit(wish(seam, { passing: without(ask.passing, index) }))}
+      />
       <div class="row">
         <select
           class="grow"
@@ -97,21 +92,16 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     </div>
     <div class="stack">
       <h3>Hands and feet that stay</h3>
-      <ul class="wishes-list">
-        ${ask.pins.map(
-          (pin, i) => html`<li key=${`${i} ${pin.joint}`} class="row">
-            <span class="grow cut">${plain(pin.joint)} ${HOLDS[pin.hold]}</span>
-            <button
-              class="button"
-              aria-label=${`Let go of the ${plain(pin.joint)}`}
-              disabled=${locked}
-              onClick=${() => does.edit(wish(seam, { pins: without(ask.pins, i) }))}
-            >
-              Let go
-            </button>
-          </li>`,
-        )}
-      </ul>
+      <${Wished}
+        rows=${ask.pins.map((pin) => ({
+          key: pin.joint,
+          words: `${plain(pin.joint)} ${HOLDS[pin.hold]}`,
+          label: `Let go of the ${plain(pin.joint)}`,
+        }))}
+        action="Let go"
+        locked=${locked}
+        onAction=${(index) => does.edit(wish(seam, { pins: without(ask.pins, index) }))}
+      />
       <div class="row">
         <select
           class="grow"
@@ -138,6 +128,19 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       </div>
     </div>
   </section>`;
+}
+
+/** A list of what is wished, each with a button that takes it back. */
+function Wished({ rows, action, locked, onAction }) {
+  return html`<ul class="wishes-list">
+    ${rows.map(
+      ({ key, picture, words, label }, i) => html`<li key=${`${i} ${key}`} class="row">
+        ${picture && html`<img alt="" src=${picture} />`}
+        <span class="grow cut">${words}</span>
+        <button class="button" aria-label=${label} disabled=${locked} onClick=${() => onAction(i)}>${action}</button>
+      </li>`,
+    )}
+  </ul>`;
 }
 
 /** Named postures of the corpus, and saved ones: [{key, name}]. */
