@@ -12,6 +12,7 @@ from motionmind.body.skeleton import Skeleton
 
 BEYOND = 5.0  # degrees past a limit from which a posture breaks it
 RARE = 0.01  # share of postures that may break a limit
+_BLOCK = 4096  # postures whose angles are looked at at a time
 
 
 def within_limits(
@@ -55,7 +56,9 @@ def find_loose(skeleton: Skeleton, rotations: Floats) -> Bools:
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return np.zeros(len(skeleton), dtype=np.bool_)
-    degrees = anatomy.degrees(rotations)
     least, most = anatomy.limits
-    beyond = np.any((degrees < least - BEYOND) | (degrees > most + BEYOND), axis=-1)
-    return np.asarray(beyond.mean(axis=0) > RARE)
+    counts = np.zeros(len(skeleton), dtype=np.int64)
+    for start in range(0, len(rotations), _BLOCK):
+        degrees = anatomy.degrees(rotations[start : start + _BLOCK])
+        counts += np.any((degrees < least - BEYOND) | (degrees > most + BEYOND), axis=-1).sum(axis=0)
+    return np.asarray(counts / len(rotations) > RARE)

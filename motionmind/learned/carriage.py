@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.learned.clusters import clusters_of
 from motionmind.learned.neighbours import MANY, Neighbours, build_neighbours
+from motionmind.learned.sampled import BLOCK
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
 LEAVES = 0.06  # metres that a body's lowest point is off the floor in the air, at least; as long as it moves
@@ -72,7 +74,9 @@ class Carriage:
 
 def learn_carriage(corpus: Corpus) -> Carriage:
     """Learn how the bodies of a corpus hold themselves, travel and stand."""
-    low = lowest_height(corpus.skeleton, corpus.rotations, corpus.root)
+    low = np.concatenate(
+        [lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here]) for here in _blocks(len(corpus))]
+    )
     floor = [floor_height(low[clip.start : clip.stop]) for clip in corpus.clips]
     clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
@@ -80,8 +84,7 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     heading = rot.heading(corpus.rotations[:, 0])
     turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
     moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
-    chains = corpus.to_chains(corpus.rotations)
-    orientations = np.concatenate([chains, rot.normalise(rot.slerp(chains[begins], chains[ends], 0.5))])
+    orientations = _orientations(corpus)
     middles = len(corpus) + np.arange(len(begins))
     stands = _standing(corpus)
     clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
@@ -106,10 +109,26 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     )
 
 
+def _blocks(count: int) -> Iterator[slice]:
+    """Yield slices of BLOCK from 0 to a count: what is measured of all postures at once would fill the memory."""
+    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+
+
+def _orientations(corpus: Corpus) -> Floats:
+    """Return the orientations of the chains in the postures, and midway in the moves [N + M, L, 4]."""
+    count, begins, ends = len(corpus), corpus.moves.begins, corpus.moves.ends
+    out = np.empty((count + len(begins), len(corpus.chains), 4))
+    for here in _blocks(count):
+        out[:count][here] = corpus.to_chains(corpus.rotations[here])
+    for here in _blocks(len(begins)):
+        out[count:][here] = rot.normalise(rot.slerp(out[begins[here]], out[ends[here]], 0.5))
+    return out
+
+
 def _touching(corpus: Corpus) -> Floats:
     """Return how deep pairs of limbs are in each other [P], metres, in all but RARE postures."""
-    depths = penetration(corpus.skeleton, corpus.rotations)
-    return np.array([np.quantile(depth, 1.0 - RARE) for depth in depths.values()])
+    blocks = [penetration(corpus.skeleton, corpus.rotations[here]) for here in _blocks(len(corpus))]
+    return np.array([np.quantile(np.concatenate([depths[k] for depths in blocks]), 1.0 - RARE) for k in blocks[0]])
 
 
 def _standing(corpus: Corpus) -> Floats:
@@ -119,22 +138,29 @@ def _standing(corpus: Corpus) -> Floats:
     moves that begin and end there.
     """
     begins, ends = corpus.moves.begins, corpus.moves.ends
-    places = corpus.skeleton.positions_and_tips(corpus.rotations, corpus.root)
     limb = limb_of_points(corpus.skeleton)
     out = np.ones((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
     counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
-    for number in range(out.shape[1]):
-        points = places[:, limb == number]
-        if not points.shape[1]:
-            continue  # every joint belongs to a limb
-        lowest = np.argmin(points[begins, :, 1] + points[ends, :, 1], axis=1)
-        moved = points[ends, lowest] - points[begins, lowest]
-        speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds
-        still = 1.0 / (1.0 + (speed / SLIDES) ** 2)
-        out[len(corpus) :, number] = still
+    for here in _blocks(len(begins)):
+        before, after = (
+            corpus.skeleton.positions_and_tips(corpus.rotations[of[here]], corpus.root[of[here]])
+            for of in (begins, ends)
+        )
+        for number in np.unique(limb):  # where every joint belongs to a limb, none is the trunk's
+            moved = _lowest_moved(before[:, limb == number], after[:, limb == number])
+            speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds[here]
+            out[len(corpus) :, number][here] = 1.0 / (1.0 + (speed / SLIDES) ** 2)
+    for number in np.unique(limb):
+        still = out[len(corpus) :, number]
         sums = np.bincount(begins, still, len(corpus)) + np.bincount(ends, still, len(corpus))
         out[: len(corpus), number] = sums / counts
     return out
+
+
+def _lowest_moved(before: Floats, after: Floats) -> Floats:
+    """Return how far the lowest of some points moves [n, 3], from where they are `before` to `after` [n, P, 3]."""
+    lowest, rows = np.argmin(before[..., 1] + after[..., 1], axis=1), np.arange(len(before))
+    return np.asarray(after[rows, lowest] - before[rows, lowest])
 
 
 def _aloft(corpus: Corpus, clearance: Floats) -> Floats:
@@ -147,9 +173,13 @@ def _aloft(corpus: Corpus, clearance: Floats) -> Floats:
         clearance: height of the lowest point above the floor in the moments [N], metres.
     """
     begins, ends, size = corpus.moves.begins, corpus.moves.ends, size_of(corpus.skeleton)
-    places, _ = contact_points(corpus.skeleton, corpus.rotations, corpus.root)
-    lowest = np.argmin(places[begins, :, 1] + places[ends, :, 1], axis=1)
-    speed = np.linalg.norm(places[ends, lowest] - places[begins, lowest], axis=-1) / corpus.moves.seconds
+    speed = np.empty(len(begins))
+    for here in _blocks(len(begins)):
+        before, after = (
+            contact_points(corpus.skeleton, corpus.rotations[of[here]], corpus.root[of[here]])[0]
+            for of in (begins, ends)
+        )
+        speed[here] = np.linalg.norm(_lowest_moved(before, after), axis=-1) / corpus.moves.seconds[here]
     both, twice = np.concatenate([begins, ends]), np.concatenate([speed, speed])
     counts = np.maximum(np.bincount(both, minlength=len(corpus)), 1)
     speeds = np.concatenate([np.bincount(both, twice, len(corpus)) / counts, speed])
@@ -165,14 +195,32 @@ def _overhang(corpus: Corpus, stands: Floats, aloft: Floats) -> Floats:
         aloft: whether the body is in the air there [N].
     """
     size = size_of(corpus.skeleton)
-    mass = centre_of_mass(corpus.skeleton, corpus.rotations, corpus.root)
-    low = limb_heights(corpus.skeleton, corpus.rotations, corpus.root)
-    bears = (low <= low.min(axis=1, keepdims=True) + NEAR * size) & (stands > FIRM) & (aloft == 0.0)[:, None]
+    found = [_overhangs(corpus, here, stands[here], aloft[here]) for here in _blocks(len(corpus))]
+    over = np.concatenate(found)
+    if not len(over):
+        return np.array([USUAL * size])
+    return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
+
+
+def _overhangs(corpus: Corpus, here: slice, stands: Floats, aloft: Floats) -> Floats:
+    """Return how far beyond its support the body has its mass in those of some postures in which one limb bears it [n].
+
+    None of a body whose masses are not known.
+
+    Args:
+        corpus: the movement.
+        here: which postures.
+        stands: how firmly each limb, and last the trunk, stands in them [T, limbs + 1].
+        aloft: whether the body is in the air there [T].
+    """
+    body, rotations, root = corpus.skeleton, corpus.rotations[here], corpus.root[here]
+    mass, near = centre_of_mass(body, rotations, root), NEAR * size_of(body)
+    low = limb_heights(body, rotations, root)
+    bears = (low <= low.min(axis=1, keepdims=True) + near) & (stands > FIRM) & (aloft == 0.0)[:, None]
     alone = bears.sum(axis=1) == 1
     if mass is None or not alone.any():
-        return np.array([USUAL * size])
-    places, joints = contact_points(corpus.skeleton, corpus.rotations[alone], corpus.root[alone])
-    near = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
-    supports = near & bears[alone][:, limb_of_points(corpus.skeleton)[joints]]
-    over = overhang(places[..., [0, 2]], supports, mass[alone][:, [0, 2]])
-    return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])
+        return np.zeros(0)
+    places, joints = contact_points(body, rotations[alone], root[alone])
+    lowest = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + near
+    supports = lowest & bears[alone][:, limb_of_points(body)[joints]]
+    return overhang(places[..., [0, 2]], supports, mass[alone][:, [0, 2]])

@@ -65,6 +65,7 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
     if corpus.facing == "free":
         space, facing = _with_facing(space, orientations[:, -1])
         states = np.concatenate([states, facing[:, None]], axis=1)
+    del orientations  # as large as the corpus
     return learn_from_states(corpus, space, states)
 
 

@@ -168,17 +168,17 @@ def learn_pace(corpus: Corpus) -> Pace:
     usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
     greatest, slowest, rises = fastest, np.zeros(1), EVERYDAY[2]
     if steps:
-        speeds = np.concatenate(steps)
-        speeds *= FPS
-        rises = max(float(speeds[:, -1].max()), rises)
-        speeds = speeds[:, :-1]
-        each = np.stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]], axis=1)
+        rises = max(FPS * max(float(step[:, -1].max()) for step in steps), rises)
+        each = np.concatenate([_usual_parts(FPS * step, joints) for step in steps])
         usual = np.maximum(each.mean(axis=0), usual)
-        rare = np.percentile(speeds, RARE, axis=0)
+        # Part by part, for all at once are as large as the corpus.
+        parts = ([FPS * step[:, part] for step in steps] for part in range(joints + 2))
+        summed = [(np.percentile(speeds, RARE), speeds.max()) for speeds in map(np.concatenate, parts)]
+        rare, most = np.array(summed, dtype=np.float64).T
         median = float(np.median(rare[:joints]))
         least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
         fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
-        greatest = np.maximum(speeds.max(axis=0), fastest)
+        greatest = np.maximum(most, fastest)
         seconds = [over_seconds(FPS * step[:, :joints].mean(axis=1), FPS) for step in steps]
         slowest = np.percentile(np.concatenate(seconds), [100.0 - RARE])
     lulls, windows = np.ones(len(corpus)), [_NO_WINDOWS]
@@ -191,6 +191,11 @@ def learn_pace(corpus: Corpus) -> Pace:
     danced = [part for clip, step in zip(clips, steps, strict=True) for part in _danced(clip, step)]
     peaks = _peaks(danced, np.append(fastest, EVERYDAY[2]), np.append(greatest, rises))
     return Pace(usual, fastest, greatest, slowest, peaks, lulls, _fit(*map(np.concatenate, zip(*windows, strict=True))))
+
+
+def _usual_parts(speeds: Floats, joints: int) -> Floats:
+    """Return the speeds of the mean joint, of the body's turning and of its travel [T, 3], from those of all parts."""
+    return np.column_stack([speeds[:, :joints].mean(axis=1), speeds[:, joints], speeds[:, joints + 1]])
 
 
 def steps_of(motion: Motion) -> Floats:

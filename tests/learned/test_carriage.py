@@ -48,3 +48,21 @@ def test_a_posture_faces_within_half_a_step_of_its_state() -> None:
     learned = learn(corpus, Codebook(15.0))
     off = learned.space.distance(corpus.to_chains(corpus.rotations), learned.states)
     assert off[:, -1].max() <= 180.0 / learned.space.sizes[-1] + 1e-6
+
+
+def test_carriage_is_the_same_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    clips = []
+    for name, count in (("one", 23), ("other", 11)):
+        rotations = rot.exp(np.cumsum(rng.normal(0.0, 0.2, (count, 23, 3)), axis=0))
+        root = np.array([0.0, 0.9, 0.0]) + np.cumsum(rng.normal(0.0, 0.03, (count, 3)), axis=0)
+        clips.append(Motion(human23(), rotations, root, 0.2 * np.arange(count), name))
+    corpus = gather("wandering", clips, reverse=1.0)
+    whole = learn_carriage(corpus)
+    assert whole.loose.any()
+    assert not whole.loose.all()
+    for size in (1, 7):
+        monkeypatch.setattr("motionmind.learned.carriage.BLOCK", size)
+        monkeypatch.setattr("motionmind.body.limits._BLOCK", size)
+        for name, array in vars(learn_carriage(corpus)).items():
+            np.testing.assert_array_equal(array, getattr(whole, name), err_msg=name)
