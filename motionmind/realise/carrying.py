@@ -1,8 +1,8 @@
 """Carrying: the root's trajectory as what bears the body carries it, smoothly and in balance.
 
 It is a least-squares solution, found in a few rounds, for some of its rows depend on where the root is: legs that are
-too short, parts that would be in the floor, weight that is beyond its support. Standard deviations say what is worth
-what; they were chosen on cmu-05 and ballet.
+too short, parts that would be in the floor, weight that is beyond its support. Rows are those of
+`motionmind.realise.root_rows`, `balance` and `flight`.
 """
 
 from __future__ import annotations
@@ -16,29 +16,25 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
-from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import SETTLES, Foot, bend_legs, departure, fade_at_ends, pose, softness
+from motionmind.realise.feet import Foot, bend_legs, departure, fade_at_ends, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
-from motionmind.realise.knees import bend_of, cover, smoothed
-from motionmind.realise.least_squares import Rows, difference_rows, position_rows, solve
-from motionmind.realise.legs import SOFT
+from motionmind.realise.knees import cover, smoothed
+from motionmind.realise.least_squares import solve
+from motionmind.realise.root_rows import (
+    hurry_rows,
+    knee_rows,
+    legs_to_places,
+    prior_rows,
+    reach_rows,
+    smooth_rows,
+    standing_rows,
+    sunk_rows,
+)
 
-HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
-RIGID = 0.004  # metres that a part which is no foot is off the floor
 DETAIL = 0.2  # seconds within which the root smooths the fine detail that it carries; chosen on indian and cmu-05
-REACH = 0.002  # metres by which a leg is too short
-LEANS = 0.08  # metres that a leg leans more than the movement has it when it may not be straight
-PLACE = 0.08  # metres that a standing leg leans more than the movement has it
-KNEE = 0.15  # radians that a standing leg's knee bends more or less than the movement has it; chosen on cmu-05
-STRAIGHT = 0.15  # radians: a knee that is straighter counts as bent so far, for it turns a leg's length into any bend
-PRIOR = 0.3  # metres off the trajectory that feet have the root on by themselves
-TRAVEL = 0.3, 0.03  # metres a second off that, where feet alone bear, and where other parts do
-PUSH = 2.0  # metres a second squared: accelerations of the centre of mass
-HURRY = 0.02  # metres a second by which a body travels faster than it may; chosen on cmu-05
-NEARLY = 0.9  # of that speed: from here on it is held to it
 TIPTOE = 0.12  # metres above the floor: a body that is no higher at both ends, above one spot, stands there on one foot
 ROUNDS = 3, 2  # of placing feet, and of the root in each
 
@@ -141,15 +137,15 @@ def carry(
             if falls is not None:
                 bearing = find_bearing(*planned, falls)
         mass = _mass(skeleton, posed)
-        steady = _smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
-        steady += _prior_rows(root, bearing, fps)
-        steady += _standing_rows(shape, bearing, floor, freedom)
+        steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
+        steady += prior_rows(root, bearing, fps)
+        steady += standing_rows(shape, bearing, floor, freedom)
         steady += flight_rows(flights, mass, standing, gravity, fps)
         for _ in range(ROUNDS[1]):
-            rows = [*steady, _sunk_rows(shape, floor, start), _hurry_rows(start, travels, fps)]
-            legs = _legs(skeleton, own.places, shape, bearing, floor, start, feet)
-            rows += _reach_rows(skeleton, legs, bearing, start, feet, fps)
-            rows += _knee_rows(skeleton, legs, bearing, start, feet, freedom)
+            rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
+            legs = legs_to_places(skeleton, own.places, shape, bearing, floor, start, feet)
+            rows += reach_rows(skeleton, legs, bearing, start, feet, fps)
+            rows += knee_rows(skeleton, legs, bearing, start, feet, freedom)
             if balances:
                 points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
                 centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
@@ -268,167 +264,3 @@ def _points_on_floor(shape: Shape, bearing: Bearing, root: Floats) -> Floats:
     for number, foot_points in enumerate(shape.feet):
         points[:, foot_points] += (bearing.targets[:, number] - root[:, [0, 2]])[:, None]
     return np.asarray(points)
-
-
-def _prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
-    """Return rows for being, and moving, as on the trajectory that feet have the root on by themselves [N, 3]."""
-    count = len(prior)
-    rests = np.minimum(bearing.others.max(axis=1, initial=0.0), 1.0)
-    share = 0.5 * (rests[1:-1] + rests[:-2])
-    travel = (1.0 - share) * TRAVEL[0] ** -2.0 + share * TRAVEL[1] ** -2.0
-    rows = []
-    for axis in (0, 2):
-        rows.append(_axis_rows(axis, prior[:, axis], np.full(count, PRIOR**-2.0)))
-        rows.append(difference_rows(axis, (-fps, fps, 0.0), fps * np.diff(prior[:-1, axis]), travel))
-    return rows
-
-
-def _hurry_rows(root: Floats, travels: float, fps: float) -> Rows:
-    """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second."""
-    moved = fps * np.diff(root, axis=0) * np.array([1.0, 0.0, 1.0])
-    speed = np.linalg.norm(moved, axis=1)
-    along = moved / np.maximum(speed, 1e-9)[:, None]
-    # Rows look at three frames: each at its first two, and the last one at its last two.
-    first = np.minimum(np.arange(len(along)), len(root) - 3)
-    coefficients = np.zeros((len(along), 9))
-    coefficients[:, :6] = fps * np.concatenate([-along, along], axis=1)
-    coefficients[-1] = np.roll(coefficients[-1], 3)
-    weights = np.where(speed > NEARLY * travels, HURRY**-2.0, 0.0)
-    return Rows(first, coefficients, np.full(len(along), min(travels, 1e3)), weights)
-
-
-def _smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:
-    """Return rows for the accelerations of the centre of mass, `mass` [N, 3] relative to the root.
-
-    At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
-    """
-    rows, last = [], len(prior) - 3
-    for axis, share in enumerate((1.0, vertical, 1.0)):
-        weights = np.full(last + 1, share * PUSH**-2.0)
-        bends = -(fps**2) * np.diff(mass[:, axis], 2)
-        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), bends, weights))
-        for first, shares in ((0, (-(fps**2), fps**2, 0.0)), (last, (0.0, -(fps**2), fps**2))):
-            leaves = prior[first : first + 3, axis] @ np.array(shares)
-            row = difference_rows(axis, shares, np.array([leaves]), weights[:1])
-            rows.append(row._replace(first=np.array([first])))
-    return rows
-
-
-def _standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:
-    """Return rows for what bears to be on the floor, and for standing legs not to lean elsewhere."""
-    rows = []
-    height = (HEIGHT[0] ** (1.0 - freedom) * HEIGHT[1] ** freedom) ** -2.0
-    for number in range(shape.low.shape[1]):
-        load = bearing.loads[:, number]
-        rows.append(_axis_rows(1, floor - shape.low[:, number], load * height))
-        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], load * PLACE**-2.0) for axis in (0, 2)]
-    for part in np.flatnonzero(np.isfinite(shape.low_others[0])):
-        rows.append(_axis_rows(1, floor - shape.low_others[:, part], bearing.others[:, part] * RIGID**-2.0))
-    # Where nothing bears, or hardly, the lowest point is near the floor.
-    rows.append(_axis_rows(1, floor - shape.lowest, np.full(len(floor), 0.01) * height))
-    return rows
-
-
-def _sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
-    """Return rows that lift parts other than feet out of the floor, where the root [N, 3] has them in it."""
-    height = floor - shape.low_others.min(axis=1, initial=np.inf)
-    sunk = root[:, 1] < height
-    return _axis_rows(1, np.where(sunk, height, 0.0), np.where(sunk, RIGID**-2.0, 0.0))
-
-
-def _reach_rows(
-    skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    fps: float,
-) -> list[Rows]:
-    """Return rows that bring the root [N, 3] near enough to feet that stand farther than their legs reach.
-
-    A leg may be as long as the movement has it; leaning elsewhere, not quite straight.
-
-    Args:
-        skeleton: the body.
-        legs: each leg in the movement, and as long as it must be, as `_legs` returns them.
-        bearing: what bears it.
-        root: positions of the root [N, 3], metres.
-        feet: its feet.
-        fps: frames a second.
-    """
-    rows, every = [], np.arange(len(root))
-    within = np.minimum(np.minimum(every, every[::-1]) / (SETTLES * fps), 1.0)
-    for number, foot in enumerate(feet):
-        own, leg = legs[number]
-        leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
-        length = foot.length(skeleton)
-        straight = rot.norm(own) / length
-        longest = length * np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
-        far = rot.norm(leg)
-        along = leg / np.maximum(far, 1e-9)[:, None]
-        short = (far > longest + 1e-6) & bearing.stands[:, number]
-        target = np.sum(along * root, axis=-1) + far - longest
-        rows.append(position_rows(every, along, target, np.where(short, (within / REACH) ** 2, 0.0)))
-    return rows
-
-
-def _knee_rows(
-    skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    freedom: Floats,
-) -> list[Rows]:
-    """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `_reach_rows`.
-
-    A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
-    then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
-    """
-    rows, every = [], np.arange(len(root))
-    for number, foot in enumerate(feet):
-        own, leg = legs[number]
-        thigh, shank = foot.bones(skeleton)
-        was, far = rot.norm(own), rot.norm(leg)
-        bends = np.maximum(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
-        lever = far / (thigh * shank * np.sin(bends))  # radians that the knee bends a metre of the leg's length
-        along = lever[:, None] * leg / np.maximum(far, 1e-9)[:, None]
-        target = np.sum(along * root, axis=-1) + lever * (far - was)
-        rows.append(position_rows(every, along, target, bearing.loads[:, number] * (1.0 - freedom) * KNEE**-2.0))
-    return rows
-
-
-def _legs(
-    skeleton: Skeleton,
-    places: Floats,
-    shape: Shape,
-    bearing: Bearing,
-    floor: Floats,
-    root: Floats,
-    feet: list[Foot],
-) -> list[tuple[Floats, Floats]]:
-    """Return each leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place.
-
-    Args:
-        skeleton: the body.
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
-        shape: the body.
-        bearing: what bears it.
-        floor: height of the floor [N], metres.
-        root: positions of the root [N, 3], metres.
-        feet: its feet.
-    """
-    out = []
-    for number, foot in enumerate(feet):
-        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
-        own = end - hip
-        leg = own - root
-        leg[:, [0, 2]] += bearing.targets[:, number]
-        leg[:, 1] += floor - shape.low[:, number]
-        out.append((own, leg))
-    return out
-
-
-def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
-    """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    return position_rows(np.arange(len(targets)), np.eye(3)[axis], targets, weights)
