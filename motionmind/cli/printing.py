@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from motionmind.tween.what_if import WhatIf
 
 
-_NAME = 24  # characters of a posture's name in a table
 _FEW = 3  # warnings that are printed without --details
 
 
@@ -235,94 +234,6 @@ def print_alternatives(results: Sequence[Tween], files: Sequence[Path], *, with_
                 f"{len(result.bridges):7}"
             )
     print_written(files)
-
-
-def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
-    """Print the report of a variation: how it was made, then a line for each stretch of the piece and its seam.
-
-    Args:
-        report: the report, as plain values.
-        names: a name for each of the piece's postures [N].
-    """
-    course, counts = report["course"], report["counts"]
-    values = ", ".join(f"{name} {value:g}" for name, value in course["parameters"].items())
-    nudge = ", ".join(f"{x:g}" for x in course["nudge"])
-    click.echo(
-        f"{displayed(report['piece']['name']) or 'piece'}, {count(report['piece']['postures'], 'posture')}, "
-        f"by {course['flow']} ({values}), nudge {nudge}, skip {course['skip']}"
-    )
-    click.echo(
-        f"Lyapunov exponent {course['exponent']:.2g}: trajectories part by {course['parting']:.2g} nats a posture"
-    )
-    seams = f"{count(counts['seams'], 'seam')} ({counts['departed']:.0%} of steps)"
-    click.echo(
-        f"{count(counts['postures'], 'posture')}, {seams}: {counts['inserted']} with an insertion, "
-        f"{counts['attested']} attested, {counts['abrupt']} abrupt, {counts['unjudged']} not judged"
-    )
-    if counts["inserted"]:
-        click.echo(f"{counts['inserted_share']:.0%} of the time is inserted")
-    if report["limits"]:
-        own = f"the trajectory's own order leaves the piece in {course['departed']:.0%} of steps"
-        click.echo(f"{_format_limits(report['limits'])}; {own}")
-    if counts["stays"]:
-        click.echo(format_stillness(counts))
-    begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
-    ends = [*(seam["at"] for seam in report["seams"]), counts["postures"] - 1]
-    spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
-    named = [_format_names(names[first], names[last]) for first, last in spans]
-    width = max(map(len, named))
-    click.echo(f"seam  postures   of the piece  {'named':{width}}  decision   transition")
-    for seam, first, last, span, name in zip([None, *report["seams"]], begins, ends, spans, named, strict=True):
-        here, there = _format_stretch(first, last), _format_stretch(*span)
-        row = f"{seam['number'] if seam else '':>4}  {here:9}  {there:12}   {name:{width}}"
-        decision = seam["decision"] if seam and (seam["breaks"] or seam["decision"] != "open") else ""
-        click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
-
-
-def _format_limits(limits: dict[str, Any]) -> str:
-    """Format what a variation was kept within: "kept within 30% inserted, in stretches of 4 postures at least"."""
-    share = "" if limits["inserted"] is None else f"within {limits['inserted']:.0%} inserted, "
-    return f"kept {share}in stretches of {count(limits['stretch'], 'posture')} at least"
-
-
-def format_stillness(counts: dict[str, Any]) -> str:
-    """Format how many of a variation's steps stay in their posture, and how long: "32 of 79 steps stay, 6.4 s"."""
-    stays, steps = counts["stays"], count(counts["postures"] - 1, "step")
-    return f"{stays} of {steps} stay{'s' * (stays == 1)}, {counts['seconds_still']:.1f} s"
-
-
-def _format_stretch(first: int, last: int) -> str:
-    return str(first) if first == last else f"{first}..{last}"
-
-
-def _format_names(first: str, last: str) -> str:
-    """Format the names of the first and the last posture of a stretch: "fifth..tendu", "adagio@3..17"."""
-    one, other = (displayed(name, _NAME) for name in (first, last))
-    clip, at, frame = other.rpartition("@")
-    return one if first == last else f"{one}..{frame if at and one.startswith(f'{clip}@') else other}"
-
-
-def _format_transition(seam: dict[str, Any]) -> str:
-    """Describe a seam: attested, abrupt, or smoothed by an insertion, and why."""
-    if seam["corpus"] is None:
-        return "not judged"
-    if not seam["breaks"]:
-        return f"attested by {displayed(seam['corpus'])}"
-    ordered = sorted(seam["breaks"], key=lambda one: -float(one["degrees"]))
-    worst, others = ordered[0], [displayed(one["joint"]) for one in ordered[1:]]
-    faults = ["not attested"] * (not worst["attested"]) + ["too fast"] * worst["fast"]
-    why = f"{displayed(worst['joint'])} {worst['degrees']:.0f} degrees, {' and '.join(faults)}"
-    if not seam["candidates"]:
-        state = "no path found" if seam["failure"] else "not smoothed"
-        return f"abrupt, {state}: {', '.join([why, *others])}"
-    why += f", and {len(others)} more" * bool(others)
-    best = seam["candidates"][seam["chosen"] - 1]
-    tween = (
-        f"{count(best['moves'], 'move')} in {best['seconds']:.2f} s, {best['status']}, {best['attested']:.0%} attested"
-    )
-    bridges = f", {count(len(best['bridges']), 'bridge')}" * bool(best["bridges"])
-    insertion = f"{tween}{bridges}, {seam['chosen']} of {len(seam['candidates'])}"
-    return f"abrupt, was {insertion}: {why}" if seam["decision"] == "discarded" else f"{insertion}: {why}"
 
 
 def _format_origin(corpus: str, is_mirrored: bool, is_reversed: bool) -> str:

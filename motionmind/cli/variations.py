@@ -13,13 +13,8 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import EVEN, MOVEMENT, check_outputs, note_licences, write
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, given_option, option, output, outputs, reading
-from motionmind.cli.printing import (
-    Interruption,
-    format_stillness,
-    note,
-    print_review,
-    print_written,
-)
+from motionmind.cli.printing import Interruption, note, print_written
+from motionmind.cli.review_tables import print_advice, print_review
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
@@ -37,9 +32,6 @@ if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
     from motionmind.variation.piece import Piece
     from motionmind.variation.variation import Variation
-
-_MUCH = 0.3  # share of the time beyond which insertions are much
-_STILL = 0.25  # share of steps that stay, beyond which a variation seems to stand still
 
 
 @command("motionmind vary macarena --attractor rossler --inserted 0.3 -o variation.json")
@@ -237,7 +229,7 @@ def vary(
     depart = trajectory["depart"]
     if not variation.kept:  # whose limits come first
         depart = share_sought(nudge, depart, trajectory["start"])
-    _print_advice(variation, engine, depart)
+    print_advice(variation, engine, depart)
     if not as_json:
         print_written([path for path, _ in files])
     if interruption.is_requested:
@@ -383,27 +375,3 @@ def _write(outputs: Sequence[Path], report: Path | None, variation: Variation, f
             told = variation.report() | {"motion_sha256": motion_sha256}
             write_atomically(report, f"{json.dumps(told)}\n".encode())
     return motion_sha256
-
-
-def _print_advice(variation: Variation, engine: Engine | None, depart: float | None) -> None:
-    """Note what to change if a variation is not what was asked for, or not what one would want."""
-    from motionmind.variation.departure import WITHIN, departure
-
-    reached = departure(variation.first_order)
-    if depart is not None and abs(reached - depart) > WITHIN:
-        note(f"no nudge was found by which {depart:.0%} of steps leave the piece's order; the nearest is {reached:.0%}")
-    counts = variation.report()["counts"]
-    limits = variation.kept.limits if variation.kept else None
-    if not variation.seams and limits:
-        note("within its limits the variation does not leave the piece's order: allow more by --inserted or --stretch")
-    elif not variation.seams:
-        note("the variation does not leave the piece's order: try --depart 0.25, or a larger --length")
-    elif engine is None:
-        note("no corpus says which transitions are abrupt, so none is smoothed: name one by --corpus")
-    share = counts["inserted_share"]
-    if limits is None and share > _MUCH:
-        note(f"insertions take {share:.0%} of the time: --inserted {_MUCH:g} keeps more of the piece")
-    if limits and limits.inserted is not None and share > limits.inserted:
-        note(f"no order was found with {limits.inserted:.0%} of the time inserted at most; this one has {share:.0%}")
-    if counts["stays"] > _STILL * (counts["postures"] - 1):
-        note(f"{format_stillness(counts)}: try another --start, or a larger --skip or --step")
