@@ -168,11 +168,13 @@ def search() -> None:
 
 
 def realise() -> None:
-    """Realise moves of the corpus, which no search has to find; learn the corpus anew; search by A* alone."""
+    """Realise moves of the corpus, which no search has to find, by all its moments and by few; learn it anew; search by
+    A* alone."""
     import numpy as np
 
     from motionmind.body.motion import Velocity
     from motionmind.discretize import make_discretization
+    from motionmind.learned.neighbours import build_neighbours
     from motionmind.realise.detail import likest_moves
     from motionmind.realise.realise import realise as realise_path
     from motionmind.search import astar, trws
@@ -185,21 +187,25 @@ def realise() -> None:
     clip = engine.corpus.motion(engine.corpus.clips[0])
     path = engine.space.assign(engine.corpus.to_chains(clip.rotations))
     none = np.zeros(len(engine.space), dtype=np.bool_)
-    realise_path(
-        path,
-        clip.posture(0),
-        clip.posture(len(clip) - 1),
-        engine.corpus,
-        engine.grammar,
-        engine.carriage,
-        np.radians(engine.space.tolerances),
-        none,
-        none,
-        30.0,
-        leaving=Velocity.at_start(clip),
-        fastest=engine.pace.fastest,
-        peaks=engine.pace.peaks_in,
-    )
+    trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
+    for array in trees.arrays.values():
+        array.setflags(write=False)  # as those of a corpus that was loaded
+    for carriage in (engine.carriage, replace(engine.carriage, trees=trees)):
+        realise_path(
+            path,
+            clip.posture(0),
+            clip.posture(len(clip) - 1),
+            engine.corpus,
+            engine.grammar,
+            carriage,
+            np.radians(engine.space.tolerances),
+            none,
+            none,
+            30.0,
+            leaving=Velocity.at_start(clip),
+            fastest=engine.pace.fastest,
+            peaks=engine.pace.peaks_in,
+        )
     likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
     problem = _problem()
