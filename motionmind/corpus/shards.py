@@ -33,7 +33,7 @@ from motionmind.corpus.corpus import Clip, JointFlip
 from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
-from motionmind.executors.team import Team
+from motionmind.executors.team import Team, UnfinishedError
 from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
 
 _KEPT_AGAIN = 2.25  # bytes on disk for each of the shards': themselves, and the corpus with what is learned
@@ -118,8 +118,16 @@ class _Entry(msgspec.Struct, frozen=True):
 
 @contextmanager
 def shards_of(name: str, home: Path | None) -> Iterator[Path]:
-    """Hold the folder of a corpus's shards; remove it if the context ends well and no other build holds it."""
-    folder = (store.home(home) / "shards" / name).absolute()
+    """Hold the folder of a corpus's shards, until the context ends; then remove it, unless another build holds it.
+
+    It stays where the work may go on: after Ctrl-C, a full disk, or the loss of workers; not after bad input.
+
+    Raises:
+        CorpusError: it cannot be made.
+    """
+    place = store.home(home).absolute()
+    folder = place / "shards" / name
+    above = [folder.parent, *([] if place.exists() else [place])]
     there = False
     try:
         while not there:  # another build may have removed it before it was held
@@ -129,9 +137,19 @@ def shards_of(name: str, home: Path | None) -> Iterator[Path]:
                     yield folder
     except OSError as error:
         raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    except MotionMindError as error:
+        if not isinstance(error, UnfinishedError) and not isinstance(error.__cause__, OSError):
+            _remove(folder, above)
+        raise
+    _remove(folder, above)
+
+
+def _remove(folder: Path, above: Sequence[Path]) -> None:
+    """Remove shards that nobody holds, and the folders above them that they leave empty."""
     versions.remove_unused(folder)
-    with suppress(OSError):  # of other corpora, there may be some
-        folder.parent.rmdir()
+    with suppress(OSError):
+        for one in above:
+            one.rmdir()
 
 
 def take_files(
@@ -159,7 +177,7 @@ def take_files(
 
     Raises:
         CorpusError: no file can be read, the disk lacks space, or workers do not share it.
-        MotionMindError: workers die of a file again and again, or are out of reach.
+        UnfinishedError: workers die of a file again and again, or are out of reach.
     """
     code = store.fingerprint([])
     jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
@@ -229,7 +247,8 @@ def take_file(job: Job) -> Taken:
     """Take a file, unless its shard is there; return the shard's name, or why it cannot be taken.
 
     Raises:
-        CorpusError: the shard cannot be written, or this worker runs another version of the package.
+        UnfinishedError: the shard cannot be written.
+        CorpusError: this worker runs another version of the package.
     """
     if job.code != _code():
         raise CorpusError(
@@ -253,7 +272,7 @@ def take_file(job: Job) -> Taken:
                 replace_file(path, _encode(recordings, said, read))
             return Taken(key, path.stat().st_size)
         except OSError as error:
-            raise CorpusError(
+            raise UnfinishedError(
                 f"{path.parent}: cannot be written: {error.strerror or error}; what is done is kept, and the same "
                 "command goes on from there"
             ) from error

@@ -25,6 +25,10 @@ AHEAD = 3  # jobs under way for each worker
 _LOOK = 1.0  # seconds after which a team asks whether its workers are still there
 
 
+class UnfinishedError(MotionMindError):
+    """Work that was broken off by no fault of its input: what is done is kept, for the same command to go on from."""
+
+
 @dataclass(frozen=True, eq=False)
 class Team:
     """Workers, by the executor that hands them jobs.
@@ -49,7 +53,7 @@ class Team:
             jobs: taken as workers become free: a long or endless iterable fills no memory.
 
         Raises:
-            MotionMindError: workers die of a job again and again, or are out of reach; and what `function` raises.
+            UnfinishedError: workers die of a job again and again, or are out of reach; and what `function` raises.
         """
         waiting = iter(jobs)
         under_way: deque[tuple[_Job, Future[_Result]]] = deque()
@@ -95,7 +99,7 @@ class Team:
             except Exception:  # of the job itself: raised where its result is taken
                 pass
             return executor, future
-        raise MotionMindError(
+        raise UnfinishedError(
             f"{job}: a worker died of it {MOST_TIMES} times, alone; memory may lack, or a library has crashed"
         )
 
@@ -127,5 +131,5 @@ def _submit(executor: Executor, function: Callable[[_Job], _Result], job: _Job) 
         return failed
 
 
-def _gone(reason: str) -> MotionMindError:
-    return MotionMindError(f"{reason}; what is done is kept: the same command goes on from there")
+def _gone(reason: str) -> UnfinishedError:
+    return UnfinishedError(f"{reason}; what is done is kept: the same command goes on from there")

@@ -30,7 +30,7 @@ from motionmind.corpus.shards import Reading, Taken, shards_of, take_files
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
 from motionmind.executors.here import this_process
 from motionmind.executors.opening import open_team
-from motionmind.executors.team import Team
+from motionmind.executors.team import Team, UnfinishedError
 from motionmind.geometry import rotations as rot
 
 TAKING = Taking(mirror=True)
@@ -99,7 +99,7 @@ def test_the_same_corpus_on_a_cluster(files: dict[Path, str], tmp_path: Path) ->
     """Its workers' threads, too, take one file at a time each."""
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        2, threads_per_worker=2, dashboard_address=None, processes=False, protocol="tcp"
+        2, threads_per_worker=2, dashboard_address=":0", processes=False, protocol="tcp"
     ) as local:
         with open_team(scheduler=local.scheduler_address) as team:
             on_cluster = Client(tmp_path / "1", team).gather(files)
@@ -196,7 +196,7 @@ def test_a_full_disk_is_told_and_what_was_done_is_kept(
     write = shards.replace_file
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     monkeypatch.setattr(shards, "replace_file", failing_at(3, write, full))
-    with pytest.raises(CorpusError, match="No space left on device; what is done is kept"):
+    with pytest.raises(UnfinishedError, match="No space left on device; what is done is kept"):
         Client(tmp_path, this_process()).gather(files)
     assert len(list((tmp_path / "shards").rglob("*.npz"))) == 2
 

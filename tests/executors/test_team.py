@@ -21,7 +21,7 @@ from motionmind.errors import MotionMindError
 from motionmind.executors import cluster as clusters
 from motionmind.executors.here import this_process
 from motionmind.executors.opening import open_team
-from motionmind.executors.team import Team
+from motionmind.executors.team import Team, UnfinishedError
 
 distributed = pytest.importorskip("distributed")
 
@@ -55,7 +55,7 @@ def doze(number: int) -> int:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """The address of a local cluster of two workers."""
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
         yield local.scheduler_address
 
 
@@ -102,7 +102,7 @@ def test_a_job_that_always_ends_its_worker_is_named() -> None:
     with open_team(2) as team:
         results = team.map(die, range(5))
         assert [next(results), next(results)] == [0, 1]
-        with pytest.raises(MotionMindError, match=r"^2: a worker died of it 3 times, alone"):
+        with pytest.raises(UnfinishedError, match=r"^2: a worker died of it 3 times, alone"):
             next(results)
 
 
@@ -125,20 +125,20 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
 
 def test_a_cluster_that_goes_away_is_told() -> None:
     local = distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, processes=False, protocol="tcp"
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False, protocol="tcp"
     )
     with local, open_team(scheduler=local.scheduler_address) as team:
         results = team.map(doze, range(100))
         assert next(results) == 0
         local.close()
-        with pytest.raises(MotionMindError, match="what is done is kept: the same command goes on from there"):
+        with pytest.raises(UnfinishedError, match="what is done is kept: the same command goes on from there"):
             list(results)
 
 
 def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clusters, "_PATIENCE", 0.3)
     with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=None, processes=False, protocol="tcp") as local,
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0", processes=False, protocol="tcp") as local,
         pytest.raises(MotionMindError, match=r"tcp://\S+ the cluster has had no workers for 0\.3 s"),
         open_team(scheduler=local.scheduler_address),
     ):
