@@ -1,4 +1,5 @@
-"""python -m experiments [NAME ...] [--quick] [--tuning] [--workers N] [--data FOLDER] [--out FOLDER]
+"""python -m experiments [NAME ...] [--quick] [--tuning] [--workers N] [--scheduler ADDRESS] [--data FOLDER]
+                      [--out FOLDER]
 
 Without names it lists the questions; with --quick alone it tries all of those that it runs, in a few minutes, and
 writes nothing that stays. A whole run writes into the question's own folder. Recorded movement is looked for beside the
@@ -9,13 +10,15 @@ from __future__ import annotations
 
 import ast
 import tempfile
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import Executor
 from pathlib import Path
 
 import click
 
 from experiments import harness
+from motionmind.errors import MotionMindError
+from motionmind.executors.here import processes
+from motionmind.executors.opening import open_team
 
 
 @click.command(help=__doc__)
@@ -23,9 +26,18 @@ from experiments import harness
 @click.option("--quick", is_flag=True, help="A trial of each, on bundled movement alone; all of them if none is named.")
 @click.option("--tuning", is_flag=True, help="On the movement on which constants are chosen, alone; needs --out.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@click.option("--scheduler", help="A Dask cluster's, such as tcp://HOST:8786; its workers share this disk.")
 @click.option("--data", type=click.Path(file_okay=False, path_type=Path), help="Folder of recorded movement.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Write into NAME in this folder.")
-def main(names: tuple[str, ...], quick: bool, tuning: bool, workers: int, data: Path | None, out: Path | None) -> None:
+def main(
+    names: tuple[str, ...],
+    quick: bool,
+    tuning: bool,
+    workers: int,
+    scheduler: str | None,
+    data: Path | None,
+    out: Path | None,
+) -> None:
     known = harness.questions()
     if tuning and not (out or quick):
         raise click.UsageError("--tuning needs --out: what is reported is found on other movement")
@@ -39,14 +51,22 @@ def main(names: tuple[str, ...], quick: bool, tuning: bool, workers: int, data: 
     recorded = data or harness.HERE.parent.parent / "shared" / "data"
     setting = harness.Setting(quick, None if quick or not recorded.is_dir() else recorded, tuning)
     harness.single_threaded()
-    with (
-        tempfile.TemporaryDirectory() as trial,
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as executor,
-    ):
-        root = out or (Path(trial) if quick else harness.HERE)
-        for name in names or known:
-            rows = harness.answer(name, setting, executor, root / name)
-            click.echo(f"{name}: {len(rows)} rows" + (f", {root / name}" if root != Path(trial) else ""))
+    try:
+        with (
+            tempfile.TemporaryDirectory() as trial,
+            open_team(scheduler=scheduler) if scheduler else processes(workers) as team,
+        ):
+            run(names or tuple(known), setting, team.make(), out, Path(trial))
+    except MotionMindError as error:
+        raise click.ClickException(str(error)) from None
+
+
+def run(names: tuple[str, ...], setting: harness.Setting, executor: Executor, out: Path | None, trial: Path) -> None:
+    """Answer questions, and say where what was found is."""
+    root = out or (trial if setting.quick else harness.HERE)
+    for name in names:
+        rows = harness.answer(name, setting, executor, root / name)
+        click.echo(f"{name}: {len(rows)} rows" + (f", {root / name}" if root != trial else ""))
 
 
 def listed(known: list[str]) -> None:

@@ -42,6 +42,13 @@ def read_bytes(path: FilePath) -> bytes:
 
     A pipe gives its bytes once: in the context of `pipes_kept` they are kept for those who read it again.
     """
+    data = _read(path)
+    if (recorded := _recorded.get()) is not None:
+        recorded[str(Path(path).absolute())] = hashlib.sha256(data).hexdigest()
+    return data
+
+
+def _read(path: FilePath) -> bytes:
     kept = _kept.get()
     try:
         status = Path(path).stat()
@@ -70,6 +77,20 @@ def pipes_kept() -> Iterator[None]:
         yield
     finally:
         _kept.reset(token)
+
+
+_recorded: ContextVar[dict[str, str] | None] = ContextVar("recorded", default=None)
+
+
+@contextmanager
+def reads_recorded() -> Iterator[dict[str, str]]:
+    """Record which files are read in the context; yield the hash of each (SHA-256), by its absolute path."""
+    recorded: dict[str, str] = {}
+    token = _recorded.set(recorded)
+    try:
+        yield recorded
+    finally:
+        _recorded.reset(token)
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.files import clip_names, read, read_mapping
+from motionmind.cli.files import clip_names, read_mapping
 from motionmind.cli.options import (
     HOME,
     JSON,
@@ -23,7 +22,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import format_repairs, note, print_check, print_origins, progress
+from motionmind.cli.printing import count, format_repairs, note, print_check, print_origins, progress
 from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.warming import warm_once
@@ -32,11 +31,14 @@ from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from motionmind.body.motion import Motion
+    from motionmind.corpus.recordings import Recording
+    from motionmind.corpus.shards import Reading, Taken
+    from motionmind.executors.team import Team
 
 DETAILS = option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
 )
+_NOTEWORTHY = 1e8  # bytes on disk that are said beforehand
 _LINE = 300  # characters of a title, an author, a source: sentences rather than names
 
 
@@ -120,6 +122,14 @@ def corpora(context: click.Context) -> None:
     help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
+@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that cannot be read.")
+@option("--workers", section=Section.WORKERS, type=COUNT, metavar="N", default=1, help="Read with N processes.")
+@option(
+    "--scheduler",
+    section=Section.WORKERS,
+    metavar="ADDRESS",
+    help="Read with the workers of a Dask cluster, by its scheduler: tcp://HOST:8786. They share this disk.",
+)
 @DETAILS
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
@@ -148,6 +158,9 @@ def build(
     asf: Path | None,
     source_fps: float | None,
     details: bool,
+    workers: int,
+    scheduler: str | None,
+    strict_files: bool,
     **options: Any,
 ) -> None:
     """Learn a corpus from movement.
@@ -157,55 +170,70 @@ def build(
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
+    from motionmind.corpus.recordings import Taking
+    from motionmind.corpus.shards import Reading, shards_of
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make_discretization
+    from motionmind.executors.opening import open_team
     from motionmind.tween.engine import Engine
 
     place = place_for(name, home)
     others = parse_mixture(mix)
     discretization = make_discretization(discretize, *parse_tolerances(tolerance, 15.0))
-    clips = _read_clips(clip_names(files), read_mapping(joints), (unit, asf, source_fps))
+    takes = Taking("auto" if rate is None else rate, options["skip"], options["flips"], flip_angle, options["mirror"])
+    reading = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
+    if scheduler:  # whose workers are in other folders
+        files = tuple(file.absolute() for file in files)
     warm_once()
-    engine = Engine.fit(
-        clips,
-        name=name,
-        home=home,
-        rate="auto" if rate is None else rate,
-        discretization=discretization,
-        flip_degrees=flip_angle,
-        mix=others,
-        **options,
-    )
-    engine.save(place)
+    with open_team(workers, scheduler) as team, shards_of(name, home) as folder:
+        engine = Engine.fit(
+            _take_files(clip_names(files), reading, folder, team, strict=strict_files),
+            name=name,
+            home=home,
+            rate=takes.rate,
+            discretization=discretization,
+            flip_degrees=flip_angle,
+            mix=others,
+            **options,
+        )
+        engine.save(place)
     print_check(engine.check(), with_states=details, with_details=details)
     click.echo(f"built {displayed_path(place)}")
 
 
-def _read_clips(
-    names: Mapping[Path, str],
-    mapping: Mapping[str, str] | None,
-    source: tuple[str | None, Path | None, float | None],
-) -> Iterator[Motion]:
-    """Read clips one by one, with a progress bar on a terminal.
+def _take_files(
+    names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
+) -> Iterator[Recording]:
+    """Take files by workers, with a progress bar on a terminal; report those that cannot be read, or end with one.
 
     Args:
         names: the clip's name for each file; a score names its own.
-        mapping: the human23 joint of each joint, None to know them by name.
-        source: the unit, the .asf file and the frames per second of files that do not state them.
+        reading: how to read and take them.
+        folder: where shards are kept until the corpus is built.
+        team: the workers.
+        strict: whether a file that cannot be read is an error.
     """
-    from motionmind.notation.compose import motions
-    from motionmind.notation.read import read_score
-    from motionmind.retarget.retarget import own_skeleton
+    from motionmind.corpus.shards import take_files
 
-    with click.progressbar(names, label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-        for file in bar:
-            if file.suffix.lower() == ".score":
-                yield from motions(read_score(file))
-            else:
-                motion = own_skeleton(replace(read(file, *source), name=names[file]), mapping)
-                if len(motion) == 1:
-                    note(f"{file}: holds one posture, and no move to learn from")
-                yield motion
+    faults: list[str] = []
+
+    def on_need(size: float) -> None:
+        if size >= _NOTEWORTHY:
+            note(f"about {size / 1e9:.1f} GB of disk are needed, half of it until the corpus is built")
+
+    def on_taken(taken: Taken) -> None:
+        bar.update(1)
+        if taken.fault and strict:
+            raise MotionMindError(taken.fault)
+        if taken.fault:
+            faults.append(taken.fault)
+
+    with click.progressbar(length=len(names), label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+        yield from take_files(names, reading, folder, team, on_need=on_need, on_taken=on_taken)
+    for fault in faults:
+        note(f"{fault}; left out")
+    if faults:
+        note(f"{count(len(faults), 'file')} of {len(names)} cannot be read, and nothing is learned from them")
     progress("learning")
 
 

@@ -34,6 +34,7 @@ class Section(StrEnum):
     MOTION = "How to move"
     LEARN = "What to learn"
     STATES = "What counts as one state"
+    WORKERS = "Who does the work"
     CHECK = "How to check"
     DRAW = "How to draw"
     ABOUT = "About the corpus"

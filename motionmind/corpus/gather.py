@@ -6,14 +6,13 @@ import logging
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, count, pairwise
+from itertools import chain, count
 from numbers import Real
-from typing import Literal, NamedTuple, TypedDict, get_args
+from typing import TypedDict, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Ints
 from motionmind.arguments import (
     check_flag,
     check_integer,
@@ -23,27 +22,27 @@ from motionmind.arguments import (
     check_text,
     check_type,
 )
-from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
-from motionmind.body.rates import FILM_RATE
-from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing, JointFlip, JointRepair, subdivide_times
-from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
+from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing
+from motionmind.corpus.flips import FLIP_DEGREES
 from motionmind.corpus.origins import gather_origins, warn_of_licences
-from motionmind.errors import CorpusError, MotionMindWarning, SkeletonError, enumerated
-from motionmind.geometry import rotations as rot
-from motionmind.geometry.splines import rotation_spline
+from motionmind.corpus.recordings import (
+    Flips,
+    Piece,
+    Rate,
+    Recording,
+    Source,
+    Taking,
+    as_piece,
+    frames_between,
+    mirror_image,
+    renamed,
+    take,
+    take_clip,
+)
+from motionmind.errors import CorpusError, MotionMindWarning, enumerated
 
-Flips = Literal["drop", "keep", "repair"]
-Rate = float | Literal["auto"] | None
-
-# Postures a second of a recording, unless another rate is given: [O10]'s choice for motion capture.
-RECORDED_RATE = 5.0
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
-DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
-FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
-_COARSE = 20.0  # frames per second; a slower recording has no detail to keep
-
 _log = logging.getLogger(__name__)
 
 
@@ -68,7 +67,7 @@ class Gathering(TypedDict, total=False):
 
 def gather(
     name: str,
-    motions: Iterable[Motion],
+    motions: Iterable[Motion | Recording],
     *,
     rate: Rate = "auto",
     skip: int = 0,
@@ -90,7 +89,8 @@ def gather(
 
     Args:
         name: the corpus's name.
-        motions: the recordings, named; repeated names are numbered.
+        motions: the recordings, named; repeated names are numbered. Those that were taken before
+            (`motionmind.corpus.recordings.take`, with the same options) stay as they are.
         rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
             recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
             keyframes: of a motion that says so, and of one with fewer than 15 frames a second.
@@ -141,44 +141,55 @@ def gather(
     _check_options(skip, flips, flip_degrees, reverse)
     given = None if rate == "auto" else rate
     _check_mix(name, mix, given)
-    own = _take_recordings(motions, rate, skip, flips, flip_degrees, performer)
-    body = own.body
+    own = _take_recordings(motions, Taking(rate, skip, flips, flip_degrees, mirror))
+    body = own[0].body if own else None
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
-    if rate == "auto" and own.rate is not None:
+    taken = max((one.rate for one in own if one.rate is not None), default=None)
+    if rate == "auto" and taken is not None:
         _log.info(
-            "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, own.rate
+            "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, taken
         )
-    pieces = [
-        piece._replace(clip=replace(piece.clip, about=(about or {}).get(piece.clip.name, ""))) for piece in own.pieces
-    ]
-    for other, weight in mix:
+    for other, _ in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
-        pieces += _take_clips(other, weight, given)
-    if not pieces or body is None:
+    mixed = [_mixed(other, clip, weight, given) for other, weight in mix for clip in other.clips]
+    if body is None or not (mixed or any(one.pieces for one in own)):
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
-    common = _common_rate(own, mix) if given is None else given
+    common = _common_rate(taken, bool(own), mix) if given is None else given
+    between = frames_between(common)
+
+    def described(one: Recording, piece: Piece) -> Piece:
+        by = performer if isinstance(performer, str) else performer.get(one.name, "")
+        about_it = (about or {}).get(piece.clip.name, "")
+        clip = replace(piece.clip, about=about_it, performer=by)
+        return piece._replace(clip=clip, detail=_widened(piece.detail, between))
+
+    pieces = [described(one, piece) for one in own for piece in one.pieces]
+    pieces += [as_piece(source, between) for source in mixed]
     if mirror:
-        pieces += _mirror_images(pieces)
-    between = _frames_between(common)
+        present = {(source.clip.corpus, source.clip.name) for source in mixed if source.clip.mirrored}
+        pieces += [described(one, image) for one in own for image in one.images]
+        pieces += [
+            mirror_image(source, between) for source in mixed if (source.clip.corpus, source.clip.name) not in present
+        ]
     corpus = Corpus(
         name,
         body,
         _lay_out_clips(name, pieces, common, reverse),
-        np.concatenate([piece.postures.rotations for piece in pieces]),
-        np.concatenate([piece.postures.root for piece in pieces]),
-        np.concatenate([piece.postures.times for piece in pieces]),
-        np.concatenate([_detail(piece.postures, piece.recording, between) for piece in pieces]),
+        np.concatenate([piece.rotations for piece in pieces]),
+        np.concatenate([piece.root for piece in pieces]),
+        np.concatenate([piece.times for piece in pieces]),
+        np.concatenate([piece.detail for piece in pieces]),
         facing,
         common,
         title,
         author,
         source,
         licence,
-        own.faults,
+        tuple(fault for one in own for fault in one.faults),
         skip,
         gather_origins(other for other, _ in mix),
         citation,
@@ -225,9 +236,15 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
             )
 
 
-def _common_rate(own: _Recordings, mix: Sequence[tuple[Corpus, float]]) -> float | None:
-    """Return the rate of recordings and of corpora mixed with them unchanged; CorpusError if they differ."""
-    found: dict[float | None, str] = {own.rate: "the recordings"} if own.body else {}
+def _common_rate(taken: float | None, has_own: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
+    """Return the rate of recordings and of corpora mixed with them unchanged; CorpusError if they differ.
+
+    Args:
+        taken: postures a second that were taken of recordings.
+        has_own: whether there are recordings.
+        mix: the corpora, as of `gather`.
+    """
+    found: dict[float | None, str] = {taken: "the recordings"} if has_own else {}
     for mixed, _ in mix:
         found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
     if len(found) > 1:
@@ -243,33 +260,9 @@ def _pace(rate: float | None) -> str:
 # --- clips without their place in the corpus --------------------------------------------------------------------------
 
 
-class _Recordings(NamedTuple):
-    """Recordings without their faults.
-
-    Attributes:
-        pieces: their unbroken parts.
-        faults: the faults, by recording and time.
-        rate: postures a second of what was resampled; None if nothing was.
-        body: the first recording's skeleton; None if there is no recording.
-    """
-
-    pieces: list[_Piece]
-    faults: tuple[JointFlip, ...]
-    rate: float | None
-    body: Skeleton | None
-
-
-class _Piece(NamedTuple):
-    """A clip: its postures, their recording, and its other attributes."""
-
-    postures: Motion
-    recording: Motion
-    clip: Clip
-
-
-def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reverse: float | None) -> tuple[Clip, ...]:
+def _lay_out_clips(name: str, pieces: Sequence[Piece], rate: float | None, reverse: float | None) -> tuple[Clip, ...]:
     """Place the clips one after the other, with the heaviest weight scaled to 1; CorpusError if they have no moves."""
-    lengths = np.cumsum([0, *(len(piece.postures) for piece in pieces)])
+    lengths = np.cumsum([0, *(len(piece.times) for piece in pieces)])
     if lengths[-1] == len(pieces):
         at_rate = f" at {rate:g} postures a second" if rate else ""
         raise CorpusError(f"corpus {name!r}: no recording holds two postures{at_rate}, so there is no move to learn")
@@ -286,150 +279,44 @@ def _lay_out_clips(name: str, pieces: Sequence[_Piece], rate: float | None, reve
     )
 
 
-def _frames_between(rate: float | None) -> int:
-    """Return how many frames of detail there are between two postures."""
-    return max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+def _take_recordings(motions: Iterable[Motion | Recording], taking: Taking) -> list[Recording]:
+    """Take recordings that are not taken yet, and number repeated names.
 
-
-def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
-    """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
-
-    They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
-    more than `FAULT_DEGREES`.
+    Raises:
+        CorpusError: they are on different joints, or there is nothing to take of one.
+        SkeletonError: the body cannot be mirrored.
     """
-    count, joints = len(postures), len(postures.skeleton)
-    out = np.zeros((count, between, joints, 3), np.float16)
-    if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
-        times = subdivide_times(postures.times, between)
-        spline = rotation_spline(postures.times, postures.rotations, times)
-        detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
-        detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
-        faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(FAULT_DEGREES)
-        out[:-1] = np.where(faulty[:, None, :, None], 0.0, detail)
-    return out
-
-
-def _take_recordings(
-    motions: Iterable[Motion],
-    rate: Rate,
-    skip: int,
-    flips: Flips,
-    flip_degrees: float,
-    performer: str | Mapping[str, str],
-) -> _Recordings:
-    """Skip frames, repair recordings or cut them at faults, and take their postures at `rate`."""
-    from motionmind.body.tempo import question_tempo  # a tween from a built corpus does not need it
-
-    pieces: list[_Piece] = []
-    faults: list[JointFlip] = []
+    out: list[Recording] = []
     names: set[str] = set()
-    rates: set[float] = set()
-    doubts: list[str] = []
-    first: Motion | None = None
-    for recording in motions:
-        check_type("a clip", recording, Motion)
-        first = first or recording
-        difference = first.skeleton.difference(recording.skeleton)
+    for motion in motions:
+        check_type("a clip", motion, Motion, Recording, wanted="a Motion")
+        taken = motion if isinstance(motion, Recording) else take(motion, taking)
+        difference = out[0].body.difference(taken.body) if out else None
         if difference is not None:
             raise CorpusError(
-                f"{recording.name} is on another skeleton than {first.name}: {difference}; "
+                f"{taken.name} is on another skeleton than {out[0].name}: {difference}; "
                 "a corpus has one (a mapping of joints may bring it there)"
             )
-        if skip >= len(recording):
-            raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
-        motion = replace(recording.slice(skip, len(recording)), name=_free_name(recording.name or "clip", names))
-        names.add(motion.name)
-        if doubt := question_tempo(motion):
-            doubts.append(f"{motion.name} ({doubt})")
-        found, cuts = find_flips(motion, flip_degrees), list[int]()
-        repairs: tuple[JointRepair, ...] = ()
-        if found and flips == "repair":
-            motion, found, repairs = repair_flips(motion, flip_degrees)
-            cuts = sorted({flip.frame for flip in find_flips(motion, flip_degrees)})
-        faults += [replace(flip, frame=flip.frame + skip) for flip in found]
-        if found and flips == "drop":
-            continue
-        wanted = _posture_rate(motion) if rate == "auto" else rate
-        if wanted is not None:
-            rates.add(wanted)
-        by = performer if isinstance(performer, str) else performer.get(motion.name, "")
-        pieces += _cut(motion, cuts, wanted, Clip(motion.name, 0, 0, repairs=_later(repairs, skip), performer=by))
-    if doubts:
+        out.append(renamed(taken, _free_name(taken.name, names)))
+        names.add(out[-1].name)
+    if doubts := [f"{one.name} ({one.doubt})" for one in out if one.doubt]:
         message = (
             f"frames per second, or the unit, are doubtful where people move as nobody can: {enumerated(doubts, 3)}"
         )
         warnings.warn(message, MotionMindWarning, stacklevel=3)
-    return _Recordings(pieces, tuple(faults), max(rates, default=None), first.skeleton if first else None)
-
-
-def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, whole: Clip) -> list[_Piece]:
-    """Cut a recording before the frames `cuts`, and take its parts' postures; `whole` is its clip.
-
-    Parts are numbered, and those of a single posture, which have no move, are dropped.
-    """
-    parts = [motion.slice(start, stop) for start, stop in pairwise([0, *cuts, len(motion)])]
-    pieces = []
-    for number, part in enumerate(parts, start=1):
-        name = f"{motion.name}.{number}" if cuts else motion.name
-        postures = replace(part if rate is None else part.resample(rate), name=name)
-        if len(postures) > 1 or not cuts:
-            first, last = part.times[0], part.times[-1]
-            within = tuple(one for one in whole.repairs if one.seconds[0] <= last and first <= one.seconds[1])
-            clip = replace(whole, name=name, repairs=within)
-            pieces.append(_Piece(postures, _with_detail(postures, part, rate), clip))
-    return pieces
-
-
-def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
-    """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
-    between = _frames_between(rate)
-    if between == 0 or len(postures) == 1 or part.fps < _COARSE:
-        return postures
-    return part.at(subdivide_times(postures.times, between))
-
-
-def _later(repairs: Iterable[JointRepair], frames: int) -> tuple[JointRepair, ...]:
-    """Return the same repairs, numbered from so many frames before."""
-    return tuple(replace(one, start=one.start + frames, stop=one.stop + frames) for one in repairs)
-
-
-def _posture_rate(motion: Motion) -> float | None:
-    """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
-    return None if motion.keyframed or motion.fps < FILM_RATE else RECORDED_RATE
-
-
-def _take_clips(other: Corpus, weight: float, rate: float | None) -> list[_Piece]:
-    """Take the clips of another corpus, marked with its name, each counting `weight` times as much."""
-    out = []
-    for clip in other.clips:
-        motion = other.motion(clip)
-        if rate is not None and rate != other.rate:
-            motion = motion.resample(rate)
-        taken = replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight)
-        out.append(_Piece(motion, other.recording(clip), taken))
     return out
 
 
-def _mirror_images(pieces: Sequence[_Piece]) -> list[_Piece]:
-    """Mirror the clips, except those whose mirror image is already there, from a corpus mixed in."""
-    present = {(clip.corpus, clip.name) for _, _, clip in pieces if clip.mirrored}
-    out = []
-    for postures, recording, clip in pieces:
-        if (clip.corpus, clip.name) not in present:
-            try:
-                partners = find_sides(postures.skeleton).partners
-                out.append(_Piece(mirrored(postures), mirrored(recording), _mirror_image(clip, postures, partners)))
-            except SkeletonError as error:
-                raise SkeletonError(f"{clip.label}: {error}") from None
-    return out
+def _mixed(other: Corpus, clip: Clip, weight: float, rate: float | None) -> Source:
+    """Take a clip of another corpus, marked with its name, counting `weight` times as much."""
+    found = take_clip(other, clip, rate)
+    return found._replace(clip=replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight))
 
 
-def _mirror_image(clip: Clip, postures: Motion, partners: Ints) -> Clip:
-    """Return a clip with left and right exchanged; `partners` are the joints' on the other side [J]."""
-    names = postures.skeleton.names
-    opposite = {name: names[partner] for name, partner in zip(names, partners, strict=True)}
-    repairs = tuple(replace(repair, joint=opposite[repair.joint]) for repair in clip.repairs)
-    return replace(clip, mirrored=True, repairs=repairs)
+def _widened(detail: NDArray[np.float16], between: int) -> NDArray[np.float16]:
+    """Return detail [N, between, J, 3]: zeros for keyframes, which have none, among recordings."""
+    count, kept, joints, _ = detail.shape
+    return detail if kept == between else np.zeros((count, between, joints, 3), np.float16)
 
 
 def _free_name(name: str, taken: set[str]) -> str:

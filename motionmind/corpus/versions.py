@@ -99,6 +99,13 @@ def remove(folder: Path) -> None:
     shutil.rmtree(aside, ignore_errors=True)
 
 
+def remove_unused(folder: Path) -> None:
+    """Remove a folder and all in it, unless somebody holds it; as far as that can be done."""
+    with suppress(OSError), locked(folder, alone=True) as unused:
+        if unused:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove what killed processes left beside a folder: those of 0.1, and those that removed it."""
     for aside in _moved_aside(folder, "(-old)?"):

@@ -12,6 +12,7 @@ from motionmind.arguments import check_mapping, check_path, check_type
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import Gathering, gather
+from motionmind.corpus.recordings import Recording
 from motionmind.discretize import Codebook, Discretization
 from motionmind.learned import persistence
 from motionmind.learned.learning import Learned, learn
@@ -32,7 +33,7 @@ class LearnedCorpus(Learned):
     @classmethod
     def fit(
         cls,
-        clips: Iterable[Motion] = (),
+        clips: Iterable[Motion | Recording] = (),
         *,
         name: str = "corpus",
         discretization: Discretization | None = None,

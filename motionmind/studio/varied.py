@@ -16,7 +16,7 @@ from starlette.routing import BaseRoute, Route
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.corpus import store
-from motionmind.corpus.gather import RECORDED_RATE
+from motionmind.corpus.recordings import RECORDED_RATE
 from motionmind.errors import MotionMindError
 from motionmind.render.page import base64_of
 from motionmind.studio import api

@@ -504,7 +504,7 @@ def test_recordings(run: Run, shared_data: Path, tmp_path: Path) -> None:
     assert run("tween", "A.json", "B.json", "--corpus", "mine", "-o", "tween.bvh").code == 0
     truncated = shared_data / "importer" / "cmu_kick_truncated.bvh"
     before = files_under(tmp_path)
-    ran = run("corpus", "build", "mine", recordings[2], truncated)
+    ran = run("corpus", "build", "mine", recordings[2], truncated, "--strict-files")
     assert ran.code == 2
     assert re.search(r"error: \S+cmu_kick_truncated\.bvh:\d+: ", ran.err)
     assert files_under(tmp_path) == before
@@ -543,7 +543,7 @@ BAD = [
     ("corpus list --home A.json", r"'A\.json' is a file"),
     ("corpus build mine", r"Missing argument 'FILES\.\.\.'"),
     ("corpus build mine one.json", r"no recording holds two postures"),
-    ("corpus build mine clip.bvh cut.bvh", r"cut\.bvh:\d+: "),
+    ("corpus build mine clip.bvh cut.bvh --strict-files", r"cut\.bvh:\d+: "),
     ("corpus build mine clip.bvh stranger.bvh", r"stranger is on another skeleton than clip: "),
     ("corpus build mine clip.bvh folder", r"'folder' is a directory"),
     ("corpus build mine clip.bvh ./clip.bvh", r"clip\.bvh: given twice"),

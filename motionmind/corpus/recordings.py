@@ -1,0 +1,226 @@
+"""Taking recordings as the clips of a corpus, each by itself: repaired, cut at faults, resampled, mirrored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind._typing import Floats, Ints
+from motionmind.body.mirror import find_sides, mirrored
+from motionmind.body.motion import Motion
+from motionmind.body.rates import FILM_RATE
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.corpus import Clip, Corpus, JointFlip, JointRepair, subdivide_times
+from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
+from motionmind.errors import CorpusError, SkeletonError
+from motionmind.geometry import rotations as rot
+from motionmind.geometry.splines import rotation_spline
+
+Flips = Literal["drop", "keep", "repair"]
+Rate = float | Literal["auto"] | None
+
+# Postures a second of a recording, unless another rate is given: [O10]'s choice for motion capture.
+RECORDED_RATE = 5.0
+DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
+FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
+_COARSE = 20.0  # frames per second; a slower recording has no detail to keep
+
+
+@dataclass(frozen=True)
+class Taking:
+    """Options of `gather` for a single recording; see there."""
+
+    rate: Rate = "auto"
+    skip: int = 0
+    flips: Flips = "repair"
+    flip_degrees: float = FLIP_DEGREES
+    mirror: bool = False
+
+
+class Piece(NamedTuple):
+    """A clip of N postures without its place in a corpus.
+
+    Attributes:
+        clip: its attributes; `start` and `stop` are 0.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root joint [N, 3], metres.
+        times: seconds in the recording [N].
+        detail: the recording's departures from the spline through the postures [N, K, J, 3], as in Corpus.
+    """
+
+    clip: Clip
+    rotations: Floats
+    root: Floats
+    times: Floats
+    detail: NDArray[np.float16]
+
+
+class Recording(NamedTuple):
+    """A recording without its faults, as it was taken.
+
+    Attributes:
+        name: its name; "" if it has none.
+        body: its skeleton.
+        rate: postures a second that were taken of it; None if every frame was, or none.
+        doubt: contradicts its clock, if it does (`question_tempo`); else "".
+        faults: the faults.
+        pieces: its unbroken parts; none if it is left out.
+        images: their mirror images, if they are wanted.
+    """
+
+    name: str
+    body: Skeleton
+    rate: float | None
+    doubt: str
+    faults: tuple[JointFlip, ...]
+    pieces: tuple[Piece, ...]
+    images: tuple[Piece, ...]
+
+
+class Source(NamedTuple):
+    """A clip as it is taken from: its postures, as much of its recording as detail is taken from, its attributes."""
+
+    postures: Motion
+    recording: Motion
+    clip: Clip
+
+
+def take(recording: Motion, taking: Taking) -> Recording:
+    """Skip frames of a recording, repair it or cut it at its faults, and take its postures.
+
+    Raises:
+        CorpusError: no frames are left.
+        SkeletonError: the body cannot be mirrored.
+    """
+    from motionmind.body.tempo import question_tempo  # a tween from a built corpus does not need it
+
+    skip = taking.skip
+    if skip >= len(recording):
+        raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
+    motion = replace(recording.slice(skip, len(recording)), name=recording.name or "clip")
+    doubt = question_tempo(motion) or ""
+    found, cuts = find_flips(motion, taking.flip_degrees), list[int]()
+    repairs: tuple[JointRepair, ...] = ()
+    if found and taking.flips == "repair":
+        motion, found, repairs = repair_flips(motion, taking.flip_degrees)
+        cuts = sorted({flip.frame for flip in find_flips(motion, taking.flip_degrees)})
+    faults = tuple(replace(flip, frame=flip.frame + skip) for flip in found)
+    if found and taking.flips == "drop":
+        return Recording(motion.name, motion.skeleton, None, doubt, faults, (), ())
+    rate = posture_rate(motion) if taking.rate == "auto" else taking.rate
+    parts = _cut(motion, cuts, rate, Clip(motion.name, 0, 0, repairs=_later(repairs, skip)))
+    between = frames_between(rate)
+    pieces = tuple(as_piece(part, between) for part in parts)
+    images = tuple(mirror_image(part, between) for part in parts) if taking.mirror else ()
+    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images)
+
+
+def renamed(taken: Recording, name: str) -> Recording:
+    """Return a recording under another name, with those of its pieces, which begin with it."""
+    if name == taken.name:
+        return taken
+
+    def other(piece: Piece) -> Piece:
+        return piece._replace(clip=replace(piece.clip, name=name + piece.clip.name[len(taken.name) :]))
+
+    faults = tuple(replace(fault, clip=name) for fault in taken.faults)
+    pieces, images = tuple(map(other, taken.pieces)), tuple(map(other, taken.images))
+    return taken._replace(name=name, faults=faults, pieces=pieces, images=images)
+
+
+def take_clip(other: Corpus, clip: Clip, rate: float | None) -> Source:
+    """Take a clip of another corpus as it is, or resampled at `rate`."""
+    motion = other.motion(clip)
+    return Source(motion if rate in (None, other.rate) else motion.resample(rate), other.recording(clip), clip)
+
+
+def as_piece(source: Source, between: int) -> Piece:
+    """Return a clip with `between` frames of detail between its postures."""
+    postures, recording, clip = source
+    return Piece(clip, postures.rotations, postures.root, postures.times, _detail(postures, recording, between))
+
+
+def mirror_image(source: Source, between: int) -> Piece:
+    """Return a clip with left and right exchanged, as `as_piece`; SkeletonError if the body has no sides."""
+    postures, recording, clip = source
+    try:
+        partners = find_sides(postures.skeleton).partners
+        image = Source(mirrored(postures), mirrored(recording), _mirrored_clip(clip, postures, partners))
+    except SkeletonError as error:
+        raise SkeletonError(f"{clip.label}: {error}") from None
+    return as_piece(image, between)
+
+
+def frames_between(rate: float | None) -> int:
+    """Return how many frames of detail there are between two postures."""
+    return max(round(DETAIL_RATE / rate) - 1, 0) if rate else 0
+
+
+def posture_rate(motion: Motion) -> float | None:
+    """Return how many postures a second to take of a motion; None for every frame, of keyframes."""
+    return None if motion.keyframed or motion.fps < FILM_RATE else RECORDED_RATE
+
+
+# --- inside -----------------------------------------------------------------------------------------------------------
+
+
+def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.float16]:
+    """Return a recording's departures from the spline through its postures [N, between, J, 3], rotation vectors.
+
+    They are 0 after the last posture, where each frame is a posture, and for a joint in a move in which it departs by
+    more than `FAULT_DEGREES`.
+    """
+    count, joints = len(postures), len(postures.skeleton)
+    out = np.zeros((count, between, joints, 3), np.float16)
+    if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
+        times = subdivide_times(postures.times, between)
+        spline = rotation_spline(postures.times, postures.rotations, times)
+        detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
+        detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
+        faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(FAULT_DEGREES)
+        out[:-1] = np.where(faulty[:, None, :, None], 0.0, detail)
+    return out
+
+
+def _cut(motion: Motion, cuts: Sequence[int], rate: float | None, whole: Clip) -> list[Source]:
+    """Cut a recording before the frames `cuts`, and take its parts' postures; `whole` is its clip.
+
+    Parts are numbered, and those of a single posture, which have no move, are dropped.
+    """
+    parts = [motion.slice(start, stop) for start, stop in pairwise([0, *cuts, len(motion)])]
+    pieces = []
+    for number, part in enumerate(parts, start=1):
+        name = f"{motion.name}.{number}" if cuts else motion.name
+        postures = replace(part if rate is None else part.resample(rate), name=name)
+        if len(postures) > 1 or not cuts:
+            first, last = part.times[0], part.times[-1]
+            within = tuple(one for one in whole.repairs if one.seconds[0] <= last and first <= one.seconds[1])
+            clip = replace(whole, name=name, repairs=within)
+            pieces.append(Source(postures, _with_detail(postures, part, rate), clip))
+    return pieces
+
+
+def _with_detail(postures: Motion, part: Motion, rate: float | None) -> Motion:
+    """Return as much of a part of a recording as detail is taken from: hours of it would fill the memory."""
+    between = frames_between(rate)
+    if between == 0 or len(postures) == 1 or part.fps < _COARSE:
+        return postures
+    return part.at(subdivide_times(postures.times, between))
+
+
+def _later(repairs: Iterable[JointRepair], frames: int) -> tuple[JointRepair, ...]:
+    """Return the same repairs, numbered from so many frames before."""
+    return tuple(replace(one, start=one.start + frames, stop=one.stop + frames) for one in repairs)
+
+
+def _mirrored_clip(clip: Clip, postures: Motion, partners: Ints) -> Clip:
+    """Return a clip with left and right exchanged; `partners` are the joints' on the other side [J]."""
+    names = postures.skeleton.names
+    opposite = {name: names[partner] for name, partner in zip(names, partners, strict=True)}
+    repairs = tuple(replace(repair, joint=opposite[repair.joint]) for repair in clip.repairs)
+    return replace(clip, mirrored=True, repairs=repairs)

@@ -1,0 +1,362 @@
+"""Files of movement taken as recordings by workers, who leave them as shards: a build that is broken off goes on there.
+
+A shard holds what `motionmind.corpus.recordings.take` made of one file. Its name is a hash of all that it depends on:
+the file's bytes and name, the options, and the package's code; and it lists the other files that were read for it (a
+skeleton, a score that is included), with their hashes. So a shard that is there is right, whoever wrote it, and workers
+pass on no more than its name. They and their client share the disk that it lies on.
+
+    shards/mine/3f/3f9a...npz      of the corpus "mine", until it is built
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import shutil
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.corpus import store, versions
+from motionmind.corpus.corpus import Clip, JointFlip
+from motionmind.corpus.manifest import BodyEntry
+from motionmind.corpus.recordings import Piece, Recording, Taking, take
+from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
+from motionmind.executors.team import Team, UnfinishedError
+from motionmind.files import make_folder, read_bytes, reads_recorded, replace_file
+
+_KEPT_AGAIN = 2.25  # bytes on disk for each of the shards': themselves, and the corpus with what is learned
+_MOVEMENT = ("rotations", "root", "times", "detail")
+_ONE_AT_A_TIME = threading.Lock()  # in a process: Python's list of warnings is one for all its threads
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Options for reading and taking files.
+
+    Attributes:
+        taking: what to take of them.
+        joints: the human23 joint of each of a file's; None recognises rigs by name.
+        unit, asf, fps: as `read_motion`.
+    """
+
+    taking: Taking
+    joints: dict[str, str] | None = None
+    unit: str | None = None
+    asf: str | None = None
+    fps: float | None = None
+
+
+class Job(NamedTuple):
+    """A file to take.
+
+    Attributes:
+        file: its path.
+        name: its clip's name; a score names its own.
+        reading: the options.
+        folder: of the shards.
+        code: names the package's code (`fingerprint`).
+    """
+
+    file: Path
+    name: str
+    reading: Reading
+    folder: Path
+    code: str
+
+    def __str__(self) -> str:
+        return str(self.file)
+
+
+class Taken(NamedTuple):
+    """A file that was taken, or could not be.
+
+    Attributes:
+        key: the shard's name; "" if there is none.
+        size: its bytes.
+        fault: why the file cannot be read or taken; "" if it was.
+    """
+
+    key: str
+    size: int = 0
+    fault: str = ""
+
+
+class _RecordingEntry(msgspec.Struct, frozen=True):
+    """A recording without its arrays; attributes as in Recording, each clip from and to its place in the arrays."""
+
+    name: str
+    body: BodyEntry
+    rate: float | None
+    doubt: str
+    faults: tuple[JointFlip, ...]
+    pieces: tuple[Clip, ...]
+    images: tuple[Clip, ...]
+
+
+class _Entry(msgspec.Struct, frozen=True):
+    """A shard without its arrays: the recordings, warnings about them, and the hashes of other files that were read."""
+
+    recordings: tuple[_RecordingEntry, ...]
+    warnings: tuple[str, ...]
+    read: dict[str, str]
+
+
+# --- the client -------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def shards_of(name: str, home: Path | None) -> Iterator[Path]:
+    """Hold the folder of a corpus's shards, until the context ends; then remove it, unless another build holds it.
+
+    It stays where the work may go on: after Ctrl-C, a full disk, or the loss of workers; not after bad input.
+
+    Raises:
+        CorpusError: it cannot be made.
+    """
+    place = store.home(home).absolute()
+    folder = place / "shards" / name
+    above = [folder.parent, *([] if place.exists() else [place])]
+    there = False
+    try:
+        while not there:  # another build may have removed it before it was held
+            make_folder(folder)
+            with versions.hold(folder) as there:
+                if there:
+                    yield folder
+    except OSError as error:
+        raise CorpusError(f"{folder}: cannot be written: {error.strerror or error}") from error
+    except MotionMindError as error:
+        if not isinstance(error, UnfinishedError) and not isinstance(error.__cause__, OSError):
+            _remove(folder, above)
+        raise
+    _remove(folder, above)
+
+
+def _remove(folder: Path, above: Sequence[Path]) -> None:
+    """Remove shards that nobody holds, and the folders above them that they leave empty."""
+    versions.remove_unused(folder)
+    with suppress(OSError):
+        for one in above:
+            one.rmdir()
+
+
+def take_files(
+    names: Mapping[Path, str],
+    reading: Reading,
+    folder: Path,
+    team: Team,
+    *,
+    on_need: Callable[[float], None],
+    on_taken: Callable[[Taken], None],
+) -> Iterator[Recording]:
+    """Yield the recordings in files, in their order; workers take them first, all that are not taken yet.
+
+    Args:
+        names: the clip's name for each file.
+        reading: the options.
+        folder: where the shards are and go.
+        team: the workers.
+        on_need: is called with the bytes that the corpus and its shards will need on disk, as soon as that is known:
+            when a file of each format was taken.
+        on_taken: is called for each file; what it raises ends the work.
+
+    Warns:
+        MotionMindWarning: what readers warn of.
+
+    Raises:
+        CorpusError: no file can be read, the disk lacks space, or workers do not share it.
+        UnfinishedError: workers die of a file again and again, or are out of reach.
+    """
+    code = store.fingerprint([])
+    jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
+    done: dict[Path, Taken] = {}
+
+    def work(some: Sequence[Job]) -> None:
+        # A pipe can be read once, and by this process alone.
+        ours = [job for job in some if not job.file.is_file()]
+        theirs = [job for job in some if job.file.is_file()]
+        for job, taken in zip(ours, map(take_file, ours), strict=True):
+            done[job.file] = taken
+            on_taken(taken)
+        for job, taken in zip(theirs, team.map(take_file, theirs), strict=True):
+            done[job.file] = taken
+            on_taken(taken)
+
+    samples = list({job.file.suffix.lower(): job for job in reversed(jobs)}.values())
+    work(samples)
+    if (needed := _needed(names, done)) > 0.0:
+        present = sum(file.stat().st_size for file in folder.rglob("*.npz"))
+        on_need(needed)
+        free = shutil.disk_usage(folder).free
+        if needed - present > free:
+            raise CorpusError(
+                f"{folder}: the corpus needs about {needed / 1e9:.1f} GB of disk, and {free / 1e9:.1f} GB are free"
+            )
+    work([job for job in jobs if job.file not in done])
+    readable = [job for job in jobs if done[job.file].key]
+    if jobs and not readable:
+        raise CorpusError(done[jobs[0].file].fault)
+    for job in readable:
+        yield from _recordings(job, done[job.file])
+
+
+def _needed(names: Mapping[Path, str], samples: Mapping[Path, Taken]) -> float:
+    """Estimate the bytes on disk that all files need, from one of each format."""
+    shares = {file.suffix.lower(): taken.size / max(_size(file), 1) for file, taken in samples.items()}
+    return _KEPT_AGAIN * sum(shares[file.suffix.lower()] * _size(file) for file in names)
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.is_file() else 0
+
+
+def _recordings(job: Job, taken: Taken) -> Iterator[Recording]:
+    """Read a shard, written anew if it was lost or damaged since, and warn of what it warns of."""
+    found = _open(job, taken.key)
+    if found is None:
+        found = _open(job, take_file(job).key)
+    if found is None:
+        raise CorpusError(f"{job.folder}: the shard of {job.file} is not there: workers must share this disk")
+    recordings, said = found
+    for text in said:
+        warnings.warn(text, MotionMindWarning, stacklevel=2)
+    yield from recordings
+
+
+# --- a worker ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def _code() -> str:
+    return store.fingerprint([])
+
+
+def take_file(job: Job) -> Taken:
+    """Take a file, unless its shard is there; return the shard's name, or why it cannot be taken.
+
+    Raises:
+        UnfinishedError: the shard cannot be written.
+        CorpusError: this worker runs another version of the package.
+    """
+    if job.code != _code():
+        raise CorpusError(
+            "a worker of the cluster has another version of MotionMind; all must be as this one for the same result"
+        )
+    with _ONE_AT_A_TIME:
+        try:
+            key = _key(job)
+            if (found := _open(job, key)) is None:
+                with warnings.catch_warnings(record=True) as raised, reads_recorded() as read:
+                    warnings.simplefilter("always", MotionMindWarning)
+                    recordings = [take(motion, job.reading.taking) for motion in _read(job)]
+                said = tuple(str(one.message) for one in raised if issubclass(one.category, MotionMindWarning))
+        except MotionMindError as error:
+            return Taken("", fault=str(error))
+        path = _place(job.folder, key)
+        try:
+            if found is None:
+                del read[str(job.file.absolute())]
+                make_folder(path.parent)
+                replace_file(path, _encode(recordings, said, read))
+            return Taken(key, path.stat().st_size)
+        except OSError as error:
+            raise UnfinishedError(
+                f"{path.parent}: cannot be written: {error.strerror or error}; what is done is kept, and the same "
+                "command goes on from there"
+            ) from error
+
+
+def _read(job: Job) -> Iterator[Motion]:
+    """Read the movement of a file, on human23 where its joints map to it."""
+    from motionmind.formats import read_motion
+    from motionmind.notation.compose import motions
+    from motionmind.notation.read import read_score
+    from motionmind.retarget.retarget import own_skeleton
+
+    if job.file.suffix.lower() == ".score":
+        yield from motions(read_score(job.file))
+        return
+    options = job.reading
+    motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps)
+    if len(motion) == 1:
+        warnings.warn(f"{job.file}: holds one posture, and no move to learn from", MotionMindWarning, stacklevel=2)
+    yield own_skeleton(replace(motion, name=job.name), options.joints)
+
+
+def _key(job: Job) -> str:
+    data = hashlib.sha256(read_bytes(job.file)).hexdigest()
+    depends = (job.code, job.file.suffix.lower(), job.name, job.reading, data)
+    return hashlib.sha256(msgspec.json.encode(depends)).hexdigest()
+
+
+def _place(folder: Path, key: str) -> Path:
+    return folder / key[:2] / f"{key}.npz"
+
+
+# --- shards on disk ---------------------------------------------------------------------------------------------------
+
+
+def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[str, str]) -> bytes:
+    """Return a shard: recordings, warnings about them, and the hashes of other files that were read."""
+    arrays: dict[str, Any] = {}
+    entries = []
+    for number, one in enumerate(recordings):
+        pieces = [*one.pieces, *one.images]
+        stops = np.cumsum([0, *(len(piece.times) for piece in pieces)]).tolist()
+        clips = tuple(
+            replace(piece.clip, start=start, stop=stop)
+            for piece, start, stop in zip(pieces, stops[:-1], stops[1:], strict=True)
+        )
+        for name in _MOVEMENT if pieces else ():
+            arrays[f"{name}{number}"] = np.concatenate([getattr(piece, name) for piece in pieces])
+        body = one.body
+        entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
+        split = len(one.pieces)
+        entries.append(_RecordingEntry(one.name, entry, one.rate, one.doubt, one.faults, clips[:split], clips[split:]))
+    about = msgspec.json.encode(_Entry(tuple(entries), said, read))
+    out = io.BytesIO()
+    np.savez(out, about=np.frombuffer(about, np.uint8), **arrays)
+    return out.getvalue()
+
+
+def _open(job: Job, key: str) -> tuple[list[Recording], tuple[str, ...]] | None:
+    """Return a shard's recordings and warnings; None if it is not there, is damaged, or another file has changed."""
+    try:
+        with np.load(io.BytesIO(_place(job.folder, key).read_bytes()), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        entry = msgspec.json.decode(arrays["about"].tobytes(), type=_Entry)
+        if any(hashlib.sha256(read_bytes(path)).hexdigest() != known for path, known in entry.read.items()):
+            return None
+    except Exception:  # a damaged archive can raise anything
+        return None
+    return [_decode(one, number, arrays) for number, one in enumerate(entry.recordings)], entry.warnings
+
+
+def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[Any]]) -> Recording:
+    body = entry.body
+    skeleton = Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips))
+
+    def pieces(clips: Sequence[Clip]) -> tuple[Piece, ...]:
+        return tuple(
+            Piece(
+                replace(clip, start=0, stop=0),
+                *(arrays[f"{name}{number}"][clip.start : clip.stop] for name in _MOVEMENT),
+            )
+            for clip in clips
+        )
+
+    return Recording(
+        entry.name, skeleton, entry.rate, entry.doubt, entry.faults, pieces(entry.pieces), pieces(entry.images)
+    )

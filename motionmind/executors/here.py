@@ -1,0 +1,73 @@
+"""Executors on this machine: this very process, and pools of others."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any, ParamSpec, TypeVar
+
+from motionmind.executors.team import AHEAD, Team
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+# Linear algebra starts a thread for each core in every process, unless these say otherwise when it is loaded.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class Here(Executor):
+    """An executor that does each job in this process, when it is submitted."""
+
+    def submit(self, function: Callable[_P, _T], /, *arguments: _P.args, **named: _P.kwargs) -> Future[_T]:
+        """Do a job, and return what came of it."""
+        future: Future[_T] = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def this_process() -> Team:
+    """Return a team of this process alone, which does a job at a time."""
+    return Team(Here, lambda: 1)
+
+
+@contextmanager
+def processes(number: int) -> Iterator[Team]:
+    """Open a team of so many processes; they end with the context, or with this process, even if that is killed."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    pools: list[ProcessPoolExecutor] = []
+
+    def make() -> Executor:
+        pool = ProcessPoolExecutor(number, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+        pools.append(pool)
+        return pool
+
+    try:
+        yield Team(make, lambda: AHEAD * number)
+    finally:
+        for pool in pools:
+            pool.shutdown(cancel_futures=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _begin() -> None:
+    """Prepare a worker: Ctrl-C is for the process that started it, with which it ends, however that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(multiprocessing.parent_process(),), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,162 @@
+"""Jobs handed to workers: the same results whoever they are, and none lost with a worker."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import partial
+from itertools import count
+from pathlib import Path
+
+import psutil
+import pytest
+
+from motionmind.errors import MotionMindError
+from motionmind.executors import cluster as clusters
+from motionmind.executors.here import this_process
+from motionmind.executors.opening import open_team
+from motionmind.executors.team import Team, UnfinishedError
+
+distributed = pytest.importorskip("distributed")
+
+
+def square(number: int) -> int:
+    if number < 0:
+        raise ValueError(f"no root of {number}")
+    return number * number
+
+
+def die_once(marks: Path, number: int) -> int:
+    """End the worker with every third job, the first time."""
+    mark = marks / str(number)
+    if number % 3 == 1 and not mark.exists():
+        mark.touch()
+        os._exit(1)
+    return number
+
+
+def die(number: int) -> int:
+    if number == 2:
+        os._exit(1)
+    return number
+
+
+def doze(number: int) -> int:
+    time.sleep(0.2)
+    return number
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a local cluster of two workers."""
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
+        yield local.scheduler_address
+
+
+@pytest.fixture(scope="module", params=["this process", "threads", "processes", "cluster"])
+def team(request: pytest.FixtureRequest) -> Iterator[Team]:
+    with ExitStack() as stack:
+        match request.param:
+            case "this process":
+                yield this_process()
+            case "threads":
+                yield Team(partial(ThreadPoolExecutor, 3), lambda: 9)
+            case "processes":
+                yield stack.enter_context(open_team(2))
+            case _:
+                yield stack.enter_context(open_team(scheduler=request.getfixturevalue("scheduler")))
+
+
+def test_results_come_in_the_order_of_the_jobs(team: Team) -> None:
+    assert list(team.map(square, range(50))) == [number * number for number in range(50)]
+    assert list(team.map(square, [])) == []
+
+
+def test_an_error_of_a_job_is_raised_in_its_place(team: Team) -> None:
+    results = team.map(square, [3, 2, -1, 0])
+    assert [next(results), next(results)] == [9, 4]
+    with pytest.raises(ValueError, match="no root of -1"):
+        next(results)
+
+
+def test_jobs_are_taken_as_they_are_needed(team: Team) -> None:
+    """An endless iterable of them fills no memory."""
+    jobs = count()
+    results = team.map(square, jobs)
+    assert [next(results) for _ in range(5)] == [0, 1, 4, 9, 16]
+    assert next(jobs) < 30
+
+
+def test_jobs_of_workers_that_die_are_done_by_others(tmp_path: Path) -> None:
+    with open_team(2) as team:
+        assert list(team.map(partial(die_once, tmp_path), range(8))) == list(range(8))
+
+
+def test_a_job_that_always_ends_its_worker_is_named() -> None:
+    with open_team(2) as team:
+        results = team.map(die, range(5))
+        assert [next(results), next(results)] == [0, 1]
+        with pytest.raises(UnfinishedError, match=r"^2: a worker died of it 3 times, alone"):
+            next(results)
+
+
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    """Even if it is killed, and can say nothing."""
+    script = tmp_path / "client.py"
+    script.write_text(
+        "import time\nfrom motionmind.executors.opening import open_team\n"
+        "if __name__ == '__main__':\n    with open_team(2) as team:\n"
+        "        print(list(team.map(abs, range(4))), flush=True)\n        time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE) as client:
+        assert client.stdout is not None
+        assert client.stdout.readline()
+        workers = psutil.Process(client.pid).children(recursive=True)
+        assert len(workers) >= 2
+        client.send_signal(signal.SIGKILL)
+    assert psutil.wait_procs(workers, timeout=10)[1] == []
+
+
+def test_a_cluster_that_goes_away_is_told() -> None:
+    local = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False, protocol="tcp"
+    )
+    with local, open_team(scheduler=local.scheduler_address) as team:
+        results = team.map(doze, range(100))
+        assert next(results) == 0
+        local.close()
+        with pytest.raises(UnfinishedError, match="what is done is kept: the same command goes on from there"):
+            list(results)
+
+
+def test_a_cluster_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clusters, "_PATIENCE", 0.3)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0", processes=False, protocol="tcp") as local,
+        pytest.raises(MotionMindError, match=r"tcp://\S+ the cluster has had no workers for 0\.3 s"),
+        open_team(scheduler=local.scheduler_address),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "tcp://127.0.0.1:port"])
+def test_an_address_of_no_scheduler_is_told(address: str) -> None:
+    with pytest.raises(MotionMindError, match=f"^{address}: no scheduler answers there"), open_team(scheduler=address):
+        pass
+
+
+def test_no_workers_are_too_few() -> None:
+    with pytest.raises(MotionMindError, match="there must be 1 worker at least, not 0"), open_team(0):
+        pass
+
+
+def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MotionMindError, match=r'pip install "motionmind\[scale\]"'), open_team(scheduler="tcp://a:1"):
+        pass
