@@ -348,8 +348,7 @@ def realised_path(
 ) -> Motion:
     tolerances, none = np.full(path.shape[1], within), np.zeros(path.shape[1], dtype=np.bool_)
     learned = known.corpus, known, known.carriage
-    motion, _ = realise(path, a, b, *learned, tolerances, ~none, none, fps, **options)  # type: ignore[arg-type]
-    return motion
+    return realise(path, a, b, *learned, tolerances, ~none, none, fps, **options).motion  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module", params=["free", "stage"])
