@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,11 +71,12 @@ def _likeliest_parents(learned: LearnedCorpus, chain: int, parent: int) -> list[
     """Return for each state of a chain the parent's states that it goes with best, each with P(state | parent's)."""
     if parent < 0:
         return [()] * int(learned.space.sizes[chain])
-    likely = np.exp(-learned.grammar.coordination.table(chain, learned.grammar.transitions.starts))
-    seen = np.zeros(likely.shape, dtype=bool)
-    seen[learned.states[:, parent], learned.states[:, chain]] = True
-    best = np.argsort(-np.where(seen, likely, 0.0), axis=0, kind="stable")[:LIKELIEST_PARENTS]
-    return [
-        tuple((learned.space.label(parent, int(p)), float(likely[p, state])) for p in column if seen[p, state])
-        for state, column in enumerate(best.T)
-    ]
+    pairs = learned.grammar.coordination
+    rows = pairs.pair_ptr[pairs.pair_starts[chain] : pairs.pair_starts[chain + 1] + 1]
+    listed = slice(rows[0], rows[-1])
+    above, below = np.repeat(np.arange(len(rows) - 1), np.diff(rows)), pairs.pair_states[listed]
+    likely = np.exp(-pairs.pair_costs[listed])
+    order = np.lexsort((above, -likely, below))
+    starts = np.searchsorted(below[order], np.arange(int(learned.space.sizes[chain]) + 1))
+    best = (order[first : min(first + LIKELIEST_PARENTS, last)] for first, last in pairwise(starts))
+    return [tuple((learned.space.label(parent, int(above[k])), float(likely[k])) for k in some) for some in best]

@@ -22,7 +22,7 @@ from toys import solution
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
-from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, find_bridges
+from motionmind.grammar.bridges import NEAREST, WITHIN, Bridges, _Neighbours, find_bridges
 from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination, count_coordination, fit_network
 from motionmind.grammar.grammar import Grammar, learn
 from motionmind.grammar.transitions import Transitions, Weights, count_transitions
@@ -263,6 +263,25 @@ def test_of_many_states_the_bridges_are_those_of_all_pairs(monkeypatch: pytest.M
         monkeypatch.undo()
         for one, other in zip(vars(near).values(), vars(every).values(), strict=True):
             np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+def test_bridges_of_twice_as_many_states_look_at_hardly_more_than_twice_as_many_pairs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked, angles = [0], _Neighbours.angles
+
+    def counted(self: _Neighbours, one: Ints, other: Ints) -> Floats:
+        looked[-1] += len(one)
+        return angles(self, one, other)
+
+    monkeypatch.setattr(_Neighbours, "angles", counted)
+    for size in (1_500, 3_000, 6_000):
+        looked.append(0)
+        centres = rot.normalise(np.random.default_rng(size).normal(size=(size, 4)))
+        graph = count_transitions(np.zeros((1, 1), np.int32), np.array([size]), np.zeros(0, np.int64), np.zeros(0))
+        find_bridges(centres, graph)
+    for fewer, more in pairwise(looked[1:]):
+        assert 0 < more < 3 * fewer  # of all pairs it would be 4
 
 
 def test_many_states_that_coincide_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
