@@ -524,3 +524,25 @@ def test_what_leads_into_the_air_ends_in_the_air() -> None:
         moved = nearer(a, b, 1.0)
         assert np.hypot(*(moved.root - a.root)[[0, 2]]) <= 1.0 + 1e-9
         assert moved.root[1] == b.root[1]
+
+
+# --- growth -----------------------------------------------------------------------------------------------------------
+
+
+def test_performances_are_read_one_after_another_on_bodies_of_their_own(tmp_path: Path) -> None:
+    from experiments.scale.run import _read_again
+    from motionmind import Engine
+
+    corpus = Engine.load("ballet").corpus
+    clips = [corpus.recording(clip, 0, 40).resample(30.0) for clip in corpus.clips[:2]]
+    spent = dict.fromkeys(("bytes", "frames", "seconds", "making", "reading", "retargeting"), 0.0)
+    names, heights = [], []
+    for motion in _read_again(clips, 3, tmp_path, spent):
+        assert not list(tmp_path.iterdir())  # nothing is kept
+        names.append(motion.name)
+        heights.append(motion.skeleton.height)
+        assert spent["frames"] >= len(motion)
+    assert len(set(names)) == len(names) == 3 * len(clips)
+    assert max(heights) / min(heights) > 1.01
+    assert spent["bytes"] > 10_000.0
+    assert min(spent["reading"], spent["retargeting"]) > 0.0
