@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from motionmind.cli import completion
+from motionmind.cli.changes import DETAILS, add, remove, take_files
 from motionmind.cli.files import clip_names, read_mapping
 from motionmind.cli.options import (
     HOME,
@@ -22,7 +21,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import count, format_repairs, note, print_check, print_origins, progress
+from motionmind.cli.printing import format_repairs, note, print_check, print_origins
 from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.warming import warm_once
@@ -31,14 +30,8 @@ from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
-    from motionmind.corpus.recordings import Recording
-    from motionmind.corpus.shards import Reading, Taken
-    from motionmind.executors.team import Team
+    pass
 
-DETAILS = option(
-    "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
-)
-_NOTEWORTHY = 1e8  # bytes on disk that are said beforehand
 _LINE = 300  # characters of a title, an author, a source: sentences rather than names
 
 
@@ -187,7 +180,7 @@ def build(
     warm_once()
     with open_team(workers, scheduler) as team, shards_of(name, home) as folder:
         engine = Engine.fit(
-            _take_files(clip_names(files), reading, folder, team, strict=strict_files),
+            take_files(clip_names(files), reading, folder, team, strict=strict_files),
             name=name,
             home=home,
             rate=takes.rate,
@@ -199,42 +192,6 @@ def build(
         engine.save(place)
     print_check(engine.check(), with_states=details, with_details=details)
     click.echo(f"built {displayed_path(place)}")
-
-
-def _take_files(
-    names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
-) -> Iterator[Recording]:
-    """Take files by workers, with a progress bar on a terminal; report those that cannot be read, or end with one.
-
-    Args:
-        names: the clip's name for each file; a score names its own.
-        reading: how to read and take them.
-        folder: where shards are kept until the corpus is built.
-        team: the workers.
-        strict: whether a file that cannot be read is an error.
-    """
-    from motionmind.corpus.shards import take_files
-
-    faults: list[str] = []
-
-    def on_need(size: float) -> None:
-        if size >= _NOTEWORTHY:
-            note(f"about {size / 1e9:.1f} GB of disk are needed, half of it until the corpus is built")
-
-    def on_taken(taken: Taken) -> None:
-        bar.update(1)
-        if taken.fault and strict:
-            raise MotionMindError(taken.fault)
-        if taken.fault:
-            faults.append(taken.fault)
-
-    with click.progressbar(length=len(names), label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-        yield from take_files(names, reading, folder, team, on_need=on_need, on_taken=on_taken)
-    for fault in faults:
-        note(f"{fault}; left out")
-    if faults:
-        note(f"{count(len(faults), 'file')} of {len(names)} cannot be read, and nothing is learned from them")
-    progress("learning")
 
 
 @command("motionmind corpus list --remote", "list")
@@ -355,5 +312,5 @@ def delete(name: str, is_sure: bool, home: Path | None) -> None:
     click.echo(f"deleted {displayed_path(place)}")
 
 
-for _command in (build, list_corpora, info, check, rename, delete, publish, fetch):
+for _command in (build, add, remove, list_corpora, info, check, rename, delete, publish, fetch):
     corpora.add_command(_command)

@@ -267,7 +267,7 @@ def take_file(job: Job) -> Taken:
         path = _place(job.folder, key)
         try:
             if found is None:
-                del read[str(job.file.absolute())]
+                read.pop(str(job.file.absolute()), None)  # formats from other packages may open it themselves
                 make_folder(path.parent)
                 replace_file(path, _encode(recordings, said, read))
             return Taken(key, path.stat().st_size)

@@ -9,6 +9,7 @@ import numpy as np
 from motionmind._typing import Floats, States
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.discretize import Discretization, StateSpace
+from motionmind.discretize.states import nearest
 from motionmind.errors import CorpusError
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
@@ -67,6 +68,50 @@ def learn(corpus: Corpus, discretization: Discretization) -> Learned:
         states = np.concatenate([states, facing[:, None]], axis=1)
     del orientations  # as large as the corpus
     return learn_from_states(corpus, space, states)
+
+
+def learn_in(corpus: Corpus, space: StateSpace) -> Learned:
+    """Learn from a corpus in states that are known, those of them with a posture in them.
+
+    Args:
+        corpus: the movement.
+        space: the states of each chain, as they were learned from a corpus on the same joints, facing alike.
+    """
+    orientations = corpus.to_chains(corpus.rotations)
+    joints = len(corpus.skeleton)
+    own = [space.of(joint) for joint in range(joints)]
+    of_joints = StateSpace.of_joints(
+        space.names[:joints],
+        own,
+        kind=space.kind,
+        tolerances=space.tolerances[:joints],
+        labels=space.labels[:joints],
+    )
+    smaller, states = _keep_visited(of_joints, of_joints.assign(orientations[:, :joints]))
+    if corpus.facing == "free":
+        smaller, facing = _with_facing(smaller, orientations[:, -1])
+        states = np.concatenate([states, facing[:, None]], axis=1)
+    return learn_from_states(corpus, smaller, states)
+
+
+def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
+    """Return the share of a corpus's orientations that are in no state of their joint, for they are farther from all of
+    them than its tolerance; the joint that is farthest, and by how many degrees.
+
+    Args:
+        corpus: the movement.
+        space: states of its chains.
+    """
+    joints = len(corpus.skeleton)
+    orientations = corpus.to_chains(corpus.rotations)
+    count, worst, farthest = 0, 0, 0.0
+    for joint in range(joints):
+        _, cosines = nearest(orientations[:, joint], space.of(joint))
+        degrees = np.degrees(2.0 * np.arccos(np.clip(cosines, 0.0, 1.0)))
+        count += int(np.sum(degrees > space.tolerances[joint] + 1e-3))
+        if degrees.max() - space.tolerances[joint] > farthest:
+            worst, farthest = joint, float(degrees.max() - space.tolerances[joint])
+    return count / (len(corpus) * joints), space.names[worst], farthest
 
 
 def learn_from_states(corpus: Corpus, space: StateSpace, states: States) -> Learned:

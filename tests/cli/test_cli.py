@@ -671,7 +671,10 @@ def test_an_interrupt_is_quiet(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert out == ""
     assert "Traceback" not in err
-    assert not (tmp_path / "home").exists()
+    # No corpus, and of what was read only whole files, with which the same command goes on.
+    assert not (tmp_path / "home" / "corpora").exists()
+    left = [path for path in (tmp_path / "home").rglob("*") if path.is_file()]
+    assert {path.suffix for path in left} <= {".npz", ".lock"}, left
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals and pipes as POSIX has them")

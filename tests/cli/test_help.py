@@ -65,6 +65,8 @@ def test_there_are_the_commands_that_the_documents_name() -> None:
             "convert",
             "corpus",
             "corpus build",
+            "corpus add",
+            "corpus remove",
             "corpus list",
             "corpus info",
             "corpus check",
@@ -141,8 +143,10 @@ def test_each_field_of_a_request_has_one_option_but_for_those_of_tween_alone() -
 def test_the_examples_run(run: Run, tmp_path: Path) -> None:
     (tmp_path / "corpora").symlink_to(BALLET.parent)
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
+    Path("new").mkdir()
+    write_motion("new/jump.bvh", ballet_clip("jump").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
-    assert len(EXAMPLES) == 29
+    assert len(EXAMPLES) == 31
     for line in EXAMPLES:
         if line.startswith(("motionmind serve", "motionmind studio")):  # which do not end
             continue

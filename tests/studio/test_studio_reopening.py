@@ -133,6 +133,7 @@ def test_the_page_says_what_is_missing(home: Path, path: Path, browser: Any) -> 
         try:
             page.goto(client.entry)
             page.get_by_text("the corpus mine is missing").wait_for()
+            page.locator(".stretch.missing").nth(1).wait_for()
             assert page.locator(".stretch.missing").count() == 2
             assert "missing" in page.get_by_test_id("block-b1").get_attribute("aria-label")
             page.wait_for_timeout(300)

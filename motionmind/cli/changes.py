@@ -1,0 +1,177 @@
+"""The commands that change what a corpus is learned from, and the reading of files for them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from motionmind.cli import completion
+from motionmind.cli.files import clip_names, read_mapping
+from motionmind.cli.options import HOME, Section, command, option, reading
+from motionmind.cli.printing import count, note, print_check, progress
+from motionmind.cli.types import FILE
+from motionmind.cli.warming import warm_once
+from motionmind.display import displayed_path
+from motionmind.errors import MotionMindError
+
+if TYPE_CHECKING:
+    from motionmind.corpus.corpus import Corpus
+    from motionmind.corpus.recordings import Rate, Recording
+    from motionmind.corpus.shards import Reading, Taken
+    from motionmind.executors.team import Team
+    from motionmind.learned.learning import Learned
+
+DETAILS = option(
+    "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
+)
+_NOTEWORTHY = 1e8  # bytes on disk that are said beforehand
+_FEW = 0.001  # share of orientations outside of all states of which nothing is said
+
+
+@command("motionmind corpus add mine new/*.bvh")
+@click.argument("name", shell_complete=completion.corpora)
+@click.argument("files", type=FILE, nargs=-1, required=True)
+@option(
+    "--flips",
+    section=Section.LEARN,
+    type=click.Choice(["repair", "keep", "drop"]),
+    default="repair",
+    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
+)
+@option(
+    "--performer",
+    section=Section.ABOUT,
+    default="",
+    show_default=False,
+    help="Name who performs the movement, if not the author: credits name them.",
+)
+@reading
+@DETAILS
+@HOME
+def add(
+    name: str,
+    files: tuple[Path, ...],
+    home: Path | None,
+    joints: Path | None,
+    unit: str | None,
+    asf: Path | None,
+    source_fps: float | None,
+    details: bool,
+    **options: Any,
+) -> None:
+    """Add recordings to a corpus that you built.
+
+    They are taken as the corpus's own were: at its rate, mirrored if these are. Its states stay, and no earlier file is
+    read again; how far the new movement is outside of these states is said.
+    """
+    from motionmind.corpus.changing import add_recordings
+    from motionmind.corpus.recordings import Taking
+    from motionmind.corpus.shards import Reading, shards_of
+    from motionmind.executors.opening import open_team
+    from motionmind.learned import persistence
+
+    learned, place = _own(name, home)
+    own = [clip for clip in learned.corpus.clips if not clip.corpus]
+    rate: Rate = "auto" if learned.corpus.rate is None else learned.corpus.rate
+    takes = Taking(rate, learned.corpus.skip, options["flips"], mirror=any(clip.mirrored for clip in own))
+    source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
+    warm_once()
+    with open_team(1, None) as team, shards_of(name, home) as folder:
+        taken = take_files(clip_names(files), source, folder, team, strict=True)
+        changed = _learn_again(learned, add_recordings(learned.corpus, taken, **options))
+        persistence.save(changed, place)
+    _tell(changed, f"added {count(len(files), 'file')} to {displayed_path(place)}", details=details)
+
+
+@command("motionmind corpus remove mine clip")
+@click.argument("name", shell_complete=completion.corpora)
+@click.argument("clips", nargs=-1, required=True)
+@DETAILS
+@HOME
+def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) -> None:
+    """Remove clips from a corpus that you built, and their mirror images.
+
+    The name of a recording removes all of its parts. The states of what is left stay.
+    """
+    from motionmind.corpus.changing import remove_clips
+    from motionmind.learned import persistence
+
+    learned, place = _own(name, home)
+    changed = _learn_again(learned, remove_clips(learned.corpus, clips))
+    persistence.save(changed, place)
+    gone = len(learned.corpus.clips) - len(changed.corpus.clips)
+    _tell(changed, f"removed {count(gone, 'clip')} from {displayed_path(place)}", details=details)
+
+
+def take_files(
+    names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
+) -> Iterator[Recording]:
+    """Take files by workers, with a progress bar on a terminal; report those that cannot be read, or end with one.
+
+    Args:
+        names: the clip's name for each file; a score names its own.
+        reading: how to read and take them.
+        folder: where shards are kept until the corpus is built.
+        team: the workers.
+        strict: whether a file that cannot be read is an error.
+    """
+    from motionmind.corpus import shards
+
+    faults: list[str] = []
+
+    def on_need(size: float) -> None:
+        if size >= _NOTEWORTHY:
+            note(f"about {size / 1e9:.1f} GB of disk are needed, half of it until the corpus is built")
+
+    def on_taken(taken: Taken) -> None:
+        bar.update(1)
+        if taken.fault and strict:
+            raise MotionMindError(taken.fault)
+        if taken.fault:
+            faults.append(taken.fault)
+
+    with click.progressbar(length=len(names), label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+        yield from shards.take_files(names, reading, folder, team, on_need=on_need, on_taken=on_taken)
+    for fault in faults:
+        note(f"{fault}; left out")
+    if faults:
+        note(f"{count(len(faults), 'file')} of {len(names)} cannot be read, and nothing is learned from them")
+    progress("learning")
+
+
+def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
+    """Return what was learned from a user's corpus, and its folder; CorpusError if there is none that was built."""
+    from motionmind.corpus.store import locate, place_for
+    from motionmind.learned import persistence
+
+    place = place_for(name, home)
+    if locate(name, home) != place:
+        raise MotionMindError(f"{name!r} is no corpus of your own")
+    return persistence.load(name, home), place
+
+
+def _learn_again(learned: Learned, corpus: Corpus) -> Learned:
+    """Learn from changed movement in the same states, and note how much of it is outside of them."""
+    from motionmind.learned.learning import learn_in, outside
+
+    progress("learning")
+    share, joint, degrees = outside(corpus, learned.space)
+    if share > _FEW:
+        note(
+            f"{100.0 * share:.1f}% of all joints' orientations are in no state ({joint} by {degrees:.0f} degrees): "
+            "to learn states anew, build the corpus from all files"
+        )
+    return learn_in(corpus, learned.space)
+
+
+def _tell(learned: Learned, done: str, *, details: bool) -> None:
+    """Print how well a changed corpus hangs together, and what was done."""
+    from motionmind.learned.summary import check_corpus, to_plain
+
+    found = to_plain(check_corpus(learned.corpus, learned.grammar, learned.states))
+    print_check(found, with_states=details, with_details=details)
+    click.echo(done)

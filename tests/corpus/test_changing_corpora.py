@@ -1,0 +1,124 @@
+"""Adding clips to a corpus and removing them is the same as building it afresh, in the same states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bundled_clips import ballet_clip
+from command_line import Run
+
+from motionmind.body.motion import Motion
+from motionmind.corpus.changing import add_recordings, remove_clips
+from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.gather import gather
+from motionmind.discretize import Codebook
+from motionmind.errors import CorpusError
+from motionmind.formats import write_motion
+from motionmind.geometry import rotations as rot
+from motionmind.learned.learning import Learned, learn, learn_in, outside
+from motionmind.tween.engine import Engine
+
+STATES = Codebook(20.0)
+
+
+@pytest.fixture(scope="module")
+def dances() -> list[Motion]:
+    """Four short recordings, at 30 frames a second, two of them with a flip that is mended or cut at."""
+    out = []
+    for number, name in enumerate(("tendus", "degages", "fondus", "jump")):
+        motion = replace(ballet_clip(name).resample(30.0).slice(0, 90), name=name, keyframed=False)
+        rotations = motion.rotations.copy()
+        if number % 2:
+            rotations[40:, 4] = rot.mul(rotations[40:, 4], rot.from_axis_angle(np.array([0.0, 1.0, 0.0]), 2.5))
+        out.append(replace(motion, rotations=rotations))
+    return out
+
+
+def assert_same(one: Learned, other: Learned) -> None:
+    """Two corpora have the same clips, faults and bytes, and so has all that was learned from them."""
+    assert (one.corpus.clips, one.corpus.faults, one.corpus.rate) == (
+        other.corpus.clips,
+        other.corpus.faults,
+        other.corpus.rate,
+    )
+    for name in ("rotations", "root", "times", "detail"):
+        np.testing.assert_array_equal(getattr(one.corpus, name), getattr(other.corpus, name))
+    np.testing.assert_array_equal(one.states, other.states)
+    np.testing.assert_array_equal(one.space.centres, other.space.centres)
+    parts = [(one.grammar.transitions, other.grammar.transitions), (one.grammar.bridges, other.grammar.bridges)]
+    parts += [(one.grammar.coordination, other.grammar.coordination), (one.pace, other.pace)]
+    for mine, theirs in [*parts, (one.carriage, other.carriage), (one.plausibility, other.plausibility)]:
+        for field in fields(mine):
+            if isinstance(value := getattr(mine, field.name), np.ndarray):
+                np.testing.assert_array_equal(value, getattr(theirs, field.name), err_msg=field.name)
+
+
+def gathered(motions: Sequence[Motion], way: str) -> Corpus:
+    """A corpus that was built in one of some ways."""
+    if way == "mirrored, backwards":
+        return gather("dances", motions, mirror=True, reverse=2.0)
+    if way == "mixed":
+        other = gather("other", [replace(ballet_clip("jump").resample(30.0), name="jump", keyframed=False)])
+        return gather("dances", motions, mirror=True, mix=[(other, 0.5)])
+    return gather("dances", motions, facing="stage", skip=2, flips="keep")
+
+
+@pytest.mark.parametrize("way", ["mirrored, backwards", "mixed", "on stage"])
+def test_what_is_added_or_removed_is_as_if_it_were_built_so(dances: list[Motion], way: str) -> None:
+    flips = {"flips": "keep"} if way == "on stage" else {}
+    before = learn(gathered(dances[:2], way), STATES)
+    added = add_recordings(before.corpus, dances[2:], **flips)  # type: ignore[arg-type]
+    assert_same(learn_in(added, before.space), learn_in(gathered(dances, way), before.space))
+    left = remove_clips(added, ["tendus", "fondus"])
+    assert_same(learn_in(left, before.space), learn_in(gathered(dances[1::2], way), before.space))
+    # And there and back again is where one was.
+    assert_same(learn_in(remove_clips(added, ["fondus", "jump"]), before.space), before)
+
+
+def test_how_much_is_outside_of_all_states_is_told(dances: list[Motion]) -> None:
+    before = learn(gather("dances", dances[:1]), STATES)
+    assert outside(before.corpus, before.space)[0] == 0.0
+    turned = dances[0].rotations.copy()
+    turned[:, 9] = rot.mul(turned[:, 9], rot.from_axis_angle(np.array([1.0, 0.0, 0.0]), 3.0))
+    other = replace(dances[0], rotations=turned, name="other")
+    share, joint, degrees = outside(add_recordings(before.corpus, [other]), before.space)
+    assert share == pytest.approx(0.5 / len(before.corpus.skeleton), rel=0.05)
+    assert joint == dances[0].skeleton.names[9]
+    assert degrees > 60.0
+
+
+def test_what_cannot_be_added_or_removed_is_refused(dances: list[Motion]) -> None:
+    corpus = gather("dances", dances[:2])
+    with pytest.raises(CorpusError, match=r"has a clip 'tendus' already: `corpus remove` it first"):
+        add_recordings(corpus, dances[:1])
+    with pytest.raises(CorpusError, match=r"has no clip 'tendu' of its own; did you mean tendus"):
+        remove_clips(corpus, ["tendu"])
+    with pytest.raises(CorpusError, match="without these clips there is no move left"):
+        remove_clips(corpus, ["tendus", "degages"])
+    with pytest.raises(CorpusError, match="is of keyframes"):
+        add_recordings(gather("keys", [ballet_clip("jump")]), dances[:1])
+
+
+def test_a_corpus_is_added_to_and_taken_from_in_place(run: Run, dances: list[Motion], tmp_path: Path) -> None:
+    for dance in dances:
+        write_motion(tmp_path / f"{dance.name}.bvh", dance)
+    home = ("--home", str(tmp_path / "home"))
+    names = [str(tmp_path / f"{dance.name}.bvh") for dance in dances]
+    assert run("corpus", "build", "mine", *names[:2], *home).code == 0
+    ran = run("corpus", "add", "mine", *names[2:], *home)
+    assert ran.code == 0, ran.err
+    assert "added 2 files to" in ran.out
+    assert "are in no state" in ran.err
+    assert {clip.name for clip in Engine.load("mine", tmp_path / "home").corpus.clips} >= {"tendus", "fondus"}
+    ran = run("corpus", "remove", "mine", "fondus", "jump", *home)
+    assert ran.code == 0, ran.err
+    manifest = tmp_path / "home/corpora/mine/manifest.json"
+    before = manifest.read_bytes()
+    for wrong in (("remove", "mine", "nobody"), ("add", "mine", names[0]), ("add", "ballet", names[0])):
+        ran = run("corpus", *wrong, *home)
+        assert (ran.code, ran.err.count("error:")) == (2, 1), ran.err
+    assert manifest.read_bytes() == before
