@@ -213,9 +213,15 @@ def serving(project: Project, home: Path | None = None, host: str = "127.0.0.1")
 
 @contextmanager
 def running(*arguments: object, home: Path, **environment: str) -> Iterator[tuple[subprocess.Popen[str], Client]]:
-    """Run `motionmind studio` in a process of its own; yield it and its page."""
+    """Run `motionmind studio` in a process of its own, which heeds interrupts even if the tests run in the background;
+    yield it and its page."""
+    program = (
+        "import runpy, signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "runpy.run_module('motionmind', run_name='__main__', alter_sys=True)\n"
+    )
     process = subprocess.Popen(
-        [sys.executable, "-m", "motionmind", "studio", "--no-browser", *map(str, arguments)],
+        [sys.executable, "-c", program, "studio", "--no-browser", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
