@@ -28,6 +28,20 @@ if TYPE_CHECKING:
 DETAILS = option(
     "--details", section=Section.OUTPUT, is_flag=True, help="Print each joint's states, and each recording with faults."
 )
+FLIPS = option(
+    "--flips",
+    section=Section.LEARN,
+    type=click.Choice(["repair", "keep", "drop"]),
+    default="repair",
+    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
+)
+PERFORMER = option(
+    "--performer",
+    section=Section.ABOUT,
+    default="",
+    show_default=False,
+    help="Name who performs the movement, if not the author: credits name them.",
+)
 _NOTEWORTHY = 1e8  # bytes on disk that are said beforehand
 _FEW = 0.001  # share of orientations outside of all states of which nothing is said
 
@@ -35,20 +49,8 @@ _FEW = 0.001  # share of orientations outside of all states of which nothing is 
 @command("motionmind corpus add mine new/*.bvh")
 @click.argument("name", shell_complete=completion.corpora)
 @click.argument("files", type=FILE, nargs=-1, required=True)
-@option(
-    "--flips",
-    section=Section.LEARN,
-    type=click.Choice(["repair", "keep", "drop"]),
-    default="repair",
-    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
-)
-@option(
-    "--performer",
-    section=Section.ABOUT,
-    default="",
-    show_default=False,
-    help="Name who performs the movement, if not the author: credits name them.",
-)
+@FLIPS
+@PERFORMER
 @reading
 @DETAILS
 @HOME

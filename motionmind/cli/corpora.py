@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from motionmind.cli import completion
-from motionmind.cli.changes import DETAILS, add, remove, take_files
+from motionmind.cli.changes import DETAILS, FLIPS, PERFORMER, add, remove, take_files
 from motionmind.cli.files import clip_names, read_mapping
 from motionmind.cli.options import (
     HOME,
@@ -77,13 +77,7 @@ def corpora(context: click.Context) -> None:
     shell_complete=completion.corpora,
     help="Learn from another corpus, too, and count each of its moves WEIGHT times  [default: 1]. Repeatable.",
 )
-@option(
-    "--flips",
-    section=Section.LEARN,
-    type=click.Choice(["repair", "keep", "drop"]),
-    default="repair",
-    help="Repair a clip where a joint jumps, keep it as it is, or drop it.",
-)
+@FLIPS
 @option(
     "--flip-angle",
     section=Section.LEARN,
@@ -127,13 +121,7 @@ def corpora(context: click.Context) -> None:
 @option("--title", section=Section.ABOUT, default="", show_default=False, help="Describe the corpus in a line.")
 @option("--author", section=Section.ABOUT, default="", show_default=False, help="Name who made the movement.")
 @option("--source", section=Section.ABOUT, default="", show_default=False, help="State where the movement comes from.")
-@option(
-    "--performer",
-    section=Section.ABOUT,
-    default="",
-    show_default=False,
-    help="Name who performs the movement, if not the author: credits name them.",
-)
+@PERFORMER
 @option("--licence", section=Section.ABOUT, default="", show_default=False, help="State the licence of the movement.")
 @option("--citation", section=Section.ABOUT, default="", show_default=False, help="State how to cite the corpus.")
 @HOME
