@@ -15,6 +15,7 @@ from motionmind.body.motion import Motion
 from motionmind.corpus.changing import add_recordings, remove_clips
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
+from motionmind.corpus.recordings import Flips
 from motionmind.discretize import Codebook
 from motionmind.errors import CorpusError
 from motionmind.formats import write_motion
@@ -69,9 +70,9 @@ def gathered(motions: Sequence[Motion], way: str) -> Corpus:
 
 @pytest.mark.parametrize("way", ["mirrored, backwards", "mixed", "on stage"])
 def test_what_is_added_or_removed_is_as_if_it_were_built_so(dances: list[Motion], way: str) -> None:
-    flips = {"flips": "keep"} if way == "on stage" else {}
+    flips: Flips = "keep" if way == "on stage" else "repair"
     before = learn(gathered(dances[:2], way), STATES)
-    added = add_recordings(before.corpus, dances[2:], **flips)  # type: ignore[arg-type]
+    added = add_recordings(before.corpus, dances[2:], flips=flips)
     assert_same(learn_in(added, before.space), learn_in(gathered(dances, way), before.space))
     left = remove_clips(added, ["tendus", "fondus"])
     assert_same(learn_in(left, before.space), learn_in(gathered(dances[1::2], way), before.space))
