@@ -105,6 +105,8 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
     async def events(request: Request) -> Response:
         window_of(request)
         first: dict[tuple[str, str], Any] = {("project", ""): {"sequence": studio.project.sequence}}
+        if studio.has_stopped:
+            first["smoothing", ""] = {"stopped": True}
         first |= {("job", job.id): job.view() for job in studio.workers.jobs}
         headers = {"cache-control": "no-store"}
         return StreamingResponse(studio.events.open(first), headers=headers, media_type="text/event-stream")

@@ -141,7 +141,6 @@ class Smoother:
         self._state = studio.project.state
         self._seen: dict[str, int] = {}  # when each question first came up
         self._job: Job | None = None
-        self._is_stopped = False
         studio.project.subscribe(self._look)
 
     def _look(self) -> None:
@@ -152,12 +151,12 @@ class Smoother:
 
     def go_on(self) -> None:
         """Judge and smooth what is open."""
-        self._is_stopped = False
+        self._studio.tell_of_smoothing(has_stopped=False)
         self._changed.set()
 
     def stop(self) -> None:
         """Stop until the next edit; what was found stays."""
-        self._is_stopped = True
+        self._studio.tell_of_smoothing(has_stopped=True)
         if self._job is not None:
             self._job.cancel()
 
@@ -169,7 +168,7 @@ class Smoother:
                 self._changed.clear()
                 await asyncio.sleep(_SETTLE)
             with suppress(JobCancelledError):
-                while not self._is_stopped and await self._step():
+                while not self._studio.has_stopped and await self._step():
                     pass
 
     async def _step(self) -> bool:
@@ -211,7 +210,7 @@ class Smoother:
         except JobCancelledError:
             raise
         except MotionMindError:  # which the job's state tells
-            self._is_stopped = True
+            self._studio.tell_of_smoothing(has_stopped=True)
 
     async def _smooth(self, corpus: str, question: Question, judged: Finding) -> None:
         try:

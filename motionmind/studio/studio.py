@@ -37,6 +37,7 @@ class Studio:
         events: what the windows are told.
         thumbnails: small pictures.
         workers: the worker processes, once the server runs.
+        has_stopped: whether seams stay as they are until somebody lets smoothing go on.
     """
 
     workers: Workers
@@ -58,6 +59,7 @@ class Studio:
         """
         self.project, self.home = project, home
         self.events, self.thumbnails = Events(), Thumbnails()
+        self.has_stopped = False
         self._processes, self._first = processes, first
         self._engines: OrderedDict[str, Engine] = OrderedDict()
         project.subscribe(self._tell_of_project)
@@ -117,6 +119,12 @@ class Studio:
             "undo": project.undoable(window),
             "redo": project.redoable(window),
         }
+
+    def tell_of_smoothing(self, has_stopped: bool) -> None:
+        """Tell the windows when smoothing stops, and when it goes on."""
+        if has_stopped != self.has_stopped:
+            self.has_stopped = has_stopped
+            self.events.send("smoothing", {"stopped": has_stopped})
 
     def _tell_of_project(self) -> None:
         self.events.send("project", {"sequence": self.project.sequence})

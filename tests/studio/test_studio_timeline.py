@@ -276,9 +276,11 @@ def test_edits_come_in_the_order_in_which_they_were_made(page: Any) -> None:
 
 def test_smoothing_tells_how_far_it_is_and_can_be_stopped(page: Any) -> None:
     page.evaluate("studio.api.edit({ edit: 'mirror', block: 'b2' })")
-    page.get_by_test_id("smoothing-stop").click()
-    page.get_by_text(re.compile(r"not smoothed: [12] of 2 seams")).wait_for()
-    page.get_by_test_id("smoothing-stop").click()
+    page.get_by_text(re.compile(r"^smoothing: [12] of 2 seams")).wait_for()
+    page.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text(re.compile(r"^not smoothed: [12] of 2 seams")).wait_for()
+    page.reload()
+    page.get_by_role("button", name="Go on", exact=True).click()
     wait_for_states(page, ["inserted", "inserted"])
     assert page.get_by_test_id("smoothing").count() == 0
 

@@ -20,6 +20,7 @@ export class Store extends EventTarget {
     /** @type {Map<string, any>} */
     this.jobs = new Map();
     this.connected = true;
+    this.stopped = false; // whether seams wait until somebody lets smoothing go on
     this.tries = 0;
     api.taken = (state) => this.take(state);
   }
@@ -52,6 +53,7 @@ export class Store extends EventTarget {
     const source = new EventSource(`/api/events?window=${this.api.window}`);
     source.addEventListener("open", () => {
       this.tries = 0;
+      this.stopped = false; // or else the next event says so
       if (!this.connected) this.load().catch(() => {});
       if (!this.connected) this.set({ connected: true });
     });
@@ -59,6 +61,7 @@ export class Store extends EventTarget {
       const { sequence } = JSON.parse(event.data);
       if (this.state && sequence > this.state.sequence) this.load().catch(() => {});
     });
+    source.addEventListener("smoothing", (event) => this.set(JSON.parse(event.data)));
     source.addEventListener("job", (event) => this.#hear(JSON.parse(event.data)));
     source.addEventListener("error", () => {
       source.close();

@@ -14,7 +14,6 @@ import { WishSheet } from "./wishes.js";
 
 const EMPTY = { seconds: 0, parts: [], blocks: [], seams: [] };
 const TEMPO = "motionmind-tempo"; // where this browser keeps it
-const REST = 1000; // milliseconds
 const HEIGHT = 48; // pixels of a thumbnail
 /** The rows of the sheet of keys; the tracks hear the keys themselves, where they have the focus. */
 const ROWS = KEYS.filter(([, , shown]) => shown).map(([, , shown, does]) => ({ shown: [shown], does, group: "Time line" }));
@@ -38,7 +37,7 @@ export function Panel({ studio }) {
   useEffect(() => {
     if (sight.fits) show({ scale: fitting(piece.seconds, sight.width, piece.blocks.length), left: 0 });
   }, [piece.seconds, piece.blocks.length, sight.width, sight.fits]);
-  const stopped = useRested(useStore(studio, ({ jobs }) => [...jobs.values()].some(atSeams)));
+  const stopped = useStore(studio, (store) => store.stopped);
   useEffect(() => studio.keys.add(ROWS), [studio]);
   const seam = selected(piece, selection)?.seam;
   return html`<section
@@ -78,22 +77,6 @@ export function Panel({ studio }) {
       }}
     />`}
   </section>`;
-}
-
-/** Whether nothing has been going on for a while: from one job to the next it takes a moment. */
-function useRested(active) {
-  const [rested, setRested] = useState(false);
-  useEffect(() => {
-    if (active) setRested(false);
-    const timer = active ? 0 : setTimeout(() => setRested(true), REST);
-    return () => clearTimeout(timer);
-  }, [active]);
-  return rested && !active;
-}
-
-/** Whether a job is at a seam, and not over. */
-function atSeams({ kind, state }) {
-  return kind.startsWith("seam") && (state === "waiting" || state === "running");
 }
 
 /** Whether a key is for what has the focus. */
