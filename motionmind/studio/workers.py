@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import os
+import sys
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
@@ -299,7 +300,7 @@ class _Worker:
     def __init__(self, workers: Workers, home: Path | None, warm: str) -> None:
         self.job: Job | None = None
         self._workers, self._is_killed, self.has_begun = workers, False, False
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=work, args=(theirs, home, warm), daemon=True, name="motionmind studio")
         self._theirs = theirs
@@ -334,6 +335,15 @@ class _Worker:
             self._workers.post(self, None)
         with suppress(AssertionError):
             self._process.join()
+
+
+def _context() -> Any:
+    """Return how processes start: forked from one that has all loaded, where that is safe, or else afresh."""
+    if sys.platform != "linux":  # elsewhere, what the system's libraries have begun may not survive a fork
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["motionmind.studio.preloaded"])
+    return context
 
 
 def _room() -> int:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 from studio_server import ROOT, running
@@ -20,6 +21,8 @@ from studio_server import ROOT, running
 from motionmind.errors import MotionMindError
 from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
+
+_Found = TypeVar("_Found")
 
 # Appends edits as fast as it can, and says the number of each once it is on disk.
 WRITER = """
@@ -78,11 +81,13 @@ def test_a_server_that_is_killed_has_all_that_it_answered(tmp_path: Path) -> Non
 
 def test_workers_end_with_the_server_that_was_killed(tmp_path: Path) -> None:
     with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, _):
-        children = _until(lambda: [child for child in _children(process.pid) if b"spawn_main" in _command(child)])
-        assert children
+        workers = _until(lambda: [worker for child in _children(process.pid) for worker in _children(child)])
+        assert workers
+        begun = [*_children(process.pid), *workers]
+        assert all(b"multiprocessing" in _command(one) for one in begun)
         process.kill()
         process.wait()
-        assert _until(lambda: not any(b"spawn_main" in _command(child) for child in children))
+        assert _until(lambda: not any(b"multiprocessing" in _command(one) for one in begun))
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.5])
@@ -199,7 +204,7 @@ def _command(process: int) -> bytes:
         return b""
 
 
-def _until(found: Callable[[], object], seconds: float = 15.0) -> object:
+def _until(found: Callable[[], _Found], seconds: float = 15.0) -> _Found:
     """Wait until something is found, and return it."""
     end = time.monotonic() + seconds
     while not (value := found()) and time.monotonic() < end:
