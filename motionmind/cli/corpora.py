@@ -110,7 +110,14 @@ def corpora(context: click.Context) -> None:
 )
 @reading
 @option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that cannot be read.")
-@option("--workers", section=Section.WORKERS, type=COUNT, metavar="N", default=1, help="Read with N processes.")
+@option(
+    "--workers",
+    section=Section.WORKERS,
+    type=COUNT,
+    metavar="N",
+    default=1,
+    help="Read with N processes, and learn with N threads.",
+)
 @option(
     "--scheduler",
     section=Section.WORKERS,
@@ -156,6 +163,7 @@ def build(
     from motionmind.corpus.store import place_for
     from motionmind.discretize import make_discretization
     from motionmind.executors.opening import open_team
+    from motionmind.executors.workshop import Workshop
     from motionmind.tween.engine import Engine
 
     place = place_for(name, home)
@@ -173,6 +181,7 @@ def build(
             home=home,
             rate=takes.rate,
             discretization=discretization,
+            workshop=Workshop.of(workers, folder),
             flip_degrees=flip_angle,
             mix=others,
             **options,

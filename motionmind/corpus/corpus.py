@@ -253,6 +253,14 @@ class Corpus:
         tilt = rot.inv_mul(turn, rotations[..., 0, :])
         return np.concatenate([tilt[..., None, :], rotations[..., 1:, :], turn[..., None, :]], axis=-2)
 
+    def chain(self, number: int) -> Floats:
+        """Return the orientations of one joint chain in all postures [N, 4], as `to_chains` gives them."""
+        if self.facing == "stage" or 0 < number < len(self.skeleton):
+            return np.ascontiguousarray(self.rotations[:, number])
+        pelvis = self.rotations[:, 0]
+        turn = rot.about_vertical(rot.heading(pelvis))
+        return rot.inv_mul(turn, pelvis) if number == 0 else turn
+
     def from_chains(self, chains: Floats) -> Floats:
         """Convert orientations of the joint chains [..., L, 4] to local rotations [..., J, 4]; inverts `to_chains`."""
         if self.facing == "stage":

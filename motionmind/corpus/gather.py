@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from numbers import Real
-from typing import TypedDict, get_args
+from typing import Any, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ from motionmind.corpus.recordings import (
     take_clip,
 )
 from motionmind.errors import CorpusError, MotionMindWarning, enumerated
+from motionmind.executors.workshop import Workshop
 
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # weights of a corpus that is mixed in
 _log = logging.getLogger(__name__)
@@ -84,6 +85,7 @@ def gather(
     licence: str = "",
     citation: str = "",
     performer: str | Mapping[str, str] = "",
+    workshop: Workshop | None = None,
 ) -> Corpus:
     """Gather `motions`, and the corpora to `mix` with them, into a corpus; all are on the same joints.
 
@@ -114,6 +116,7 @@ def gather(
         citation: how to cite it.
         performer: who performs the recordings: one for all, or each by the recording's name. Where it is not known, the
             author is credited.
+        workshop: room for the corpus, where memory lacks it; None keeps it in memory.
 
     Returns:
         The corpus.
@@ -126,6 +129,7 @@ def gather(
         CorpusError: nothing is left to learn from, recordings or corpora differ in their joints or cannot be brought to
             one rate, or an option is out of range.
         SkeletonError: the body cannot be mirrored.
+        OSError: the workshop's disk is full.
     """
     check_text("name", name)
     check_type("rate", rate, str, Real, wanted='"auto", None, or a number', or_none=True)
@@ -141,7 +145,16 @@ def gather(
     _check_options(skip, flips, flip_degrees, reverse)
     given = None if rate == "auto" else rate
     _check_mix(name, mix, given)
-    own = _take_recordings(motions, Taking(rate, skip, flips, flip_degrees, mirror))
+    workshop = workshop or Workshop()
+    growing, images = _Growing(workshop), _Growing(workshop)
+    own: list[Recording] = []
+    for one in _take_recordings(motions, Taking(rate, skip, flips, flip_degrees, mirror)):
+        by = performer if isinstance(performer, str) else performer.get(one.name, "")
+        for into, pieces in ((growing, one.pieces), (images, one.images if mirror else ())):
+            for piece in pieces:
+                clip = replace(piece.clip, about=(about or {}).get(piece.clip.name, ""), performer=by)
+                into.add(piece._replace(clip=clip))
+        own.append(one._replace(pieces=(), images=()))
     body = own[0].body if own else None
     if body is None and not mix:
         raise CorpusError(f"corpus {name!r}: no recordings given")
@@ -155,34 +168,27 @@ def gather(
         difference = body.difference(other.skeleton)
         if difference is not None:
             raise CorpusError(f"corpus {other.name!r} is on another skeleton than {body.name}: {difference}")
-    mixed = [_mixed(other, clip, weight, given) for other, weight in mix for clip in other.clips]
-    if body is None or not (mixed or any(one.pieces for one in own)):
+    mixed = [(other, clip, weight) for other, weight in mix for clip in other.clips]
+    if body is None or not (mixed or growing.clips):
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
     common = _common_rate(taken, bool(own), mix) if given is None else given
     between = frames_between(common)
-
-    def described(one: Recording, piece: Piece) -> Piece:
-        by = performer if isinstance(performer, str) else performer.get(one.name, "")
-        about_it = (about or {}).get(piece.clip.name, "")
-        clip = replace(piece.clip, about=about_it, performer=by)
-        return piece._replace(clip=clip, detail=_widened(piece.detail, between))
-
-    pieces = [described(one, piece) for one in own for piece in one.pieces]
-    pieces += [as_piece(source, between) for source in mixed]
+    for one_mixed in mixed:
+        growing.add(as_piece(_mixed(*one_mixed, given), between))
     if mirror:
-        present = {(source.clip.corpus, source.clip.name) for source in mixed if source.clip.mirrored}
-        pieces += [described(one, image) for one in own for image in one.images]
-        pieces += [
-            mirror_image(source, between) for source in mixed if (source.clip.corpus, source.clip.name) not in present
-        ]
+        growing.extend(images)
+        present = {_name_in(other, clip) for other, clip, _ in mixed if clip.mirrored}
+        for other, clip, weight in mixed:
+            if _name_in(other, clip) not in present:
+                growing.add(mirror_image(_mixed(other, clip, weight, given), between))
     corpus = Corpus(
         name,
         body,
-        _lay_out_clips(name, pieces, common, reverse),
-        np.concatenate([piece.rotations for piece in pieces]),
-        np.concatenate([piece.root for piece in pieces]),
-        np.concatenate([piece.times for piece in pieces]),
-        np.concatenate([piece.detail for piece in pieces]),
+        _lay_out_clips(name, growing.clips, common, reverse),
+        growing.array("rotations"),
+        growing.array("root"),
+        growing.array("times"),
+        growing.detail(between),
         facing,
         common,
         title,
@@ -257,66 +263,112 @@ def _pace(rate: float | None) -> str:
     return "frame by frame" if rate is None else f"{rate:g} postures a second"
 
 
-# --- clips without their place in the corpus --------------------------------------------------------------------------
+# --- a corpus that grows ----------------------------------------------------------------------------------------------
 
 
-def _lay_out_clips(name: str, pieces: Sequence[Piece], rate: float | None, reverse: float | None) -> tuple[Clip, ...]:
-    """Place the clips one after the other, with the heaviest weight scaled to 1; CorpusError if they have no moves."""
-    lengths = np.cumsum([0, *(len(piece.times) for piece in pieces)])
-    if lengths[-1] == len(pieces):
+class _Growing:
+    """Clips of a corpus, one after the other, and their movement.
+
+    Attributes:
+        clips: the clips, in their places.
+    """
+
+    def __init__(self, workshop: Workshop) -> None:
+        self.clips: list[Clip] = []
+        self._workshop, self._joints = workshop, 0
+        self._piles = {name: workshop.pile() for name in Piece._fields[1:]}
+        self._between: list[int] = []  # frames of detail, by clip
+
+    def add(self, piece: Piece) -> None:
+        """Add a clip and its movement."""
+        start = self.clips[-1].stop if self.clips else 0
+        self.clips.append(replace(piece.clip, start=start, stop=start + len(piece.times)))
+        self._joints = piece.detail.shape[2]
+        self._between.append(piece.detail.shape[1])
+        for name, pile in self._piles.items():
+            if name != "detail" or piece.detail.shape[1]:
+                pile.add(getattr(piece, name))
+
+    def extend(self, others: _Growing) -> None:
+        """Add all clips of others, which grow no more."""
+        if not others.clips:
+            return
+        rotations, root, times = (others.array(name) for name in ("rotations", "root", "times"))
+        detail = others.detail(max(others._between))
+        for clip, between in zip(others.clips, others._between, strict=True):
+            here = slice(clip.start, clip.stop)
+            self.add(Piece(clip, rotations[here], root[here], times[here], detail[here, :between]))
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return rotations, roots or times of all postures."""
+        return self._piles[name].array()
+
+    def detail(self, between: int) -> NDArray[np.float16]:
+        """Return the detail of all postures [N, between, J, 3]; of keyframes, which have none, zeros."""
+        pile, count = self._piles["detail"], self.clips[-1].stop
+        if len(pile) == count and set(self._between) == {between}:
+            return pile.array()
+        out = self._workshop.empty((count, between, self._joints, 3), np.float16)
+        kept, start = pile.array() if len(pile) else out[:0], 0
+        for clip, own in zip(self.clips, self._between, strict=True):
+            stop = start + len(clip) * bool(own)
+            out[clip.start : clip.stop] = kept[start:stop] if own else 0.0
+            start = stop
+        return out
+
+
+def _lay_out_clips(name: str, clips: Sequence[Clip], rate: float | None, reverse: float | None) -> tuple[Clip, ...]:
+    """Return the clips with the heaviest weight scaled to 1; CorpusError if they have no moves."""
+    if clips[-1].stop == len(clips):
         at_rate = f" at {rate:g} postures a second" if rate else ""
         raise CorpusError(f"corpus {name!r}: no recording holds two postures{at_rate}, so there is no move to learn")
-    heaviest = max(piece.clip.weight for piece in pieces)
+    heaviest = max(clip.weight for clip in clips)
     return tuple(
-        replace(
-            piece.clip,
-            start=int(start),
-            stop=int(stop),
-            weight=piece.clip.weight / heaviest,
-            reverse=piece.clip.reverse if reverse is None else reverse,
-        )
-        for piece, start, stop in zip(pieces, lengths[:-1], lengths[1:], strict=True)
+        replace(clip, weight=clip.weight / heaviest, reverse=clip.reverse if reverse is None else reverse)
+        for clip in clips
     )
 
 
-def _take_recordings(motions: Iterable[Motion | Recording], taking: Taking) -> list[Recording]:
-    """Take recordings that are not taken yet, and number repeated names.
+def _take_recordings(motions: Iterable[Motion | Recording], taking: Taking) -> Iterator[Recording]:
+    """Yield recordings, taken if they are not yet, with repeated names numbered; then warn of doubtful clocks.
 
     Raises:
         CorpusError: they are on different joints, or there is nothing to take of one.
         SkeletonError: the body cannot be mirrored.
     """
-    out: list[Recording] = []
+    first: Recording | None = None
     names: set[str] = set()
+    doubts: list[str] = []
     for motion in motions:
         check_type("a clip", motion, Motion, Recording, wanted="a Motion")
         taken = motion if isinstance(motion, Recording) else take(motion, taking)
-        difference = out[0].body.difference(taken.body) if out else None
-        if difference is not None:
+        if first is not None and (difference := first.body.difference(taken.body)) is not None:
             raise CorpusError(
-                f"{taken.name} is on another skeleton than {out[0].name}: {difference}; "
+                f"{taken.name} is on another skeleton than {first.name}: {difference}; "
                 "a corpus has one (a mapping of joints may bring it there)"
             )
-        out.append(renamed(taken, _free_name(taken.name, names)))
-        names.add(out[-1].name)
-    if doubts := [f"{one.name} ({one.doubt})" for one in out if one.doubt]:
+        taken = renamed(taken, _free_name(taken.name, names))
+        first = first or taken._replace(pieces=(), images=())
+        names.add(taken.name)
+        if taken.doubt:
+            doubts.append(f"{taken.name} ({taken.doubt})")
+        yield taken
+    if doubts:
         message = (
             f"frames per second, or the unit, are doubtful where people move as nobody can: {enumerated(doubts, 3)}"
         )
         warnings.warn(message, MotionMindWarning, stacklevel=3)
-    return out
+
+
+def _name_in(other: Corpus, clip: Clip) -> tuple[str, str]:
+    """Return the name of the corpus that a clip of another corpus comes from, and its own."""
+    return clip.corpus or other.name, clip.name
 
 
 def _mixed(other: Corpus, clip: Clip, weight: float, rate: float | None) -> Source:
     """Take a clip of another corpus, marked with its name, counting `weight` times as much."""
     found = take_clip(other, clip, rate)
     return found._replace(clip=replace(clip, corpus=clip.corpus or other.name, weight=weight * clip.weight))
-
-
-def _widened(detail: NDArray[np.float16], between: int) -> NDArray[np.float16]:
-    """Return detail [N, between, J, 3]: zeros for keyframes, which have none, among recordings."""
-    count, kept, joints, _ = detail.shape
-    return detail if kept == between else np.zeros((count, between, joints, 3), np.float16)
 
 
 def _free_name(name: str, taken: set[str]) -> str:

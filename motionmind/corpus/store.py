@@ -33,7 +33,8 @@ _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name fro
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
     *("_cells.py", "_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py", "plugins.py"),
-    *("geometry", "credits", "body", "retarget", "formats", "notation", "corpus", "discretize", "grammar", "learned"),
+    *("executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
+    *("discretize", "grammar", "learned"),
 )
 
 
@@ -203,7 +204,9 @@ def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArr
     with versions.new_version(folder) as version:
         for name, array in arrays.items():
             with (version / f"{name}.npy").open("xb") as file:
-                np.save(file, np.ascontiguousarray(array), allow_pickle=False)
+                whole = np.ascontiguousarray(array)
+                np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(whole))
+                file.write(whole.data)  # as np.save does, but for an error that says why
                 file.flush()
                 os.fsync(file.fileno())
         sync_folder(version)

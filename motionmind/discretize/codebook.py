@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.discretize.protocol import check_range, per_joint_values, samples
+from motionmind.discretize.protocol import check_range, fit_joints, per_joint_values
 from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.geometry import rotations as rot
 
@@ -67,10 +67,13 @@ class Codebook:
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Learn the states for `names` [J] that cover `rotations` [N, J, 4]; see `Discretization.fit`."""
-        rotations = samples(names, rotations)
-        tolerances = per_joint_values(names, self.tolerance, self.per_joint)
-        centres = [codebook(rotations[:, j], tolerances[j]) for j in range(len(names))]
-        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=tolerances)
+        return fit_joints(self, names, rotations)
+
+    def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
+        """Learn the states of one of the joints that cover `rotations` [N, 4]; see `ByJoint.fit_joint`."""
+        tolerance = float(per_joint_values(names, self.tolerance, self.per_joint)[joint])
+        centres = codebook(rotations, tolerance)
+        return StateSpace.of_joints([names[joint]], [centres], kind=self.kind, tolerances=np.array([tolerance]))
 
     def to_spec(self) -> dict[str, object]:
         """Return the tolerances, as `from_spec` reads them."""

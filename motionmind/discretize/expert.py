@@ -9,7 +9,7 @@ from typing import ClassVar
 from motionmind._typing import Floats
 from motionmind.discretize.codebook import codebook
 from motionmind.discretize.library import Library, library_to_mapping, read_library
-from motionmind.discretize.protocol import check_range, per_joint_values, samples
+from motionmind.discretize.protocol import check_range, fit_joints, per_joint_values
 from motionmind.discretize.states import StateSpace
 from motionmind.files import FilePath
 
@@ -62,20 +62,17 @@ class ExpertLibrary:
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Return the library's states for `names` [J]; see `Discretization.fit`."""
-        rotations = samples(names, rotations)
-        tolerances = per_joint_values(names, self.tolerance, self.per_joint)
-        tables = self.library.tables_of(names)
-        centres: list[Floats] = []
-        labels: list[tuple[str, ...]] = []
-        for j, name in enumerate(names):
-            table = tables.get(j)
-            if table is None:
-                centres.append(codebook(rotations[:, j], float(tolerances[j])))
-                labels.append(())
-            else:
-                centres.append(self.library.of_joint(table, name))
-                labels.append(tuple(self.library.tables[table]))
-        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=tolerances, labels=labels)
+        return fit_joints(self, names, rotations)
+
+    def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
+        """Return the library's states for one of the joints, of `rotations` [N, 4]; see `ByJoint.fit_joint`."""
+        tolerances = per_joint_values(names, self.tolerance, self.per_joint)[[joint]]
+        table = self.library.tables_of(names).get(joint)
+        centres = (
+            codebook(rotations, float(tolerances[0])) if table is None else self.library.of_joint(table, names[joint])
+        )
+        labels = () if table is None else tuple(self.library.tables[table])
+        return StateSpace.of_joints([names[joint]], [centres], kind=self.kind, tolerances=tolerances, labels=[labels])
 
     def to_spec(self) -> dict[str, object]:
         """Return the whole library, as `from_spec` reads it: a manifest must be readable without the library's file.

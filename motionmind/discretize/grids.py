@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.discretize.protocol import check_range, per_joint_values, samples
+from motionmind.discretize.protocol import check_range, fit_joints, per_joint_values
 from motionmind.discretize.states import StateSpace, distinct, nearest
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
@@ -48,10 +48,13 @@ class QuaternionGrid:
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
-        rotations = samples(names, rotations)
-        steps = per_joint_values(names, self.step, self.per_joint)
-        centres = [self._cells(rotations[:, j], steps[j]) for j in range(len(names))]
-        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=np.degrees(2.0 * np.arcsin(steps)))
+        return fit_joints(self, names, rotations)
+
+    def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
+        """Return the cells of one of the joints, of `rotations` [N, 4], that occur; see `ByJoint.fit_joint`."""
+        step = per_joint_values(names, self.step, self.per_joint)[[joint]]
+        centres, tolerances = self._cells(rotations, step[0]), np.degrees(2.0 * np.arcsin(step))
+        return StateSpace.of_joints([names[joint]], [centres], kind=self.kind, tolerances=tolerances)
 
     def to_spec(self) -> dict[str, object]:
         """Return the steps, as `from_spec` reads them."""
@@ -98,10 +101,13 @@ class EulerGrid:
 
     def fit(self, names: Sequence[str], rotations: Floats) -> StateSpace:
         """Return the cells of `rotations` [N, J, 4] that occur, for `names` [J]; see `Discretization.fit`."""
-        rotations = samples(names, rotations)
-        widths = per_joint_values(names, self.degrees, self.per_joint)
-        centres = [self._cells(rotations[:, j], np.radians(widths[j])) for j in range(len(names))]
-        return StateSpace.of_joints(names, centres, kind=self.kind, tolerances=widths * np.sqrt(5.0) / 2.0)
+        return fit_joints(self, names, rotations)
+
+    def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
+        """Return the cells of one of the joints, of `rotations` [N, 4], that occur; see `ByJoint.fit_joint`."""
+        width = per_joint_values(names, self.degrees, self.per_joint)[[joint]]
+        centres, tolerances = self._cells(rotations, np.radians(width[0])), width * np.sqrt(5.0) / 2.0
+        return StateSpace.of_joints([names[joint]], [centres], kind=self.kind, tolerances=tolerances)
 
     def to_spec(self) -> dict[str, object]:
         """Return the widths and the order, as `from_spec` reads them."""

@@ -52,6 +52,30 @@ class Discretization(Protocol):
         ...
 
 
+@runtime_checkable
+class ByJoint(Discretization, Protocol):
+    """A discretization that divides the orientations of each joint by themselves, so that joints can be done apart."""
+
+    def fit_joint(self, names: Sequence[str], joint: int, rotations: Floats) -> StateSpace:
+        """Divide one joint's orientations into states: those that `fit` gives this joint.
+
+        Args:
+            names: names of all joints [J], for settings by joint.
+            joint: the joint's index.
+            rotations: unit quaternions of the joint in a corpus's postures [N, 4].
+
+        Raises:
+            SkeletonError: a per-joint setting is for no joint of `names`.
+        """
+        ...
+
+
+def fit_joints(discretization: ByJoint, names: Sequence[str], rotations: Floats) -> StateSpace:
+    """Divide each joint's orientations [N, J, 4] into states, joint by joint; as `Discretization.fit`."""
+    rotations = samples(names, rotations)
+    return StateSpace.joined([discretization.fit_joint(names, j, rotations[:, j]) for j in range(len(names))])
+
+
 def samples(names: Sequence[str], rotations: Floats) -> Floats:
     """Check the arguments of `fit`, and return `rotations` as float64 [N, J, 4].
 

@@ -105,6 +105,29 @@ class StateSpace:
         flat = rot.canonical(np.concatenate([np.asarray(c, dtype=np.float64) for c in centres]))
         return cls(tuple(names), flat, starts, kind, tolerances, tuple(tuple(named) for named in labels))
 
+    @classmethod
+    def joined(cls, spaces: Sequence[StateSpace]) -> StateSpace:
+        """Make one state space of some, one at least, of one kind and on different joints, in their order."""
+        starts = np.concatenate([[0], np.cumsum(np.concatenate([space.sizes for space in spaces]))])
+        return cls(
+            tuple(name for space in spaces for name in space.names),
+            np.concatenate([space.centres for space in spaces]),
+            starts,
+            spaces[0].kind,
+            np.concatenate([space.tolerances for space in spaces]),
+            tuple(labels for space in spaces for labels in space.labels),
+        )
+
+    def alone(self, joint: int) -> StateSpace:
+        """Return the states of one joint as a state space."""
+        return StateSpace.of_joints(
+            [self.names[joint]],
+            [self.of(joint)],
+            kind=self.kind,
+            tolerances=self.tolerances[[joint]],
+            labels=[self.labels[joint]],
+        )
+
     @cached_property
     def sizes(self) -> Ints:
         """Number of states of each joint [J]."""

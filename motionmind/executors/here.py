@@ -1,4 +1,4 @@
-"""Executors on this machine: this very process, and pools of others."""
+"""Executors on this machine: this very process, its threads, and pools of other processes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
@@ -36,6 +36,13 @@ class Here(Executor):
 def this_process() -> Team:
     """Return a team of this process alone, which does a job at a time."""
     return Team(Here, lambda: 1)
+
+
+def threads(number: int) -> Team:
+    """Return a team of so many threads of this process: for jobs that mostly compute in compiled code."""
+    if number == 1:
+        return this_process()
+    return Team(lambda: ThreadPoolExecutor(number), lambda: AHEAD * number)
 
 
 @contextmanager

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
+from motionmind.executors.here import this_process
+from motionmind.executors.team import Team
 from motionmind.grammar.transitions import Transitions
 
 NEAREST = 3  # nearest states to which bridges lead from each state
@@ -34,7 +36,7 @@ class Bridges:
         return float(self.degrees[first + np.searchsorted(self.targets[first:last], target)])
 
 
-def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
+def find_bridges(centres: Floats, transitions: Transitions, team: Team | None = None) -> Bridges:
     """Find the bridges between the states of each chain.
 
     Bridges lead from every state to its three nearest within 45 degrees and, both ways, along a minimum spanning tree
@@ -43,19 +45,23 @@ def find_bridges(centres: Floats, transitions: Transitions) -> Bridges:
     Args:
         centres: orientation of each state of each chain [G, 4].
         transitions: the joint graphs.
+        team: threads, for which each chain is a job; None for this one.
     """
-    indptr, targets, degrees = [np.zeros(1, np.int64)], [], []
-    for chain, size in enumerate(transitions.sizes()):
-        first = transitions.starts[chain]
+    sizes = transitions.sizes()
+
+    def find(chain: int) -> tuple[Ints, Int32s, Floats]:
+        first, size = transitions.starts[chain], sizes[chain]
         own = centres[first : first + size]
         keys, angles = _of_all_pairs(own) if size <= MOST_COMPARED else _of_near_pairs(own)
         rows = transitions.indptr[first : first + size + 1]
         attested = np.repeat(np.arange(size), np.diff(rows)) * size + transitions.targets[rows[0] : rows[-1]]
         new = ~np.isin(keys, attested)
-        indptr.append(np.cumsum(np.bincount(keys[new] // size, minlength=size)) + indptr[-1][-1])
-        targets.append((keys[new] % size).astype(np.int32))
-        degrees.append(angles[new])
-    return Bridges(np.concatenate(indptr), np.concatenate(targets), np.concatenate(degrees))
+        leaving = np.bincount(keys[new] // size, minlength=size)
+        return leaving, (keys[new] % size).astype(np.int32), angles[new]
+
+    found = (team or this_process()).map(find, range(len(sizes)))
+    leaving, targets, degrees = map(np.concatenate, zip(*found, strict=True))
+    return Bridges(np.concatenate([[0], np.cumsum(leaving)]), targets, degrees)
 
 
 def _of_all_pairs(centres: Floats) -> tuple[Ints, Floats]:

@@ -22,6 +22,8 @@ import numpy as np
 
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.errors import CorpusError
+from motionmind.executors.here import this_process
+from motionmind.executors.team import Team
 
 if TYPE_CHECKING:
     from pgmpy.models import DiscreteBayesianNetwork
@@ -88,7 +90,12 @@ class Coordination:
 
 
 def count_coordination(
-    parents: Ints, states: Int32s, sizes: Ints, joints: int, weights: Floats | None = None
+    parents: Ints,
+    states: Int32s,
+    sizes: Ints,
+    joints: int,
+    weights: Floats | None = None,
+    team: Team | None = None,
 ) -> Coordination:
     """Count how joints coordinate.
 
@@ -98,34 +105,35 @@ def count_coordination(
         sizes: number of states of each chain [L].
         joints: number of the first chains, which are joints; others get no coordination.
         weights: weight of each posture [N]; None for 1.
+        team: threads, for which each joint is a job; None for this one.
     """
     weights = np.ones(len(states)) if weights is None else np.asarray(weights)
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     coupled = np.where(np.arange(len(parents)) < joints, parents, -1).astype(np.int64)
+    rows = np.where(coupled >= 0, np.asarray(sizes)[coupled], 0)
     child_costs = np.zeros(starts[-1])
-    pair_starts, pair_counts = [0], [np.zeros(0, dtype=np.int64)]
-    pair_states, pair_costs, parent_costs = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0)]
-    for j, parent in enumerate(coupled):
-        pair_starts.append(pair_starts[-1] + (int(sizes[parent]) if parent >= 0 else 0))
-        if parent < 0:
-            continue
+
+    def count_pairs(j: int) -> tuple[Ints, Ints, Floats, Floats]:
+        parent = coupled[j]
         prior = PSEUDO_COUNT * np.bincount(states[:, j], weights, sizes[j]) / weights.sum()
         visits = np.bincount(states[:, parent], weights, sizes[parent]) + PSEUDO_COUNT
         keys, which = np.unique(states[:, parent].astype(np.int64) * sizes[j] + states[:, j], return_inverse=True)
         p, c = keys // sizes[j], keys % sizes[j]
-        pair_counts.append(np.bincount(p, minlength=sizes[parent]))
-        pair_states.append(c)
-        pair_costs.append(np.log(visits[p]) - np.log(np.bincount(which, weights, len(keys)) + prior[c]))
+        costs = np.log(visits[p]) - np.log(np.bincount(which, weights, len(keys)) + prior[c])
         child_costs[starts[j] : starts[j + 1]] = -np.log(prior)
-        parent_costs.append(np.log(visits))
+        return np.bincount(p, minlength=sizes[parent]), c, costs, np.log(visits)
+
+    none = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+    found = (team or this_process()).map(count_pairs, np.flatnonzero(coupled >= 0).tolist())
+    pair_counts, pair_states, pair_costs, parent_costs = map(np.concatenate, zip(none, *found, strict=True))
     return Coordination(
         coupled,
-        np.array(pair_starts, dtype=np.int64),
-        np.concatenate([[0], np.cumsum(np.concatenate(pair_counts))]).astype(np.int64),
-        np.concatenate(pair_states).astype(np.int32),
-        np.concatenate(pair_costs),
+        np.concatenate([[0], np.cumsum(rows)]).astype(np.int64),
+        np.concatenate([[0], np.cumsum(pair_counts)]).astype(np.int64),
+        pair_states.astype(np.int32),
+        pair_costs,
         child_costs,
-        np.concatenate(parent_costs),
+        parent_costs,
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.executors.here import this_process
+from motionmind.executors.team import Team
 from motionmind.grammar.bridges import Bridges, find_bridges
 from motionmind.grammar.coordination import Coordination, count_coordination
 from motionmind.grammar.transitions import Transitions, count_transitions
@@ -41,6 +43,7 @@ def learn(
     ends: Ints | None = None,
     weights: Floats | None = None,
     posture_weights: Floats | None = None,
+    team: Team | None = None,
 ) -> Grammar:
     """Learn a grammar from N postures of a corpus, with L chains and M moves between postures.
 
@@ -56,7 +59,9 @@ def learn(
         ends: the posture that each move leads to [M]; None for the next one.
         weights: weight of each move [M]; None for 1.
         posture_weights: weight of each posture [N]; None for 1.
+        team: threads, for which each chain is a job; None for this one.
     """
+    team = team or this_process()
     joints = len(chains) - (chains[-1] == "facing")
     transitions = count_transitions(
         states,
@@ -67,6 +72,7 @@ def learn(
         ends=ends,
         weights=weights,
         posture_weights=posture_weights,
+        team=team,
     )
-    coordination = count_coordination(parents, states, sizes, joints, posture_weights)
-    return Grammar(chains, centres, transitions, find_bridges(centres, transitions), coordination)
+    coordination = count_coordination(parents, states, sizes, joints, posture_weights, team)
+    return Grammar(chains, centres, transitions, find_bridges(centres, transitions, team), coordination)

@@ -7,11 +7,14 @@ state s of chain j has the row `starts[j] + s` in flat arrays.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Int32s, Ints
+from motionmind.executors.here import this_process
+from motionmind.executors.team import Team
 from motionmind.grammar.schemes import Weights
 
 
@@ -109,6 +112,7 @@ def count_transitions(
     ends: Ints | None = None,
     weights: Floats | None = None,
     posture_weights: Floats | None = None,
+    team: Team | None = None,
 ) -> Transitions:
     """Count the transitions of all chains.
 
@@ -123,20 +127,23 @@ def count_transitions(
         ends: the posture that each move leads to [M]; None for the next one.
         weights: weight of each move [M]; None for 1.
         posture_weights: weight of each posture [N]; None for 1.
+        team: threads, for which each chain is a job; None for this one.
     """
     ends = begins + 1 if ends is None else ends
     weights = np.ones(len(begins)) if weights is None else weights
     posture_weights = np.ones(len(states)) if posture_weights is None else posture_weights
     size = np.asarray(sizes, dtype=np.int64)
-    counted, visits = [], []
-    for chain in range(states.shape[1]):
+
+    def count_chain(chain: int) -> tuple[_Counted, NDArray[Any]]:
         src, dst = states[begins, chain].astype(np.int64), states[ends, chain].astype(np.int64)
         if chain == pooled:
-            counted.append(_pool(_count(np.zeros_like(src), (dst - src) % size[chain], size[chain], seconds, weights)))
-            visits.append(np.full(size[chain], posture_weights.sum() / size[chain]))
-        else:
-            counted.append(_count(src, dst, size[chain], seconds, weights))
-            visits.append(np.bincount(states[:, chain], weights=posture_weights, minlength=size[chain]))
+            turns = _count(np.zeros_like(src), (dst - src) % size[chain], size[chain], seconds, weights)
+            return _pool(turns), np.full(size[chain], posture_weights.sum() / size[chain])
+        visits = np.bincount(states[:, chain], weights=posture_weights, minlength=size[chain])
+        return _count(src, dst, size[chain], seconds, weights), visits
+
+    chains = range(states.shape[1])
+    counted, visits = zip(*(team or this_process()).map(count_chain, chains), strict=True)
     starts = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
     rows = np.concatenate([starts[chain] + one.sources for chain, one in enumerate(counted)])
     leaving = np.bincount(rows, minlength=starts[-1])

@@ -8,15 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
-from motionmind.body.capsules import penetration
+from motionmind.body.capsules import capsules_of, penetration
 from motionmind.body.contact import contact_points, floor_height, limb_heights, lowest_height
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.limits import find_loose
 from motionmind.body.support import NEAR, STILL, centre_of_mass, overhang, size_of
 from motionmind.corpus.corpus import Corpus
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.learned.clusters import clusters_of
 from motionmind.learned.neighbours import MANY, Neighbours, build_neighbours
+from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK
 
 SLIDES = 0.3  # metres a second at which a limb on the floor stands half as firmly as one at rest
@@ -72,11 +74,19 @@ class Carriage:
     trees: Neighbours | None = None
 
 
-def learn_carriage(corpus: Corpus) -> Carriage:
-    """Learn how the bodies of a corpus hold themselves, travel and stand."""
-    low = np.concatenate(
-        [lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here]) for here in _blocks(len(corpus))]
-    )
+def learn_carriage(corpus: Corpus, workshop: Workshop | None = None) -> Carriage:
+    """Learn how the bodies of a corpus hold themselves, travel and stand.
+
+    Args:
+        corpus: the movement.
+        workshop: threads, and room for large arrays; None for this thread and memory.
+    """
+    workshop = workshop or Workshop()
+
+    def low_in(here: slice) -> Floats:
+        return lowest_height(corpus.skeleton, corpus.rotations[here], corpus.root[here])
+
+    low = np.concatenate(list(workshop.map(low_in, _blocks(len(corpus)))))
     floor = [floor_height(low[clip.start : clip.stop]) for clip in corpus.clips]
     clearance = np.maximum(low - np.repeat(floor, [clip.stop - clip.start for clip in corpus.clips]), 0.0)
     begins, ends, weights = corpus.moves.begins, corpus.moves.ends, corpus.moves.weights
@@ -84,11 +94,11 @@ def learn_carriage(corpus: Corpus) -> Carriage:
     heading = rot.heading(corpus.rotations[:, 0])
     turned = np.angle(np.exp(1j * (heading[ends] - heading[begins])))
     moved = rot.mul_vec(rot.about_vertical(-heading[begins] - 0.5 * turned), corpus.root[ends] - corpus.root[begins])
-    orientations = _orientations(corpus)
+    orientations = _orientations(corpus, workshop)
     middles = len(corpus) + np.arange(len(begins))
-    stands = _standing(corpus)
+    stands = _standing(corpus, workshop)
     clear = np.concatenate([clearance, 0.5 * (clearance[begins] + clearance[ends])])
-    aloft = _aloft(corpus, clear)
+    aloft = _aloft(corpus, clear, workshop)
     counts = np.concatenate([corpus.weights, weights])
     return Carriage(
         orientations,
@@ -96,16 +106,16 @@ def learn_carriage(corpus: Corpus) -> Carriage:
         np.concatenate([begins, middles]),
         np.concatenate([middles, ends]),
         np.concatenate([shares, np.ones(len(begins))]),
-        clusters_of(corpus.skeleton, orientations),
+        clusters_of(corpus.skeleton, orientations, workshop),
         0.5 * turned,
         0.5 * moved,
         clear,
         stands,
         aloft,
-        _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)]),
+        _overhang(corpus, stands[: len(corpus)], aloft[: len(corpus)], workshop),
         find_loose(corpus.skeleton, corpus.rotations),
-        _touching(corpus),
-        build_neighbours(corpus.skeleton, orientations, counts) if len(counts) > MANY else None,
+        _touching(corpus, workshop),
+        build_neighbours(corpus.skeleton, orientations, counts, workshop) if len(counts) > MANY else None,
     )
 
 
@@ -114,24 +124,37 @@ def _blocks(count: int) -> Iterator[slice]:
     return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 
-def _orientations(corpus: Corpus) -> Floats:
+def _orientations(corpus: Corpus, workshop: Workshop) -> Floats:
     """Return the orientations of the chains in the postures, and midway in the moves [N + M, L, 4]."""
     count, begins, ends = len(corpus), corpus.moves.begins, corpus.moves.ends
-    out = np.empty((count + len(begins), len(corpus.chains), 4))
-    for here in _blocks(count):
+    out = workshop.empty((count + len(begins), len(corpus.chains), 4))
+
+    def postures(here: slice) -> None:
         out[:count][here] = corpus.to_chains(corpus.rotations[here])
-    for here in _blocks(len(begins)):
+
+    def middles(here: slice) -> None:
         out[count:][here] = rot.normalise(rot.slerp(out[begins[here]], out[ends[here]], 0.5))
+
+    workshop.do(postures, _blocks(count))
+    workshop.do(middles, _blocks(len(begins)))
     return out
 
 
-def _touching(corpus: Corpus) -> Floats:
+def _touching(corpus: Corpus, workshop: Workshop) -> Floats:
     """Return how deep pairs of limbs are in each other [P], metres, in all but RARE postures."""
-    blocks = [penetration(corpus.skeleton, corpus.rotations[here]) for here in _blocks(len(corpus))]
-    return np.array([np.quantile(np.concatenate([depths[k] for depths in blocks]), 1.0 - RARE) for k in blocks[0]])
+    if not len(capsules_of(corpus.skeleton).pairs()):
+        return np.zeros(0)
+
+    def depths(here: slice) -> Floats:
+        return np.stack([*penetration(corpus.skeleton, corpus.rotations[here]).values()], axis=-1)
+
+    most = Percentile(100.0 * (1.0 - RARE), len(corpus))
+    for block in workshop.map(depths, _blocks(len(corpus))):
+        most.add(block)
+    return most.value()
 
 
-def _standing(corpus: Corpus) -> Floats:
+def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
     """Return how firmly limbs and trunk stand [N, limbs + 1], as in Carriage.
 
     In a move 1 / (1 + (v / SLIDES)^2), with v the level speed of the limb's lowest point; in a posture the mean of the
@@ -141,7 +164,8 @@ def _standing(corpus: Corpus) -> Floats:
     limb = limb_of_points(corpus.skeleton)
     out = np.ones((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
     counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
-    for here in _blocks(len(begins)):
+
+    def move(here: slice) -> None:
         before, after = (
             corpus.skeleton.positions_and_tips(corpus.rotations[of[here]], corpus.root[of[here]])
             for of in (begins, ends)
@@ -150,6 +174,8 @@ def _standing(corpus: Corpus) -> Floats:
             moved = _lowest_moved(before[:, limb == number], after[:, limb == number])
             speed = np.hypot(moved[:, 0], moved[:, 2]) / corpus.moves.seconds[here]
             out[len(corpus) :, number][here] = 1.0 / (1.0 + (speed / SLIDES) ** 2)
+
+    workshop.do(move, _blocks(len(begins)))
     for number in np.unique(limb):
         still = out[len(corpus) :, number]
         sums = np.bincount(begins, still, len(corpus)) + np.bincount(ends, still, len(corpus))
@@ -163,7 +189,7 @@ def _lowest_moved(before: Floats, after: Floats) -> Floats:
     return np.asarray(after[rows, lowest] - before[rows, lowest])
 
 
-def _aloft(corpus: Corpus, clearance: Floats) -> Floats:
+def _aloft(corpus: Corpus, clearance: Floats, workshop: Workshop) -> Floats:
     """Return whether the body is in the air in each moment [N], 0 or 1, as in Carriage.
 
     A body on half-pointe, or whose recording's floor is a little off, is as high; but its lowest point hardly moves.
@@ -171,32 +197,37 @@ def _aloft(corpus: Corpus, clearance: Floats) -> Floats:
     Args:
         corpus: the movement.
         clearance: height of the lowest point above the floor in the moments [N], metres.
+        workshop: threads.
     """
     begins, ends, size = corpus.moves.begins, corpus.moves.ends, size_of(corpus.skeleton)
     speed = np.empty(len(begins))
-    for here in _blocks(len(begins)):
+
+    def move(here: slice) -> None:
         before, after = (
             contact_points(corpus.skeleton, corpus.rotations[of[here]], corpus.root[of[here]])[0]
             for of in (begins, ends)
         )
         speed[here] = np.linalg.norm(_lowest_moved(before, after), axis=-1) / corpus.moves.seconds[here]
+
+    workshop.do(move, _blocks(len(begins)))
     both, twice = np.concatenate([begins, ends]), np.concatenate([speed, speed])
     counts = np.maximum(np.bincount(both, minlength=len(corpus)), 1)
     speeds = np.concatenate([np.bincount(both, twice, len(corpus)) / counts, speed])
     return np.asarray((clearance > LEAVES * size) & (speeds > STILL * size), dtype=np.float64)
 
 
-def _overhang(corpus: Corpus, stands: Floats, aloft: Floats) -> Floats:
+def _overhang(corpus: Corpus, stands: Floats, aloft: Floats, workshop: Workshop) -> Floats:
     """Return how far beyond its support the corpus's bodies have their mass while one limb bears it, as in Carriage.
 
     Args:
         corpus: the movement.
         stands: how firmly each limb, and last the trunk, stands in its postures [N, limbs + 1].
         aloft: whether the body is in the air there [N].
+        workshop: threads.
     """
     size = size_of(corpus.skeleton)
-    found = [_overhangs(corpus, here, stands[here], aloft[here]) for here in _blocks(len(corpus))]
-    over = np.concatenate(found)
+    found = workshop.map(lambda here: _overhangs(corpus, here, stands[here], aloft[here]), _blocks(len(corpus)))
+    over = np.concatenate(list(found))
     if not len(over):
         return np.array([USUAL * size])
     return np.array([min(float(np.nanquantile(over, 1.0 - RARE)), MOST * size)])

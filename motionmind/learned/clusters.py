@@ -17,6 +17,7 @@ import numpy as np
 from motionmind._typing import Floats, Int32s, Ints
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
@@ -32,7 +33,7 @@ SHOWN = 4096  # postures that show the directions
 SLACK = 1e-6  # of rounding, in squared distances
 
 
-def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
+def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | None = None) -> Int32s:
     """Cluster the postures of each part of a body: [N, P], with parts as in `parts_of` and clusters numbered from 0.
 
     In order, a posture founds a cluster unless a founder lies within ALIKE; then each joins its nearest founder, the
@@ -41,11 +42,19 @@ def clusters_of(skeleton: Skeleton, orientations: Floats) -> Int32s:
     Args:
         skeleton: the body.
         orientations: orientations of the chains [N, L, 4].
+        workshop: threads, for which each part is a job, and room for large arrays; None for this thread and memory.
     """
-    parts = parts_of(skeleton)
+    workshop, parts = workshop or Workshop(), parts_of(skeleton)
     out = np.empty((len(orientations), len(parts)), dtype=np.int32)
-    for part, joints in enumerate(parts):
-        out[:, part] = clusters(np.ascontiguousarray(orientations[:, joints]), len(joints) * ALIKE**2)
+
+    def of_part(part: int) -> None:
+        joints = parts[part]
+        own = workshop.empty((len(orientations), len(joints), 4))
+        for start in range(0, len(orientations), BLOCK):
+            own[start : start + BLOCK] = orientations[start : start + BLOCK, joints]
+        out[:, part] = clusters(own, len(joints) * ALIKE**2)
+
+    workshop.do(of_part, range(len(parts)))
     return out
 
 

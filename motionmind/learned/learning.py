@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from motionmind._typing import Floats, States
 from motionmind.corpus.corpus import FACING, Corpus
 from motionmind.discretize import Discretization, StateSpace
+from motionmind.discretize.protocol import ByJoint
 from motionmind.discretize.states import nearest
 from motionmind.errors import CorpusError
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.grammar.grammar import Grammar
 from motionmind.grammar.grammar import learn as learn_grammar
@@ -45,53 +49,55 @@ class Learned:
     plausibility: Plausibility
 
 
-def learn(corpus: Corpus, discretization: Discretization) -> Learned:
+def learn(corpus: Corpus, discretization: Discretization, workshop: Workshop | None = None) -> Learned:
     """Learn from a corpus.
 
     Args:
         corpus: the movement.
         discretization: how orientations become states; only states with a posture in them are kept.
+        workshop: threads, and room for large arrays; None for this thread and memory. What is learned is the same.
 
     Raises:
         CorpusError: a joint has more than MOST_STATES_LEARNED states, or the facing more than MOST_FACINGS.
+        OSError: the workshop's disk is full.
     """
-    orientations = corpus.to_chains(corpus.rotations)
     joints = corpus.skeleton.names
+    # Tolerances do not depend on the postures, so one shows them, and faulty settings, before all are compared.
+    tolerances = discretization.fit(joints, corpus.to_chains(corpus.rotations[:1])[:, : len(joints)]).tolerances
     if corpus.facing == "free":
-        # Tolerances do not depend on the postures, so one shows them before all are compared.
-        _check_facing(corpus, float(discretization.fit(joints, orientations[:1, : len(joints)]).tolerances[0]))
-    space = discretization.fit(joints, orientations[:, : len(joints)])
-    space, states = _keep_visited(space, space.assign(orientations[:, : len(joints)]))
-    _check_size(corpus, space)
-    if corpus.facing == "free":
-        space, facing = _with_facing(space, orientations[:, -1])
-        states = np.concatenate([states, facing[:, None]], axis=1)
-    del orientations  # as large as the corpus
-    return learn_from_states(corpus, space, states)
+        _check_facing(corpus, float(tolerances[0]))
+    if isinstance(discretization, ByJoint):
+        return _learn(corpus, partial(discretization.fit_joint, joints), workshop)
+    whole = discretization.fit(joints, corpus.to_chains(corpus.rotations)[:, : len(joints)])
+    return _learn(corpus, lambda joint, _: whole.alone(joint), workshop)
 
 
-def learn_in(corpus: Corpus, space: StateSpace) -> Learned:
+def learn_in(corpus: Corpus, space: StateSpace, workshop: Workshop | None = None) -> Learned:
     """Learn from a corpus in states that are known, those of them with a posture in them.
 
     Args:
         corpus: the movement.
         space: the states of each chain, as they were learned from a corpus on the same joints, facing alike.
+        workshop: as of `learn`.
     """
-    orientations = corpus.to_chains(corpus.rotations)
-    joints = len(corpus.skeleton)
-    own = [space.of(joint) for joint in range(joints)]
-    of_joints = StateSpace.of_joints(
-        space.names[:joints],
-        own,
-        kind=space.kind,
-        tolerances=space.tolerances[:joints],
-        labels=space.labels[:joints],
-    )
-    smaller, states = _keep_visited(of_joints, of_joints.assign(orientations[:, :joints]))
+    return _learn(corpus, lambda joint, _: space.alone(joint), workshop)
+
+
+def _learn(corpus: Corpus, fit: Callable[[int, Floats], StateSpace], workshop: Workshop | None) -> Learned:
+    """Learn from a corpus; `fit` gives the states of a joint, of its index and its orientations [N, 4]."""
+    workshop = workshop or Workshop()
+    states = workshop.empty((len(corpus), len(corpus.chains)), np.int32)
+
+    def visit(joint: int) -> StateSpace:
+        orientations = corpus.chain(joint)
+        smaller, states[:, joint] = _keep_visited(fit(joint, orientations), orientations)
+        return smaller
+
+    space = StateSpace.joined(list(workshop.map(visit, range(len(corpus.skeleton)))))
+    _check_size(corpus, space)
     if corpus.facing == "free":
-        smaller, facing = _with_facing(smaller, orientations[:, -1])
-        states = np.concatenate([states, facing[:, None]], axis=1)
-    return learn_from_states(corpus, smaller, states)
+        space, states[:, -1] = _with_facing(space, corpus.chain(len(corpus.skeleton)))
+    return learn_from_states(corpus, space, states, workshop)
 
 
 def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
@@ -103,10 +109,9 @@ def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
         space: states of its chains.
     """
     joints = len(corpus.skeleton)
-    orientations = corpus.to_chains(corpus.rotations)
     count, worst, farthest = 0, 0, 0.0
     for joint in range(joints):
-        _, cosines = nearest(orientations[:, joint], space.of(joint))
+        _, cosines = nearest(corpus.chain(joint), space.of(joint))
         degrees = np.degrees(2.0 * np.arccos(np.clip(cosines, 0.0, 1.0)))
         count += int(np.sum(degrees > space.tolerances[joint] + 1e-3))
         if degrees.max() - space.tolerances[joint] > farthest:
@@ -114,14 +119,16 @@ def outside(corpus: Corpus, space: StateSpace) -> tuple[float, str, float]:
     return count / (len(corpus) * joints), space.names[worst], farthest
 
 
-def learn_from_states(corpus: Corpus, space: StateSpace, states: States) -> Learned:
+def learn_from_states(corpus: Corpus, space: StateSpace, states: States, workshop: Workshop | None = None) -> Learned:
     """Learn from a corpus whose postures have states.
 
     Args:
         corpus: the movement.
         space: the states of each chain.
         states: states of the corpus's postures [N, L].
+        workshop: as of `learn`.
     """
+    workshop = workshop or Workshop()
     moves = corpus.moves
     grammar = learn_grammar(
         corpus.chains,
@@ -134,23 +141,26 @@ def learn_from_states(corpus: Corpus, space: StateSpace, states: States) -> Lear
         ends=moves.ends,
         weights=moves.weights,
         posture_weights=corpus.weights,
+        team=workshop.team,
     )
-    pace = learn_pace(corpus)
+    pace = learn_pace(corpus, workshop.team)
     plausibility = learn_plausibility(corpus, pace.fastest)
-    return Learned(corpus, space, states, grammar, learn_carriage(corpus), pace, plausibility)
+    return Learned(corpus, space, states, grammar, learn_carriage(corpus, workshop), pace, plausibility)
 
 
-def _keep_visited(space: StateSpace, states: States) -> tuple[StateSpace, States]:
-    """Return the state space without states that no posture is in, and the postures' states [N, J] in it.
+def _keep_visited(space: StateSpace, orientations: Floats) -> tuple[StateSpace, States]:
+    """Return the state space of one joint without states that no posture is in, and the states [N] in it of its
+    orientations [N, 4].
 
     Nothing is known of a state without postures.
     """
-    kept = [np.unique(column) for column in states.T]
-    labels = [[named[s] for s in seen] if named else [] for named, seen in zip(space.labels, kept, strict=True)]
-    centres = [space.of(joint)[seen] for joint, seen in enumerate(kept)]
-    smaller = StateSpace.of_joints(space.names, centres, kind=space.kind, tolerances=space.tolerances, labels=labels)
-    renamed = [np.searchsorted(seen, column) for seen, column in zip(kept, states.T, strict=True)]
-    return smaller, np.stack(renamed, axis=1).astype(np.int32)
+    states = space.assign(orientations[:, None])[:, 0]
+    seen = np.unique(states)
+    labels = [[space.labels[0][s] for s in seen] if space.labels[0] else []]
+    smaller = StateSpace.of_joints(
+        space.names, [space.of(0)[seen]], kind=space.kind, tolerances=space.tolerances, labels=labels
+    )
+    return smaller, np.searchsorted(seen, states).astype(np.int32)
 
 
 def _check_size(corpus: Corpus, space: StateSpace) -> None:

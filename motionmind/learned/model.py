@@ -14,6 +14,7 @@ from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import Gathering, gather
 from motionmind.corpus.recordings import Recording
 from motionmind.discretize import Codebook, Discretization
+from motionmind.executors.workshop import Workshop
 from motionmind.learned import persistence
 from motionmind.learned.learning import Learned, learn
 
@@ -39,6 +40,7 @@ class LearnedCorpus(Learned):
         discretization: Discretization | None = None,
         mix: Mapping[str, float] | None = None,
         home: str | os.PathLike[str] | None = None,
+        workshop: Workshop | None = None,
         **options: Unpack[Gathering],
     ) -> Self:
         """Learn from clips, all on the same joints (`own_skeleton` brings known rigs together).
@@ -50,6 +52,7 @@ class LearnedCorpus(Learned):
             mix: other corpora to learn from as well, by name or folder, each with the weight of its postures and moves,
                 those of `clips` having weight 1.
             home: where corpora that `mix` names are.
+            workshop: threads, and room for large arrays; None for this thread and memory. What is learned is the same.
             options: rate, skip, facing, flips, flip_degrees, mirror, reverse, about, title, author, source, licence,
                 citation: see `motionmind.corpus.gather.gather`.
 
@@ -61,15 +64,18 @@ class LearnedCorpus(Learned):
         check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION, or_none=True)
         check_mapping("mix", mix, or_none=True)
         check_path("home", home, or_none=True)
+        check_type("workshop", workshop, Workshop, or_none=True)
         others = [(persistence.load(other, home).corpus, weight) for other, weight in (mix or {}).items()]
-        return cls.learn(gather(name, clips, mix=others, **options), discretization or Codebook(15.0))
+        corpus = gather(name, clips, mix=others, workshop=workshop, **options)
+        return cls.learn(corpus, discretization or Codebook(15.0), workshop)
 
     @classmethod
-    def learn(cls, corpus: Corpus, discretization: Discretization) -> Self:
+    def learn(cls, corpus: Corpus, discretization: Discretization, workshop: Workshop | None = None) -> Self:
         """Learn from a corpus; see `motionmind.learned.learning.learn`."""
         check_type("corpus", corpus, Corpus)
         check_type("discretization", discretization, Discretization, wanted=_DISCRETIZATION)
-        return cls._of(learn(corpus, discretization))
+        check_type("workshop", workshop, Workshop, or_none=True)
+        return cls._of(learn(corpus, discretization, workshop))
 
     @classmethod
     def load(cls, name: str, home: str | os.PathLike[str] | None = None) -> Self:

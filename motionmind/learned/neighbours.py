@@ -24,10 +24,12 @@ from numpy.typing import NDArray
 from motionmind._typing import Floats, Int32s, Ints, Singles
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
 
 MANY = 8000  # moments of a corpus that has no trees, at most: all of them are looked at
+BLOCK = 2048  # moments that are copied at a time
 LEAF = 32  # moments of a leaf, at most
 SAMPLE = 64  # moments of a node by which it is halved, and of which its centre is the mean
 LEAVES = 96  # of a tree that are searched for near moments
@@ -68,26 +70,35 @@ class Neighbours:
         return self.centres[:, start : start + len(self.parts[number])]
 
 
-def build_neighbours(skeleton: Skeleton, orientations: Floats, weights: Floats) -> Neighbours:
+def build_neighbours(
+    skeleton: Skeleton, orientations: Floats, weights: Floats, workshop: Workshop | None = None
+) -> Neighbours:
     """Build the trees of all parts of a body (`parts_of`).
 
     Args:
         skeleton: the body.
         orientations: of the chains in N moments, the joints' first [N, L, 4].
         weights: of the moments [N].
+        workshop: threads, for which each part is a job, and room for large arrays; None for this thread and memory.
     """
+    workshop = workshop or Workshop()
     parts, bounds = parts_of(skeleton), node_bounds(len(orientations))
     order = np.empty((len(parts), len(orientations)), dtype=np.int32)
     ranks = np.empty_like(order)
     radii, sums = np.empty((2, len(parts), len(bounds)))
     centres = np.empty((len(bounds), sum(map(len, parts)), 4), dtype=np.float32)
     trees = Neighbours(parts, order, ranks, bounds, centres, radii, sums)
-    for number, part in enumerate(parts):
-        shown = np.asarray(orientations[:, part], dtype=np.float32)
+
+    def grow(number: int) -> None:
+        shown = workshop.empty((len(orientations), len(parts[number]), 4), np.float32)
+        for start in range(0, len(orientations), BLOCK):
+            shown[start : start + BLOCK] = orientations[start : start + BLOCK, parts[number]]
         _grow(shown, bounds, order[number], trees.centres_of(number), radii[number])
         ranks[number, order[number]] = np.arange(len(orientations), dtype=np.int32)
         total = np.concatenate([np.zeros(1), np.cumsum(weights[order[number]])])
         sums[number] = total[bounds[:, 1]] - total[bounds[:, 0]]
+
+    workshop.do(grow, range(len(parts)))
     return trees
 
 

@@ -30,6 +30,7 @@ speeds of all windows of 1 to 6 s, but a hundredth, keep to; none is less than t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +38,11 @@ import numpy as np
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.executors.here import this_process
+from motionmind.executors.team import Team
 from motionmind.geometry import rotations as rot
+from motionmind.learned.percentiles import Percentile
 from motionmind.learned.sampled import BLOCK, Sampled
 
 SHORTEST, LONGEST = 0.3, 5.0  # seconds between the still moments of a window
@@ -59,7 +63,7 @@ EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turn
 LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # seconds of the windows whose peaks are known
 STRIDE = 6  # frames from window to window
 FEW = 10  # windows; where there are fewer, peaks are those of shorter ones
-_NO_WINDOWS = (np.zeros(0),) * 3
+_SIZES = [round(seconds * FPS / STRIDE) for seconds in LENGTHS]  # of the windows, in strides
 
 
 class Way(NamedTuple):
@@ -159,38 +163,106 @@ class Pace:
         return float(np.exp(np.log(STILL + self.lulls[numbers]).mean()) - STILL)
 
 
-def learn_pace(corpus: Corpus) -> Pace:
-    """Learn the pace of a corpus."""
-    recordings = [Sampled(corpus, clip, FPS) for clip in corpus.clips if len(clip) > 1]
-    clips = [recording for recording in recordings if len(recording) > 1]
-    steps = [np.concatenate([steps_of(block) for block in clip.blocks(BLOCK, overlap=1)]) for clip in clips]
-    joints = len(corpus.skeleton)
-    usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
-    greatest, slowest, rises = fastest, np.zeros(1), EVERYDAY[2]
-    if steps:
-        rises = max(FPS * max(float(step[:, -1].max()) for step in steps), rises)
-        each = np.concatenate([_usual_parts(FPS * step, joints) for step in steps])
-        usual = np.maximum(each.mean(axis=0), usual)
-        # Part by part, for all at once are as large as the corpus.
-        parts = ([FPS * step[:, part] for step in steps] for part in range(joints + 2))
-        summed = [(np.percentile(speeds, RARE), speeds.max()) for speeds in map(np.concatenate, parts)]
-        rare, most = np.array(summed, dtype=np.float64).T
-        median = float(np.median(rare[:joints]))
-        least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
-        fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
-        greatest = np.maximum(most, fastest)
-        seconds = [over_seconds(FPS * step[:, :joints].mean(axis=1), FPS) for step in steps]
-        slowest = np.percentile(np.concatenate(seconds), [100.0 - RARE])
-    lulls, windows = np.ones(len(corpus)), [_NO_WINDOWS]
-    for clip, step in zip(clips, steps, strict=True):
-        means = step[:, :joints].mean(axis=1)
-        found = _lulls(means, usual[0])
-        windows.append(_windows(clip, *found, usual))
-        here = slice(clip.clip.start, clip.clip.stop)
-        lulls[here] = np.interp(corpus.times[here], clip.times[found[0]], found[1])
-    danced = [part for clip, step in zip(clips, steps, strict=True) for part in _danced(clip, step)]
-    peaks = _peaks(danced, np.append(fastest, EVERYDAY[2]), np.append(greatest, rises))
-    return Pace(usual, fastest, greatest, slowest, peaks, lulls, _fit(*map(np.concatenate, zip(*windows, strict=True))))
+def learn_pace(corpus: Corpus, team: Team | None = None) -> Pace:
+    """Learn the pace of a corpus; each clip is a job for the team's threads."""
+    gauge = _Gauge(corpus)
+    for shown in (team or this_process()).map(partial(_show, corpus), gauge.clips):
+        gauge.add(shown)
+    return gauge.pace()
+
+
+class _Shown(NamedTuple):
+    """The pace that a clip of T frames at FPS shows.
+
+    Attributes:
+        steps: as of `steps_of` [T - 1, J + 3].
+        stretches: those of which nothing was reconstructed, from and to a step [n, 2].
+        times: of the still moments [S], seconds in the recording.
+        speeds: of the mean joint in them [S], rad/s.
+        windows: the ways between each two that are as far apart as a window: angles of the mean joint and of the
+            body's turning, radians, and its travel, heights; both speeds; seconds [W, 6].
+    """
+
+    steps: Floats
+    stretches: Ints
+    times: Floats
+    speeds: Floats
+    windows: Floats
+
+
+def _show(corpus: Corpus, clip: Clip) -> _Shown:
+    """Return what a clip of two frames or more shows of its pace."""
+    recording = Sampled(corpus, clip, FPS)
+    steps = np.concatenate([steps_of(block) for block in recording.blocks(BLOCK, overlap=1)])
+    still, speeds = _lulls(steps[:, : len(corpus.skeleton)].mean(axis=1))
+    windows = _windows(recording, still, speeds)
+    return _Shown(steps, _danced(recording), recording.times[still], speeds, windows)
+
+
+class _Gauge:
+    """The pace of a corpus, from what its clips show, one after the other; their frames are not kept.
+
+    Attributes:
+        clips: the clips that show any.
+    """
+
+    def __init__(self, corpus: Corpus) -> None:
+        recordings = (Sampled(corpus, clip, FPS) for clip in corpus.clips if len(clip) > 1)
+        found = [(one.clip, len(one) - 1, _danced(one)) for one in recordings if len(one) > 1]
+        counts = np.array([count for _, count, _ in found], dtype=np.int64)
+        lengths = np.array([stop - start for _, _, stretches in found for start, stop in stretches], dtype=np.int64)
+        parts = -(-lengths // STRIDE)
+        many = [int(np.maximum(parts - size + 1, 0).sum()) for size in _SIZES]
+        self.clips = [clip for clip, _, _ in found]
+        self._corpus, self._joints, self._count = corpus, len(corpus.skeleton), int(counts.sum())
+        self._rare = Percentile(RARE, self._count)
+        self._seconds = Percentile(100.0 - RARE, int((counts - np.minimum(counts, round(FPS)) + 1).sum()))
+        self._peaks = [Percentile(RARE, count) if count >= FEW else None for count in many]
+        self._usual = np.zeros((0, 3))
+        self._most = np.zeros(self._joints + 3)
+        self._stills: list[tuple[Floats, Floats]] = []
+        self._windows = [np.zeros((0, 6))]
+
+    def add(self, shown: _Shown) -> None:
+        """Add the pace of the next clip."""
+        speeds = FPS * shown.steps
+        # Row after row, so that it does not matter how many clips there are.
+        self._usual = np.concatenate([self._usual, _usual_parts(speeds, self._joints)]).sum(axis=0, keepdims=True)
+        self._most = np.maximum(self._most, speeds.max(axis=0))
+        self._rare.add(speeds[:, :-1])
+        self._seconds.add(over_seconds(FPS * shown.steps[:, : self._joints].mean(axis=1), FPS)[:, None])
+        self._stills.append((shown.times, shown.speeds))
+        self._windows.append(shown.windows)
+        for start, stop in shown.stretches:
+            # Each STRIDE frames are one, for the greatest is the same.
+            part = np.maximum.reduceat(speeds[start:stop], np.arange(0, stop - start, STRIDE))
+            for size, peaks in zip(_SIZES, self._peaks, strict=True):
+                if peaks is not None and len(part) >= size:
+                    peaks.add(np.lib.stride_tricks.sliding_window_view(part, size, axis=0).max(axis=-1))
+
+    def pace(self) -> Pace:
+        """Return the pace of all clips."""
+        joints = self._joints
+        usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
+        greatest, slowest = np.append(fastest, EVERYDAY[2]), np.zeros(1)
+        if self.clips:
+            usual = np.maximum(self._usual[0] / self._count, usual)
+            rare = self._rare.value()
+            median = float(np.median(rare[:joints]))
+            least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
+            fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
+            greatest = np.maximum(self._most, np.append(fastest, EVERYDAY[2]))
+            slowest = self._seconds.value()
+        lulls = np.ones(len(self._corpus))
+        for clip, (times, speeds) in zip(self.clips, self._stills, strict=True):
+            here = slice(clip.start, clip.stop)
+            lulls[here] = np.interp(self._corpus.times[here], times, speeds / usual[0])
+        peaks, most, least_peaks = [], greatest, np.append(fastest, EVERYDAY[2])
+        for found in self._peaks:
+            most = most if found is None else np.maximum(found.value(), least_peaks)
+            peaks.append(most)
+        law = _fit_windows(np.concatenate(self._windows), usual)
+        return Pace(usual, fastest, greatest[:-1], slowest, np.stack(peaks), lulls, law)
 
 
 def _usual_parts(speeds: Floats, joints: int) -> Floats:
@@ -204,38 +276,15 @@ def steps_of(motion: Motion) -> Floats:
     return np.column_stack([way_of(motion).parts, np.abs(np.diff(motion.root[:, 1])) / height])
 
 
-def _danced(clip: Sampled, steps: Floats) -> list[Floats]:
-    """Return the stretches of a clip's steps [T - 1, ...] of which nothing was reconstructed."""
-    known = np.ones(len(steps) + 2, dtype=np.bool_)
+def _danced(clip: Sampled) -> Ints:
+    """Return the stretches of a clip's steps of which nothing was reconstructed, from and to a step [n, 2]."""
+    known = np.ones(len(clip) + 1, dtype=np.bool_)
     known[[0, -1]] = False
     for repair in clip.clip.repairs:
         if not repair.exact:
             first, last = repair.seconds
             known[1:-1] &= (clip.times[1:] < first) | (clip.times[:-1] > last)
-    edges = np.flatnonzero(np.diff(known))
-    return [steps[start:stop] for start, stop in edges.reshape(-1, 2)]
-
-
-def _peaks(steps: list[Floats], least: Floats, greatest: Floats) -> Floats:
-    """Return the greatest speeds in all windows of each of LENGTHS but a hundredth [6, J + 3].
-
-    Args:
-        steps: of the clips, from each frame to the next [T - 1, J + 3].
-        least: what no peak is less than [J + 3].
-        greatest: peaks where there are no windows [J + 3].
-    """
-    # Each STRIDE frames are one, for the greatest is the same.
-    parts = [FPS * np.maximum.reduceat(step, np.arange(0, len(step), STRIDE)) for step in steps]
-    peaks = []
-    for seconds in LENGTHS:
-        size = round(seconds * FPS / STRIDE)
-        windows = [
-            np.lib.stride_tricks.sliding_window_view(p, size, axis=0).max(axis=-1) for p in parts if len(p) >= size
-        ]
-        if sum(map(len, windows)) >= FEW:
-            greatest = np.maximum(np.percentile(np.concatenate(windows), RARE, axis=0), least)
-        peaks.append(greatest)
-    return np.stack(peaks)
+    return np.flatnonzero(np.diff(known)).reshape(-1, 2)
 
 
 def over_seconds(speeds: Floats, fps: float) -> Floats:
@@ -254,17 +303,15 @@ def _quickness(first: Floats, last: Floats) -> Floats:
     return np.asarray(0.5 * (np.log(STILL + first) + np.log(STILL + last)))
 
 
-def _windows(clip: Sampled, still: Ints, lulls: Floats, usual: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the efforts, quickness and logarithms of the seconds [n] between a clip's still moments, of each two that
-    are as far apart as a window.
+def _windows(clip: Sampled, still: Ints, speeds: Floats) -> Floats:
+    """Return the windows between a clip's still moments, as of `_Shown` [W, 6].
 
     What was reconstructed in a recording nobody danced: no window leads over it.
 
     Args:
         clip: at FPS frames a second.
         still: its still moments, frames in order [S].
-        lulls: of these [S], in usual speeds.
-        usual: see `Pace`.
+        speeds: of the mean joint in them [S], rad/s.
     """
     rotations, root = clip.take(still)
     stops = np.searchsorted(still, still + LONGEST * FPS, side="right")
@@ -279,27 +326,33 @@ def _windows(clip: Sampled, still: Ints, lulls: Floats, usual: Floats) -> tuple[
         if SHORTEST <= (still[k] - still[i]) / FPS <= LONGEST
     ]
     begins, ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    efforts = [np.zeros(0)]
+    out = np.empty((len(pairs), 6))
     for start in range(0, len(pairs), BLOCK):
         part = slice(start, start + BLOCK)
-        places = ((of[begins[part]], of[ends[part]]) for of in (rotations, root))
-        efforts.append(_effort(ways(clip.skeleton, *places), usual))
-    seconds = (still[ends] - still[begins]) / FPS
-    return np.concatenate(efforts), _quickness(lulls[begins], lulls[ends]), np.log(seconds)
+        found = ways(clip.skeleton, *((of[begins[part]], of[ends[part]]) for of in (rotations, root)))
+        out[part, :3] = np.column_stack([found.joints.mean(axis=-1), found.turn, found.travel])
+    out[:, 3], out[:, 4], out[:, 5] = speeds[begins], speeds[ends], (still[ends] - still[begins]) / FPS
+    return out
 
 
-def _lulls(steps: Floats, usual: float) -> tuple[Ints, Floats]:
-    """Return a clip's still moments, frames in order [S], and their lulls [S]; the first frame, with the clip's mean
-    speed, where there are none.
+def _fit_windows(windows: Floats, usual: Floats) -> Floats:
+    """Return the law [4] of windows [W, 6] (see `_Shown`) at usual speeds (see `Pace`)."""
+    joints, turn, travel, first, last, seconds = windows.T
+    efforts = _effort(Way(joints[:, None], turn, travel), usual)
+    return _fit(efforts, _quickness(first / usual[0], last / usual[0]), np.log(seconds))
+
+
+def _lulls(steps: Floats) -> tuple[Ints, Floats]:
+    """Return a clip's still moments, frames in order [S], and the speeds of the mean joint in them [S], rad/s; the
+    first frame, with the clip's mean speed, where there are none.
 
     Args:
         steps: angle that the mean joint turns by from each frame to the next [T - 1], at FPS frames a second.
-        usual: its usual speed, rad/s.
     """
     still = find_still(steps)
     if not len(still):
-        return np.zeros(1, dtype=np.int64), FPS * steps.mean(keepdims=True) / usual
-    return still, FPS * _smooth(steps)[still] / usual
+        return np.zeros(1, dtype=np.int64), FPS * steps.mean(keepdims=True)
+    return still, FPS * _smooth(steps)[still]
 
 
 def find_still(steps: Floats) -> Ints:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -161,16 +162,24 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
     for clip in corpus.clips:
         recording = Sampled(corpus, clip, RATE, smooth=True)
         size = max(len(recording), BLOCK) if every <= 1 else _PIECE
-        lowest: list[Floats] = []
-        kept: list[Motion] = []
-        for block in recording.blocks(max(size, BLOCK)):
-            lowest.append(lowest_height(block.skeleton, block.rotations, block.root))
-            for start in range(0, len(block), size):
-                if every <= 1 or pieces % every == 0:
-                    kept.append(block.slice(start, start + size))
-                pieces += 1
-        floor = floor_height(np.concatenate(lowest))
-        yield from (_show(piece, fastest, floor)[0] for piece in kept)
+        many = -(-len(recording) // size)
+        chosen = range(-pieces % every, many, every) if every > 1 else range(many)
+        pieces += many
+        if len(chosen):  # else its floor is of no use, which takes all of its frames to find
+            kept, floor = _pieces_of(recording, size, chosen)
+            yield from (_show(piece, fastest, floor)[0] for piece in kept)
+
+
+def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motion], float]:
+    """Return pieces of a clip of so many frames, by number, and the height of its floor, metres."""
+    lowest: list[Floats] = []
+    kept: list[Motion] = []
+    numbers = count()
+    for block in recording.blocks(max(size, BLOCK)):
+        lowest.append(lowest_height(block.skeleton, block.rotations, block.root))
+        parts = (block.slice(start, start + size) for start in range(0, len(block), size))
+        kept += [part for part, number in zip(parts, numbers, strict=False) if number in chosen]
+    return kept, floor_height(np.concatenate(lowest))
 
 
 def _greatest_of_stretches(values: Floats) -> Floats:

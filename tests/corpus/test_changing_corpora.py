@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
+from same import assert_learned_alike
 
 from motionmind.body.motion import Motion
 from motionmind.corpus.changing import add_recordings, remove_clips
@@ -20,7 +21,7 @@ from motionmind.discretize import Codebook
 from motionmind.errors import CorpusError
 from motionmind.formats import write_motion
 from motionmind.geometry import rotations as rot
-from motionmind.learned.learning import Learned, learn, learn_in, outside
+from motionmind.learned.learning import learn, learn_in, outside
 from motionmind.tween.engine import Engine
 
 STATES = Codebook(20.0)
@@ -39,25 +40,6 @@ def dances() -> list[Motion]:
     return out
 
 
-def assert_same(one: Learned, other: Learned) -> None:
-    """Two corpora have the same clips, faults and bytes, and so has all that was learned from them."""
-    assert (one.corpus.clips, one.corpus.faults, one.corpus.rate) == (
-        other.corpus.clips,
-        other.corpus.faults,
-        other.corpus.rate,
-    )
-    for name in ("rotations", "root", "times", "detail"):
-        np.testing.assert_array_equal(getattr(one.corpus, name), getattr(other.corpus, name))
-    np.testing.assert_array_equal(one.states, other.states)
-    np.testing.assert_array_equal(one.space.centres, other.space.centres)
-    parts = [(one.grammar.transitions, other.grammar.transitions), (one.grammar.bridges, other.grammar.bridges)]
-    parts += [(one.grammar.coordination, other.grammar.coordination), (one.pace, other.pace)]
-    for mine, theirs in [*parts, (one.carriage, other.carriage), (one.plausibility, other.plausibility)]:
-        for field in fields(mine):
-            if isinstance(value := getattr(mine, field.name), np.ndarray):
-                np.testing.assert_array_equal(value, getattr(theirs, field.name), err_msg=field.name)
-
-
 def gathered(motions: Sequence[Motion], way: str) -> Corpus:
     """A corpus that was built in one of some ways."""
     if way == "mirrored, backwards":
@@ -73,11 +55,11 @@ def test_what_is_added_or_removed_is_as_if_it_were_built_so(dances: list[Motion]
     flips: Flips = "keep" if way == "on stage" else "repair"
     before = learn(gathered(dances[:2], way), STATES)
     added = add_recordings(before.corpus, dances[2:], flips=flips)
-    assert_same(learn_in(added, before.space), learn_in(gathered(dances, way), before.space))
+    assert_learned_alike(learn_in(added, before.space), learn_in(gathered(dances, way), before.space))
     left = remove_clips(added, ["tendus", "fondus"])
-    assert_same(learn_in(left, before.space), learn_in(gathered(dances[1::2], way), before.space))
+    assert_learned_alike(learn_in(left, before.space), learn_in(gathered(dances[1::2], way), before.space))
     # And there and back again is where one was.
-    assert_same(learn_in(remove_clips(added, ["fondus", "jump"]), before.space), before)
+    assert_learned_alike(learn_in(remove_clips(added, ["fondus", "jump"]), before.space), before)
 
 
 def test_how_much_is_outside_of_all_states_is_told(dances: list[Motion]) -> None:
