@@ -6,6 +6,7 @@ import csv
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from pathlib import Path
@@ -529,20 +530,33 @@ def test_what_leads_into_the_air_ends_in_the_air() -> None:
 # --- growth -----------------------------------------------------------------------------------------------------------
 
 
-def test_performances_are_read_one_after_another_on_bodies_of_their_own(tmp_path: Path) -> None:
-    from experiments.scale.run import _read_again
+def test_performances_are_read_on_bodies_of_their_own_whoever_reads_them() -> None:
+    from experiments.scale.run import Job, perform, performance
     from motionmind import Engine
+    from motionmind.corpus.recordings import Recording
 
     corpus = Engine.load("ballet").corpus
-    clips = [corpus.recording(clip, 0, 40).resample(30.0) for clip in corpus.clips[:2]]
-    spent = dict.fromkeys(("bytes", "frames", "seconds", "making", "reading", "retargeting"), 0.0)
-    names, heights = [], []
-    for motion in _read_again(clips, 3, tmp_path, spent):
-        assert not list(tmp_path.iterdir())  # nothing is kept
-        names.append(motion.name)
-        heights.append(motion.skeleton.height)
-        assert spent["frames"] >= len(motion)
-    assert len(set(names)) == len(names) == 3 * len(clips)
+    clip = corpus.recording(corpus.clips[0], 0, 40).resample(30.0)
+    made = [performance(clip, Job(None, 0, number)) for number in range(3)]
+    heights = [motion.skeleton.height for motion in made]
     assert max(heights) / min(heights) > 1.01
-    assert spent["bytes"] > 10_000.0
-    assert min(spent["reading"], spent["retargeting"]) > 0.0
+    assert len({motion.name for motion in made}) == 3
+    (one, spent), (same, _) = perform(Job(None, 1, 2)), perform(Job(None, 1, 2))
+    assert isinstance(one, Recording)
+    np.testing.assert_array_equal(one.pieces[0].rotations, same.pieces[0].rotations)
+    assert spent.bytes > 10_000.0
+    assert spent.frames >= 6 * len(one.pieces[0].times) - 6
+    assert min(spent.reading, spent.retargeting, spent.taking) > 0.0
+
+
+def test_memory_is_watched_at_its_most() -> None:
+    from experiments.scale.memory import Memory, own_memory
+
+    if not own_memory():
+        pytest.skip("this system does not say how much memory is a process's own")
+    before = own_memory()
+    with Memory() as memory:
+        held = np.ones(4_000_000)
+        time.sleep(0.1)
+        del held
+    assert memory.most > before + 25.0

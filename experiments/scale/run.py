@@ -1,109 +1,158 @@
 """Growth with the corpus: the time and memory of reading, retargeting and learning, and the disk that is filled.
 
 Recordings are made to tens and hundreds of times as many: mirrored or not, at a tempo and on a body of their own, each
-joint off by an angle that drifts. Each is written as a BVH file, read, brought to the body of the corpus, and removed.
+joint off by an angle that drifts. Each is written as a BVH file, read, brought to the body of the corpus, taken, and
+removed.
 """
 
 from __future__ import annotations
 
-import resource
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import recorded
-from experiments.scale.tweens import FPS, RATE, performances
+from experiments.scale.memory import Memory
+from experiments.scale.tweens import FPS, RATE, performed
 from motionmind import Engine, Motion, make_discretization, own_skeleton, read_motion
 from motionmind.corpus.gather import gather
+from motionmind.corpus.recordings import Recording, Taking, take
+from motionmind.executors.opening import open_team
+from motionmind.executors.workshop import Workshop
 from motionmind.formats.bvh import write_bvh
 
 NAME = "cmu-05"
-TIMES, TRIAL = (1, 10, 100), (1, 3)  # times as much as was recorded; as one clip of a bundled corpus
+# Times as much as was recorded, and workers; for a trial, as one clip of a bundled corpus.
+SIZES, TRIAL = ((1, 1), (10, 1), (100, 1), (100, 2)), ((1, 1), (3, 2))
 DEGREES, TALLER = 3.0, 0.15  # that joints of a copy are turned by, in the mean; share by which bodies differ at most
 TOLERANCE = 15.0  # degrees
 
 
+class Job(NamedTuple):
+    """A performance to read and take.
+
+    Attributes:
+        data: the folder of recorded movement; None for bundled movement.
+        clip: which of the recordings.
+        number: which performance of it, from 0, which is the recording itself.
+    """
+
+    data: str | None
+    clip: int
+    number: int
+
+
+class Spent(NamedTuple):
+    """The size of a performance in bytes, frames and seconds of movement, and the seconds that it took."""
+
+    bytes: float
+    frames: float
+    seconds: float
+    making: float
+    reading: float
+    retargeting: float
+    taking: float
+
+
 def jobs(setting: Setting) -> list[dict[str, Any]]:
     data = str(setting.data) if recorded(setting.data, NAME) else None
-    return [{"data": data, "times": times} for times in (TIMES if data else TRIAL)]
+    return [{"data": data, "times": times, "workers": workers} for times, workers in (SIZES if data else TRIAL)]
 
 
-def work(data: str | None, times: int) -> list[Row]:
+def work(data: str | None, times: int, workers: int) -> list[Row]:
     """Build a corpus in a process of its own, whose memory is this corpus's alone."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
-        return [alone.submit(measure, data, times).result()]
+        return [alone.submit(measure, data, times, workers).result()]
 
 
-def measure(data: str | None, times: int) -> Row:
-    """Read, retarget and learn so many times what was recorded."""
-    clips = _recorded(data)
+def measure(data: str | None, times: int, workers: int, room: str | None = None) -> Row:
+    """Read, retarget and learn so many times what was recorded, in a folder for large arrays and the corpus."""
     kind = make_discretization("codebook", TOLERANCE)
-    Engine.learn(gather("first", [own_skeleton(clips[0])], rate=RATE), kind)  # loads what learning needs
-    spent = {"bytes": 0.0, "frames": 0.0, "seconds": 0.0, "making": 0.0, "reading": 0.0, "retargeting": 0.0}
-    with tempfile.TemporaryDirectory() as scratch:
+    Engine.learn(gather("first", [own_skeleton(_recorded(data)[0])], rate=RATE), kind)  # loads what learning needs
+    spent: list[Spent] = []
+    with tempfile.TemporaryDirectory(dir=room) as scratch, open_team(workers) as team, Memory() as memory:
+        workshop = Workshop.of(workers, Path(scratch))
+        all_jobs = (Job(data, k, n) for n in range(times) for k in range(len(_recorded(data))))
         began = perf_counter()
-        corpus = gather("scale", _read_again(clips, times, Path(scratch), spent), rate=RATE)
-        gathering = perf_counter() - began - spent["making"] - spent["reading"] - spent["retargeting"]
-        began = perf_counter()
-        engine = Engine.learn(corpus, kind)
-        learning = perf_counter() - began
+        corpus = gather("scale", _kept(team.map(perform, all_jobs), spent), rate=RATE, workshop=workshop)
+        taken = perf_counter()
+        engine = Engine.learn(corpus, kind, workshop)
+        learned = perf_counter()
         engine.save(Path(scratch) / "scale")
+        saved = perf_counter()
         disk = sum(path.stat().st_size for path in (Path(scratch) / "scale").rglob("*") if path.is_file())
+    total = Spent(*np.sum(spent, axis=0).tolist())
     return {
         "times": times,
-        "hours": spent["seconds"] / 3600.0,
-        "frames": int(spent["frames"]),
+        "workers": workers,
+        "hours": total.seconds / 3600.0,
+        "frames": int(total.frames),
         "postures": len(corpus),
         "states": int(engine.space.sizes.sum()),
-        "bvh_mb": spent["bytes"] / 1e6,
-        "reading_s": spent["reading"],
-        "retargeting_s": spent["retargeting"],
-        "gathering_s": gathering,
-        "learning_s": learning,
-        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "bvh_mb": total.bytes / 1e6,
+        "reading_s": total.reading,
+        "retargeting_s": total.retargeting,
+        "taking_s": total.taking,
+        "gathering_s": taken - began - total.making / workers,
+        "learning_s": learned - taken,
+        "saving_s": saved - learned,
+        "peak_mb": memory.most,
         "disk_mb": disk / 1e6,
     }
 
 
-def _recorded(data: str | None) -> list[Motion]:
-    """Return the recordings on their own bodies, at 30 frames a second, without the T-pose before them."""
-    if data is None:
-        corpus = Engine.load("ballet").corpus
-        return [corpus.recording(clip).resample(FPS) for clip in corpus.clips[:2]]
-    clips = (read_motion(path) for path in sorted(Path(data, NAME).glob("*.bvh")))
-    return [clip.slice(1, len(clip)).resample(FPS) for clip in clips]
-
-
-def _read_again(clips: list[Motion], times: int, folder: Path, spent: dict[str, float]) -> Iterator[Motion]:
-    """Yield the recordings and other performances, each from a file of its own, and add up what that takes."""
-    made, rng = performances(clips, times, DEGREES, seed=0), np.random.default_rng(1)
-    path = folder / "performance.bvh"
-    while True:
-        began = perf_counter()
-        if (motion := next(made, None)) is None:
-            return
-        write_bvh(path, _on_another_body(motion, 1.0 + rng.uniform(-TALLER, TALLER)))
+def perform(job: Job) -> tuple[Recording, Spent]:
+    """Make a performance and write it; read it, bring it to the body of the corpus and take its postures."""
+    began = perf_counter()
+    motion = performance(_recorded(job.data)[job.clip], job)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "performance.bvh"
+        write_bvh(path, motion)
         written = perf_counter()
         read = read_motion(path)
         known = perf_counter()
-        own = replace(own_skeleton(read), name=motion.name)
-        spent["retargeting"] += perf_counter() - known
-        spent["reading"] += known - written
-        spent["making"] += written - began
-        spent["bytes"] += path.stat().st_size
-        spent["frames"] += len(read)
-        spent["seconds"] += float(read.times[-1])
-        path.unlink()
-        yield own
+        size = path.stat().st_size
+    found = perf_counter()
+    own = replace(own_skeleton(read), name=motion.name)
+    brought = perf_counter()
+    recording = take(own, Taking(RATE))
+    taken = perf_counter()
+    seconds = written - began, known - written, brought - found, taken - brought
+    return recording, Spent(size, len(read), float(read.times[-1]), *seconds)
+
+
+def performance(clip: Motion, job: Job) -> Motion:
+    """Return a performance of a clip on a body of its own; which one, the job's numbers say alone."""
+    rng = np.random.default_rng([job.number, job.clip])
+    motion = performed(clip, job.number, DEGREES, rng) if job.number else clip
+    return _on_another_body(motion, 1.0 + rng.uniform(-TALLER, TALLER))
+
+
+def _kept(found: Iterator[tuple[Recording, Spent]], spent: list[Spent]) -> Iterator[Recording]:
+    """Yield recordings, and keep what they took."""
+    for recording, took in found:
+        spent.append(took)
+        yield recording
+
+
+@cache
+def _recorded(data: str | None) -> tuple[Motion, ...]:
+    """Return the recordings on their own bodies, at 30 frames a second, without the T-pose before them."""
+    if data is None:
+        corpus = Engine.load("ballet").corpus
+        return tuple(corpus.recording(clip).resample(FPS) for clip in corpus.clips[:2])
+    clips = (read_motion(path) for path in sorted(Path(data, NAME).glob("*.bvh")))
+    return tuple(clip.slice(1, len(clip)).resample(FPS) for clip in clips)
 
 
 def _on_another_body(motion: Motion, size: float) -> Motion:
@@ -115,13 +164,13 @@ def _on_another_body(motion: Motion, size: float) -> Motion:
 
 
 def chart(rows: list[Row]) -> str:
-    parts = ("reading_s", "retargeting_s", "gathering_s", "learning_s")
-    time = Panel("microseconds a posture", "postures", "microseconds", log=True)
-    for part in parts:
-        time.series[part.removesuffix("_s")] = [(row["postures"], 1e6 * row[part] / row["postures"]) for row in rows]
-    memory = Panel("memory and disk", "postures", "MB", log=True)
+    alone = [row for row in rows if row["workers"] == 1]
+    time = Panel("microseconds a posture, one worker", "postures", "microseconds", log=True)
+    for part in ("reading_s", "retargeting_s", "taking_s", "learning_s"):
+        time.series[part.removesuffix("_s")] = [(row["postures"], 1e6 * row[part] / row["postures"]) for row in alone]
+    memory = Panel("memory and disk, one worker", "postures", "MB", log=True)
     for part, title in (("peak_mb", "most memory"), ("disk_mb", "on disk")):
-        memory.series[title] = [(row["postures"], row[part]) for row in rows]
+        memory.series[title] = [(row["postures"], row[part]) for row in alone]
     return svg([time, memory])
 
 
@@ -129,9 +178,13 @@ def tell(rows: list[Row]) -> str:
     def of_posture(part: str, row: Row) -> str:
         return f"{row[part]:.1f} s ({1e6 * row[part] / row['postures']:.0f} µs)"
 
+    def in_all(row: Row) -> str:
+        return f"{row['gathering_s'] + row['learning_s'] + row['saving_s']:.1f} s"
+
     return markdown(
         {
             "times": lambda r: r["times"],
+            "workers": lambda r: r["workers"],
             "hours": lambda r: f"{r['hours']:.2f}",
             "frames read": lambda r: f"{r['frames']:,}",
             "postures": lambda r: f"{r['postures']:,}",
@@ -139,8 +192,10 @@ def tell(rows: list[Row]) -> str:
             "BVH": lambda r: f"{r['bvh_mb']:.0f} MB, {r['bvh_mb'] / r['reading_s']:.1f} MB/s",
             "reading": lambda r: of_posture("reading_s", r),
             "retargeting": lambda r: of_posture("retargeting_s", r),
-            "gathering": lambda r: of_posture("gathering_s", r),
+            "taking": lambda r: of_posture("taking_s", r),
+            "all three, by the clock": lambda r: of_posture("gathering_s", r),
             "learning": lambda r: of_posture("learning_s", r),
+            "in all": in_all,
             "most memory": lambda r: f"{r['peak_mb']:.0f} MB",
             "on disk": lambda r: f"{r['disk_mb']:.0f} MB",
         },

@@ -73,13 +73,18 @@ def performances(clips: list[Motion], times: int, degrees: float, seed: int) -> 
     rng = np.random.default_rng(seed)
     for number in range(1, times):
         for clip in clips:
-            other = mirrored(clip) if number % 2 else clip
-            other = replace(other, skeleton=clip.skeleton, times=other.times * rng.uniform(*TEMPI)).resample(FPS)
-            knots = np.arange(0.0, other.times[-1] + 2.0 * DRIFT, DRIFT)
-            drift = rng.normal(0.0, np.radians(degrees) / 1.6, (len(knots), len(clip.skeleton), 3))
-            drift[:, 0] = 0.0
-            turned = rot.mul(rot.exp(natural_spline(knots, drift, other.times)), other.rotations)
-            yield replace(other, rotations=rot.normalise(turned), name=f"{clip.name} {number}")
+            yield performed(clip, number, degrees, rng)
+
+
+def performed(clip: Motion, number: int, degrees: float, rng: np.random.Generator) -> Motion:
+    """Return another performance of a clip, the `number`th, whose joints are turned by so many degrees in the mean."""
+    other = mirrored(clip) if number % 2 else clip
+    other = replace(other, skeleton=clip.skeleton, times=other.times * rng.uniform(*TEMPI)).resample(FPS)
+    knots = np.arange(0.0, other.times[-1] + 2.0 * DRIFT, DRIFT)
+    drift = rng.normal(0.0, np.radians(degrees) / 1.6, (len(knots), len(clip.skeleton), 3))
+    drift[:, 0] = 0.0
+    turned = rot.mul(rot.exp(natural_spline(knots, drift, other.times)), other.rotations)
+    return replace(other, rotations=rot.normalise(turned), name=f"{clip.name} {number}")
 
 
 def ask(options: argparse.Namespace) -> None:
