@@ -10,6 +10,7 @@ from motionmind._typing import Floats, Indices
 from motionmind.arguments import as_floats
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
+from motionmind.geometry import rotations as rot
 
 
 class Body(Protocol):
@@ -50,7 +51,7 @@ def freeze_checked(thing: Body, rotations: tuple[int, ...], root: tuple[int, ...
         array.setflags(write=False)
         object.__setattr__(thing, what, array)
     with np.errstate(over="ignore"):  # a length beyond all numbers is not 1 either
-        length = np.linalg.norm(thing.rotations, axis=-1)
+        length = rot.norm(thing.rotations)
     if np.any(np.abs(length - 1.0) > 1e-6):
         where = np.argwhere(np.abs(length - 1.0) > 1e-6)[0]
         raise MotionMindError(

@@ -211,8 +211,8 @@ class Motion:
             insertions=(),
         )
         first, last = part.times[0], part.times[-1]
-        kept = (one for one in self.insertions if one.times[-1] >= first and one.times[0] <= last)
-        return replace(part, insertions=tuple(kept))
+        kept = tuple(one for one in self.insertions if one.times[-1] >= first and one.times[0] <= last)
+        return replace(part, insertions=kept) if kept else part
 
     def inserted(self) -> Bools:
         """Return which frames [T] the engine made: those between the A and the B of an insertion."""

@@ -67,7 +67,8 @@ def question_tempo(motion: Motion) -> str:
         return ""
     if np.ptp(np.diff(motion.times)) > _UNEVEN / motion.fps:  # each frame has a time of its own
         return ""
-    motion = motion.resample(min(_RATE, motion.fps))
+    if motion.fps > _RATE:
+        motion = motion.resample(_RATE)
     begin = int(_BEGINS * motion.fps)
     if len(motion) < begin + _LONG * motion.fps:
         return ""

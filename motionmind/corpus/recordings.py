@@ -180,7 +180,8 @@ def _detail(postures: Motion, recording: Motion, between: int) -> NDArray[np.flo
     if between > 0 and 1 < count < len(recording) and recording.fps >= _COARSE:
         times = subdivide_times(postures.times, between)
         spline = rotation_spline(postures.times, postures.rotations, times)
-        detail = rot.log(rot.inv_mul(spline, recording.at(times).rotations))
+        recorded = recording if np.array_equal(recording.times, times) else recording.at(times)
+        detail = rot.log(rot.inv_mul(spline, recorded.rotations))
         detail = detail[:-1].reshape(count - 1, between + 1, joints, 3)[:, 1:]
         faulty = np.linalg.norm(detail, axis=-1).max(axis=1) > np.radians(FAULT_DEGREES)
         out[:-1] = np.where(faulty[:, None, :, None], 0.0, detail)

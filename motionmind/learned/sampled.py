@@ -38,7 +38,13 @@ class Sampled:
         return len(self.times)
 
     def frames(self, start: int, stop: int) -> Motion:
-        """Return the frames from `start` up to, not including, `stop`; up to the last if there are not so many."""
+        """Return the frames from `start` up to, not including, `stop`; up to the last if there are not so many.
+
+        Of a clip of one block the frames are made once.
+        """
+        return self._whole.slice(start, stop) if len(self) <= BLOCK else self._make(start, stop)
+
+    def _make(self, start: int, stop: int) -> Motion:
         times = self.times[start:stop]
         if self._smooth:
             keys = self._keys
@@ -62,6 +68,10 @@ class Sampled:
             part = self.frames(int(first), int(numbers[here[-1]]) + 1)
             rotations[here], root[here] = part.rotations[numbers[here] - first], part.root[numbers[here] - first]
         return rotations, root
+
+    @cached_property
+    def _whole(self) -> Motion:
+        return self._make(0, len(self))
 
     @cached_property
     def _keys(self) -> Motion:
