@@ -21,7 +21,7 @@ from motionmind.cli.files import (
 from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_part
-from motionmind.cli.types import FILE, RATE, Whole
+from motionmind.cli.types import FILE, FRAME, RATE
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @option(
     "--frame",
     section=Section.PART,
-    type=Whole(),
+    type=FRAME,
     metavar="N",
     help="Take frame N, counted from 0, or from the end if negative  [default: the only one, or that of SOURCE@N]",
 )

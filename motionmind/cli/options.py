@@ -84,6 +84,10 @@ class Command(click.Command):
         text, is_useless = "Show all options and exit.", not self._has_advanced()
         self.params.append(Option(["--help-all"], section=Section.HELP, help=text, hidden=is_useless, **flag))
 
+    def get_short_help_str(self, limit: int = 45) -> str:
+        """Return the first sentence of the help, whole, whatever the limit: a list of commands breaks its lines."""
+        return super().get_short_help_str(max(limit, 1000))
+
     def sections(self, context: click.Context) -> dict[Section, list[click.Option]]:
         """Return the options that are not hidden under each heading, advanced ones too, in the order of the page."""
         found: dict[Section, list[click.Option]] = {section: [] for section in Section}

@@ -15,7 +15,7 @@ from motionmind.cli.files import check_outputs, note_licences
 from motionmind.cli.options import HOME, Section, command, option, output, outputs, reading
 from motionmind.cli.printing import count
 from motionmind.cli.sources import parse_movement, read_movement, read_movements, select_part
-from motionmind.cli.types import COUNT, FILE_OR_FOLDER, RATE, Whole
+from motionmind.cli.types import COUNT, FILE_OR_FOLDER, FRAME, RATE, Whole
 from motionmind.display import displayed_path
 from motionmind.errors import MotionMindError
 from motionmind.files import all_or_none
@@ -29,7 +29,7 @@ FIRST = option(
     "--from",
     "start",
     section=Section.PART,
-    type=Whole(),
+    type=FRAME,
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative.",
@@ -38,7 +38,7 @@ LAST = option(
     "--to",
     "end",
     section=Section.PART,
-    type=Whole(),
+    type=FRAME,
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",

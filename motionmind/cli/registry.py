@@ -132,7 +132,7 @@ def print_index(place: str | None, *, as_json: bool) -> None:
 
 @command(
     "motionmind corpus publish hands -o public --url https://example.org/public/ --date 2026-11-23 "
-    "--licence-file corpora/LICENSE"
+    "--licence-file LICENCE.txt"
 )
 @click.argument("folder", shell_complete=completion.corpora)
 @output("Write into this folder; corpora that its index lists stay.", type=FOLDER)

@@ -58,7 +58,7 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
     )
 
 
-@command("motionmind library corpora/karate/*.score -o mine.toml --tolerance 12 --tolerance hip=8")
+@command("motionmind library karate/kata.score -o mine.toml --tolerance 12 --tolerance hip=8")
 @click.argument("scores", type=FILE, nargs=-1, required=True)
 @output("Write the library: .toml.")
 @option(
@@ -81,11 +81,13 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
     """
     from motionmind.discretize.library import write_library
     from motionmind.discretize.naming import name_states
+    from motionmind.names.finding import locate_score
     from motionmind.notation.read import read_score
 
-    check_outputs([(output, (".toml",))], scores)
+    places = [locate_score(str(score)) for score in scores]
+    check_outputs([(output, (".toml",))], places)
     degrees, per_joint = parse_tolerances(tolerance, _TOLERANCE)
-    found = name_states([read_score(score) for score in scores], degrees, per_joint, stage=stage)
+    found = name_states([read_score(place) for place in places], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(
         f"{displayed_path(output)}: {sum(map(len, found.tables.values()))} states "

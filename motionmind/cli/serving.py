@@ -9,6 +9,7 @@ import click
 from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import CORPUS, HOME, Section, command, option
 from motionmind.cli.printing import note
+from motionmind.cli.types import PORT
 from motionmind.cli.warming import warm_once
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
@@ -33,7 +34,7 @@ _IDLE = 5  # seconds that a connection without a request stays open
     metavar="ADDRESS",
     help="Listen at this address; any other than that of this computer lets others ask.",
 )
-@option("--port", section=Section.OUTPUT, type=click.IntRange(0, 65535), default=8000, help="Listen at this port.")
+@option("--port", section=Section.OUTPUT, type=PORT, metavar="N", default=8000, help="Listen at this port.")
 @HOME
 def serve(mmcp: bool, corpus: str, host: str, port: int, home: Path | None) -> None:
     """Serve movement in the style of a corpus to animation programs, until Ctrl-C.

@@ -12,7 +12,7 @@ from motionmind.cli import completion
 from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import HOME, Section, command, given_option, option
 from motionmind.cli.printing import note
-from motionmind.cli.types import FILE
+from motionmind.cli.types import FILE, PORT
 from motionmind.cli.warming import compile_all, is_cold
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
@@ -45,7 +45,8 @@ _TERMINAL = "terminal"  # the window of edits that the command makes
 @option(
     "--port",
     section=Section.OUTPUT,
-    type=click.IntRange(0, 65535),
+    type=PORT,
+    metavar="N",
     default=0,
     show_default="any that is free",
     help="Listen at this port.",

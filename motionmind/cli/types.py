@@ -25,13 +25,25 @@ class Number(click.FloatRange):
 
 
 class Whole(click.IntRange):
-    """A whole number, in a range if one is given."""
+    """A whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number; fail with a usage error if it is none."""
         if _has_too_many_digits(str(value).strip("+- ")):
             self.fail(f"{value} is too large.", param, ctx)
         return int(super().convert(value, param, ctx))
+
+
+class FrameNumber(click.ParamType[int]):
+    """The number of a frame; counted from the end if negative."""
+
+    name = "frame"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number; fail with a usage error if it is none."""
+        if _has_too_many_digits(str(value).strip("+- ")):
+            self.fail(f"{value} is too large.", param, ctx)
+        return int(click.INT.convert(value, param, ctx))
 
 
 def _has_too_many_digits(word: str) -> bool:
@@ -126,8 +138,10 @@ FILE = click.Path(dir_okay=False, readable=False, path_type=Path)
 FILE_OR_FOLDER = click.Path(readable=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
+FRAME = FrameNumber()
 COUNT = Whole(min=1)
 NATURAL = Whole(min=0)
 NATS = Number(min=0, max=1e6)  # as `motionmind.tween.request.MOST_NATS`
+PORT = Whole(0, 65535)
 POSITIVE = Number(min=0, min_open=True)
 RATE = Number(min=0, min_open=True, max=10_000)  # as `motionmind.body.motion.FASTEST`

@@ -18,7 +18,7 @@ from motionmind.cli.review_tables import print_advice, print_review
 from motionmind.cli.search_options import SEARCH_OPTIONS, request_options, searching, via_files
 from motionmind.cli.sources import parse_movement, read_movement, select_part
 from motionmind.cli.tweens import INTERRUPTED
-from motionmind.cli.types import COUNT, FILE, NATURAL, POSITIVE, RATE, Number, Point, Whole
+from motionmind.cli.types import COUNT, FILE, FRAME, NATURAL, POSITIVE, RATE, Number, Point
 from motionmind.cli.warming import help_first_search
 from motionmind.cli.words import parse_parameters
 from motionmind.display import displayed_path
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     "--from",
     "begin",
     section=Section.PART,
-    type=Whole(),
+    type=FRAME,
     metavar="N",
     default=0,
     help="Begin at frame N, counted from the end if negative; a recording begins where those of the corpus do.",
@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     "--to",
     "end",
     section=Section.PART,
-    type=Whole(),
+    type=FRAME,
     metavar="N",
     default=-1,
     help="End at frame N, counted from the end if negative.",

@@ -157,10 +157,19 @@ def open_collection(source: Source, home: Path | None = None) -> Collection:
 
 
 def locate_score(path: str, home: Path | None = None) -> Path:
-    """Return the path of a score: of the file or, where there is none, of a corpus's own, CORPUS/NAME.score."""
+    """Return the path of a score: of the file or, where there is none, of a corpus's own, CORPUS/NAME.score.
+
+    Raises:
+        MotionMindError: neither is there, but a corpus has a score of this name.
+    """
+    if is_file(path):
+        return Path(path)
+    corpora = store.list_corpora(home)
     corpus, _, name = path.rpartition("/")
-    if corpus and not is_file(path) and (folder := store.list_corpora(home).get(corpus)) and (folder / name).is_file():
-        return folder / name
+    if corpus in corpora and is_file(f"{corpora[corpus]}/{name}"):
+        return corpora[corpus] / name
+    if not corpus and (owner := next((word for word in corpora if is_file(f"{corpora[word]}/{name}")), None)):
+        raise MotionMindError(f"{path}: there is no such file; did you mean {owner}/{name}?")
     return Path(path)
 
 

@@ -110,6 +110,14 @@ def test_every_command_and_option_has_help(path: tuple[str, ...], run: Run) -> N
 
 
 @pytest.mark.parametrize("path", PAGES, ids=" ".join)
+def test_help_has_whole_sentences_and_no_range_without_bounds(path: tuple[str, ...], run: Run) -> None:
+    page = run(*path, "--help").out
+    assert "=None" not in page
+    assert "RANGE" not in page
+    assert not re.search(r"[a-z]\.\.\.$", page.partition("\nCommands:")[2], re.M)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=" ".join)
 def test_every_option_is_in_exactly_one_section(path: tuple[str, ...]) -> None:
     command = COMMANDS.get(path, app)
     assert isinstance(command, Command)
@@ -140,10 +148,10 @@ def test_each_field_of_a_request_has_one_option_but_for_those_of_tween_alone() -
     assert sorted(options) == sorted({field.name for field in fields(TweenRequest)} - {"unlike", "what_if"})
 
 
-def test_the_examples_run(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "corpora").symlink_to(BALLET.parent)
+def test_the_examples_run_outside_a_checkout(run: Run) -> None:
     write_motion("clip.bvh", ballet_clip("plies").resample(30.0))
     Path("new").mkdir()
+    Path("LICENCE.txt").write_text("Free for all uses.\n")
     write_motion("new/jump.bvh", ballet_clip("jump").resample(30.0))
     run("tween", ARABESQUE, FIFTH, "--corpus", "ballet", "-o", "tween.json", "--report", "report.json")
     assert len(EXAMPLES) == 31

@@ -208,18 +208,18 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two recordings, as a user has them."""
+    """A folder with two recordings and a licence, as a user has them."""
     folder = tmp_path_factory.mktemp("recordings")
     for name, clip in (("clip", "adagio"), ("plies", "plies")):
         write_motion(folder / f"{name}.bvh", ballet_clip(clip).resample(30.0))
+    (folder / "LICENCE.txt").write_text("Free for all uses.\n")
     return folder
 
 
 @pytest.fixture
 def here(tmp_path: Path, home: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder in a checkout with the bundled corpora, where commands run."""
+    """An empty folder outside of any checkout, where commands run."""
     monkeypatch.setenv("MOTIONMIND_HOME", str(home))
-    (tmp_path / "corpora").symlink_to(ROOT / "corpora")
     return tmp_path
 
 

@@ -155,6 +155,8 @@ def test_a_score_of_a_corpus_needs_no_path_and_a_file_of_that_name_goes_first() 
     Path("ballet").mkdir()
     shutil.copy(BALLET / "barre.score", "ballet/centre.score")
     assert locate_score("ballet/centre.score") == Path("ballet/centre.score")
+    assert locate_score("nothing.score") == Path("nothing.score")
+    shutil.copy(BALLET / "centre.score", "centre.score")
     assert locate_score("centre.score") == Path("centre.score")
 
 
@@ -191,7 +193,8 @@ def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None
         ("ballet/fifth@1", r"^ballet/fifth: frames are 0 to 0, there is no frame 1$"),
         ("ballet/adagio@34s", r"^ballet/adagio: its frames are from 0\.00 to 33\.50 s, there is none at 34 s$"),
         (f"{CENTRE}/tendue", r"centre\.score: no posture or clip 'tendue'; did you mean tendus\?|tendu\?"),
-        ("centre.score/tendu", r"^centre\.score: cannot be read: there is no such file or folder$"),
+        ("centre.score/tendu", r"^centre\.score: there is no such file; did you mean ballet/centre\.score\?$"),
+        ("nothing.score/tendu", r"^nothing\.score: cannot be read: there is no such file or folder$"),
         ("nothing.bvh@3", r"^nothing\.bvh: cannot be read: there is no such file or folder$"),
         (str(BALLET / "postures"), r"postures: is a folder, and no corpus"),
         (".", r"^\.: is a folder, and no corpus"),
