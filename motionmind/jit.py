@@ -74,11 +74,6 @@ def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> A
     return compiled
 
 
-def is_compiled(package: str) -> bool:
-    """Return whether compiled code of a subpackage such as "search" is on disk; the search takes half a minute."""
-    return any(name.startswith(f"{package}/") for name in compiled_names())
-
-
 def decorated_names() -> frozenset[str]:
     """Return the functions of this package that are to be compiled, as "search/astar.search"; none need be loaded."""
     return frozenset(

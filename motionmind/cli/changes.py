@@ -47,7 +47,7 @@ _FEW = 0.001  # share of orientations outside of all states of which nothing is 
 
 
 @command("motionmind corpus add mine new/*.bvh")
-@click.argument("name", shell_complete=completion.corpora)
+@click.argument("name", shell_complete=completion.own_corpora)
 @click.argument("files", type=FILE, nargs=-1, required=True)
 @FLIPS
 @PERFORMER
@@ -81,7 +81,6 @@ def add(
     rate: Rate = "auto" if learned.corpus.rate is None else learned.corpus.rate
     takes = Taking(rate, learned.corpus.skip, options["flips"], mirror=any(clip.mirrored for clip in own))
     source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
-    warm_once()
     with open_team(1, None) as team, shards_of(name, home) as folder:
         taken = take_files(clip_names(files), source, folder, team, strict=True)
         changed = _learn_again(learned, add_recordings(learned.corpus, taken, **options))
@@ -90,7 +89,7 @@ def add(
 
 
 @command("motionmind corpus remove mine clip")
-@click.argument("name", shell_complete=completion.corpora)
+@click.argument("name", shell_complete=completion.own_corpora)
 @click.argument("clips", nargs=-1, required=True)
 @DETAILS
 @HOME
@@ -113,6 +112,8 @@ def take_files(
     names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
 ) -> Iterator[Recording]:
     """Take files by workers, with a progress bar on a terminal; report those that cannot be read, or end with one.
+
+    After the last of them, what learning needs is compiled: a file that is not there does not wait for that.
 
     Args:
         names: the clip's name for each file; a score names its own.
@@ -142,17 +143,16 @@ def take_files(
         note(f"{fault}; left out")
     if faults:
         note(f"{count(len(faults), 'file')} of {len(names)} cannot be read, and nothing is learned from them")
+    warm_once()
     progress("learning")
 
 
 def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
     """Return what was learned from a user's corpus, and its folder; CorpusError if there is none that was built."""
-    from motionmind.corpus.store import locate, place_for
+    from motionmind.corpus.store import own_place
     from motionmind.learned import persistence
 
-    place = place_for(name, home)
-    if locate(name, home) != place:
-        raise MotionMindError(f"{name!r} is no corpus of your own")
+    place = own_place(name, home)
     return persistence.load(name, home), place
 
 

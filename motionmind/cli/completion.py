@@ -36,6 +36,15 @@ def corpora(context: click.Context, _: click.Parameter, incomplete: str) -> list
     return [CompletionItem(name) for name in _folders(context) if name.startswith(incomplete)]
 
 
+def own_corpora(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a corpus that the user built."""
+    from motionmind.corpus.bundled import bundled
+
+    places = _folders(context).items()
+    own = [name for name, folder in places if folder.parent != bundled("corpora")]
+    return [CompletionItem(name) for name in own if name.startswith(incomplete)]
+
+
 def postures(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete a posture of a corpus, or a file; of a clip the first posture is given."""
     return _complete_named(context, incomplete, "@0")

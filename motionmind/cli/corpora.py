@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -28,9 +28,6 @@ from motionmind.cli.warming import warm_once
 from motionmind.cli.words import parse_mixture, parse_tolerances
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
-
-if TYPE_CHECKING:
-    pass
 
 _LINE = 300  # characters of a title, an author, a source: sentences rather than names
 
@@ -160,7 +157,7 @@ def build(
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
     from motionmind.corpus.recordings import Taking
     from motionmind.corpus.shards import Reading, shards_of
-    from motionmind.corpus.store import place_for
+    from motionmind.corpus.store import locate, place_for
     from motionmind.discretize import make_discretization
     from motionmind.executors.opening import open_team
     from motionmind.executors.workshop import Workshop
@@ -173,7 +170,10 @@ def build(
     reading = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
     if scheduler:  # whose workers are in other folders
         files = tuple(file.absolute() for file in files)
-    warm_once()
+    if others:  # a bundled one is learned as it is loaded
+        for other in others:
+            locate(other, home)
+        warm_once()
     with open_team(workers, scheduler) as team, shards_of(name, home) as folder:
         engine = Engine.fit(
             take_files(clip_names(files), reading, folder, team, strict=strict_files),
@@ -280,7 +280,7 @@ def check(name: str, as_json: bool, details: bool, pairs: int, seed: int, home: 
 
 
 @command("motionmind corpus rename mine dancer")
-@click.argument("name", shell_complete=completion.corpora)
+@click.argument("name", shell_complete=completion.own_corpora)
 @click.argument("new")
 @HOME
 def rename(name: str, new: str, home: Path | None) -> None:
@@ -295,15 +295,15 @@ def rename(name: str, new: str, home: Path | None) -> None:
 
 
 @command("motionmind corpus delete dancer --yes")
-@click.argument("name", shell_complete=completion.corpora)
+@click.argument("name", shell_complete=completion.own_corpora)
 @option("--yes", "is_sure", section=Section.EDITS, is_flag=True, help="Delete it; there is no way back.")
 @HOME
 def delete(name: str, is_sure: bool, home: Path | None) -> None:
     """Delete a corpus that you built."""
     from motionmind.corpus import store
 
-    place = store.place_for(name, home)
-    if not is_sure and place.exists():
+    place = store.own_place(name, home)
+    if not is_sure:
         raise MotionMindError(f"{place}: would be deleted for good; say --yes")
     store.delete(name, home)
     click.echo(f"deleted {displayed_path(place)}")

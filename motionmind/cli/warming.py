@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from motionmind.search.problem import Problem
 
 NOTICE = "compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)"
+_LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _LOOK = 0.2  # seconds between two looks at what is compiled
 
 
@@ -50,7 +51,7 @@ def warm() -> None:
 
 
 def warm_once() -> None:
-    """Compile all, unless something is compiled; say so, with a bar on a terminal, else in a line.
+    """Compile all, unless a search is compiled; say so, with a bar on a terminal, else in a line.
 
     Nothing is done where compiled code cannot be kept: whatever needs it then compiles it.
     """
@@ -60,10 +61,10 @@ def warm_once() -> None:
 
 
 def is_cold() -> bool:
-    """Return whether nothing is compiled, and compiled code can be kept."""
-    from motionmind.jit import is_compiled, place_of_code
+    """Return whether a search is yet to be compiled, if only its rest, and compiled code can be kept."""
+    from motionmind.jit import compiled_names, place_of_code
 
-    return not is_compiled("search") and place_of_code() is not None
+    return _LAST not in compiled_names() and place_of_code() is not None
 
 
 def compile_all(report: Callable[[int, int, str], None]) -> None:
@@ -84,9 +85,9 @@ def help_first_search() -> None:
 
     What is still running when the command ends is ended with it.
     """
-    from motionmind.jit import is_compiled, place_of_code
+    from motionmind.jit import compiled_names, place_of_code
 
-    if is_compiled("search"):
+    if _LAST in compiled_names():
         return
     _say()
     if place_of_code() is not None and _processors() > 1:

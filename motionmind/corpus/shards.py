@@ -291,7 +291,10 @@ def _read(job: Job) -> Iterator[Motion]:
     options = job.reading
     motion = read_motion(job.file, unit=options.unit, asf=options.asf, fps=options.fps)
     if len(motion) == 1:
-        warnings.warn(f"{job.file}: holds one posture, and no move to learn from", MotionMindWarning, stacklevel=2)
+        doubt = f"{job.file}: holds one posture, and no move to learn from"
+        if options.taking.skip:  # which would drop it
+            raise CorpusError(doubt)
+        warnings.warn(doubt, MotionMindWarning, stacklevel=2)
     yield own_skeleton(replace(motion, name=job.name), options.joints)
 
 

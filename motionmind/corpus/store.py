@@ -76,9 +76,26 @@ def place_for(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Return the folder for a new corpus of a user; CorpusError if the name is invalid or a bundled corpus's."""
     if not re.fullmatch(r"\w[\w.-]{0,63}", name):
         raise CorpusError(f"{name!r:.80} cannot be a corpus's name: use letters, digits, -, _ and . (64 at most)")
-    if (bundled("corpora") / name / MANIFEST).is_file():
+    if _is_bundled(name):
         raise CorpusError(f"{name!r} is the name of a bundled corpus; choose another")
     return home(folder) / "corpora" / name
+
+
+def own_place(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Return the folder of a corpus of the user's own; CorpusError if it is none."""
+    corpora = list_corpora(folder)
+    if name in corpora and _is_bundled(name):
+        raise CorpusError(f"{name!r} is a bundled corpus, which can be neither changed nor deleted")
+    place = place_for(name, folder)
+    if corpora.get(name) != place:
+        own = [known for known, where in corpora.items() if where.parent == place.parent]
+        raise CorpusError(f"no corpus {name!r} of your own{suggestion(name, own)}")
+    return place
+
+
+def _is_bundled(name: str) -> bool:
+    """Return whether a corpus of this name comes with MotionMind."""
+    return (bundled("corpora") / name / MANIFEST).is_file()
 
 
 def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
@@ -130,12 +147,8 @@ def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) ->
 
 
 def _own(name: str, folder: str | os.PathLike[str] | None) -> Path:
-    """Return the folder of a built corpus of the user's own; CorpusError if it is none."""
-    place = place_for(name, folder)
-    corpora = list_corpora(folder)
-    if corpora.get(name) != place:
-        own = [known for known, where in corpora.items() if where.parent == place.parent]
-        raise CorpusError(f"no corpus {name!r} of your own{suggestion(name, own)}")
+    """Return the folder of a corpus of the user's own that holds nothing but what was built; CorpusError if none is."""
+    place = own_place(name, folder)
     if stranger := versions.find_stranger(place, MANIFEST):
         raise CorpusError(f"{place}: holds {stranger.relative_to(place)}, which is no part of a built corpus")
     return place

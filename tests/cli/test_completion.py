@@ -58,6 +58,9 @@ def test_corpora_postures_clips_joints_and_flows_are_completed(complete: Complet
     assert complete("tween", "ballet/fifth", "mi") == ["mine/jump@0"]
     assert complete("sheet", "mine/") == ["mine/jump"]
     assert complete("corpus", "info", "k") == ["karate"]
+    assert {"ballet", "mine"} <= set(complete("corpus", "check", ""))
+    for change in ("add", "remove", "rename", "delete"):
+        assert complete("corpus", change, "") == ["mine"]
     assert complete("measure", "x.bvh", "--corpus", "mi") == ["mine"]
     assert complete("vary", "ballet/jump", "--attractor", "l") == ["lorenz"]
     for words in (

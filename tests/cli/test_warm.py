@@ -10,11 +10,14 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 import pytest
+from bundled_clips import ballet_clip
 from command_line import Run
 from numba.core.registry import CPUDispatcher
 
 from motionmind import jit
-from motionmind.cli import warming
+from motionmind.cli import changes, corpora, warming
+from motionmind.errors import MotionMindError
+from motionmind.formats import write_motion
 
 
 def dispatchers() -> dict[str, Any]:
@@ -76,6 +79,33 @@ def test_the_first_search_alone_says_what_it_waits_for(is_first: bool, tmp_path:
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
     assert ("compiling" in done.stderr) == is_first
     assert done.stderr.count("\n") <= 1
+
+
+def test_what_an_interruption_left_uncompiled_is_said_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = jit.decorated_names()
+    assert warming._LAST in names
+    monkeypatch.setattr(jit, "compiled_names", lambda: names - {warming._LAST})
+    assert warming.is_cold()
+    monkeypatch.setattr(jit, "compiled_names", lambda: names)
+    assert not warming.is_cold()
+
+
+def test_a_build_compiles_once_its_files_are_read(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt() -> None:
+        raise MotionMindError("compiling")
+
+    monkeypatch.setattr(changes, "warm_once", interrupt)
+    monkeypatch.setattr(corpora, "warm_once", interrupt)
+    write_motion("clip.bvh", ballet_clip("jump").resample(30.0))
+    for words, message in [
+        (["nothing.bvh"], "nothing.bvh: cannot be read: there is no such file"),
+        (["clip.bvh", "--mix", "balet"], "no corpus 'balet'; did you mean ballet?"),
+        (["clip.bvh", "--strict-files", "nothing.bvh"], "nothing.bvh: cannot be read: there is no such file"),
+        (["clip.bvh"], "compiling"),
+        (["--mix", "ballet"], "compiling"),
+    ]:
+        done = run("corpus", "build", "mine", *words)
+        assert (done.code, message in done.err) == (2, True), done.err
 
 
 def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

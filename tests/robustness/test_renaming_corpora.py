@@ -154,7 +154,7 @@ def test_a_build_under_which_it_goes_away_fails_and_leaves_nothing(mine: Path) -
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("ballet", "'ballet' is the name of a bundled corpus"),
+        ("ballet", "'ballet' is a bundled corpus, which can be neither changed nor deleted"),
         ("amrs", "no corpus 'amrs' of your own; did you mean arms\\?"),
         ("zzz", "no corpus 'zzz' of your own; there are arms"),
         ("../arms", "cannot be a corpus's name"),
