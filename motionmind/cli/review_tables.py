@@ -78,10 +78,12 @@ def _format_stretch(first: int, last: int) -> str:
 
 
 def _format_names(first: str, last: str) -> str:
-    """Format the names of the first and the last posture of a stretch: "fifth..tendu", "adagio@3..17"."""
+    """Format the names of the first and the last posture of a stretch: "adagio@3..17", "adagio@3 to tendu"."""
     one, other = (displayed(name, _NAME) for name in (first, last))
     clip, at, frame = other.rpartition("@")
-    return one if first == last else f"{one}..{frame if at and one.startswith(f'{clip}@') else other}"
+    if first == last:
+        return one
+    return f"{one}..{frame}" if at and one.startswith(f"{clip}@") else f"{one} to {other}"
 
 
 def _format_transition(seam: dict[str, Any]) -> str:

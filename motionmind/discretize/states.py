@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Ints, States
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError, SkeletonError, suggestion
 from motionmind.geometry import rotations as rot
 
@@ -48,6 +49,9 @@ class StateSpace:
     kind: str
     tolerances: Floats
     labels: tuple[tuple[str, ...], ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<StateSpace by {displayed(self.kind)}: joints {len(self.names)}, states {len(self.centres)}>"
 
     def __post_init__(self) -> None:
         # asarray, not array: memory-mapped arrays stay memory-mapped.

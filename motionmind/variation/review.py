@@ -117,6 +117,10 @@ class Seam:
     decision: Decision
     chosen: int
 
+    def __repr__(self) -> str:
+        judged = f", chosen {self.chosen}\n {self.transition!r}" if self.transition else ", not judged"
+        return f"<Seam {self.number} from posture {self.start} to {self.end}: {self.decision}{judged}>"
+
     @property
     def join(self) -> Transition | None:
         """The former name of `transition`, which goes in 0.3."""

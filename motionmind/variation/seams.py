@@ -18,6 +18,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Int32s
 from motionmind.body.motion import Motion, Posture
+from motionmind.display import displayed
 from motionmind.errors import NoPathError, SkeletonError, WrongTypeError, did_you_mean
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Status, Watch
@@ -83,6 +84,10 @@ class InsertionCandidate(msgspec.Struct, Generic[M, P], frozen=True, eq=False, f
     bridges: tuple[Bridge, ...]
     waits: tuple[Wait, ...]
 
+    def __repr__(self) -> str:
+        proof = f"{self.status} at {self.cost:.3f} nats, at least {self.lower_bound:.3f}"
+        return f"<InsertionCandidate: moves {self.moves}, {proof}, attested {self.attested:.1%}>"
+
     @property
     def moves(self) -> int:
         """Number of moves T; the path has T + 1 postures."""
@@ -124,6 +129,10 @@ class JudgedTransition(msgspec.Struct, Generic[C], frozen=True, eq=False, forbid
     candidates: tuple[C, ...]
     failure: str
     options: Mapping[str, Any] = msgspec.field(name="asked")
+
+    def __repr__(self) -> str:
+        found = f"abrupt joints {len(self.abrupt_joints)}, candidates {len(self.candidates)}"
+        return f"<JudgedTransition from {self.start} to {self.end} by {displayed(self.corpus)}: {found}>"
 
     @property
     def breaks(self) -> tuple[AbruptJoint, ...]:

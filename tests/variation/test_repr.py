@@ -39,6 +39,12 @@ def test_public_values_are_shown_in_one_to_five_safe_lines(engine: Engine) -> No
         (variation := vary(motion, nudge=1.0), "lorenz"),
         (replace(variation, piece=replace(variation.piece, motion=_foreign(variation.piece.motion))), "left"),
     ]
+    values += [
+        (engine.space, "joints 23"),
+        (first := variation.seams[0], "not judged"),
+        (seam := vary(motion, engine, nudge=1.0, length=first.at + 2, alternatives=1).seams[0], f"to {first.end}"),
+        (seam.insertion, "nats"),
+    ]
     for value, said in values:
         shown = repr(value)
         assert said in shown

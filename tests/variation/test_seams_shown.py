@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from motionmind.body.motion import Motion
 from motionmind.errors import MotionMindError
 from motionmind.geometry import rotations as rot
 from motionmind.names.finding import find_posture, open_collection
-from motionmind.names.spelling import parse_source
+from motionmind.names.spelling import parse_frames, parse_source
 from motionmind.render.seam_sheet import seam_sheet
 from motionmind.tween.engine import Engine
 from motionmind.variation.piece import Piece
@@ -79,6 +80,9 @@ def test_the_table_names_postures_and_does_without_the_corpus(run: Run, file: Pa
     listed = run("review", file, "--list").out
     (line,) = [line for line in listed.splitlines() if line.startswith("   1  ")]
     assert f" {names[first.end]}" in line
+    for frames in re.findall(r"\S+@\S+\.\.\S+", listed):
+        parse_frames(frames)  # a name that commands take
+    assert re.search(r"[a-z] to [a-z]", listed)  # from a posture of one name to one of another
     gone = tuple(msgspec.structs.replace(one, corpus="gone") for one in variation.transitions)
     write_variation(file, replace(variation, transitions=gone))
     assert f" adagio@{first.end}" in run("review", file).out
