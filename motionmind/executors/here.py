@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
@@ -48,6 +47,9 @@ def threads(number: int) -> Team:
 @contextmanager
 def processes(number: int) -> Iterator[Team]:
     """Open a team of so many processes; they end with the context, or with this process, even if that is killed."""
+    import multiprocessing  # which takes a tween from a built corpus a while to import, and it needs none
+    from concurrent.futures import ProcessPoolExecutor
+
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     pools: list[ProcessPoolExecutor] = []
@@ -71,6 +73,8 @@ def processes(number: int) -> Iterator[Team]:
 
 def _begin() -> None:
     """Prepare a worker: Ctrl-C is for the process that started it, with which it ends, however that ends."""
+    import multiprocessing
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(multiprocessing.parent_process(),), daemon=True).start()
 
