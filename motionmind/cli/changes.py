@@ -128,7 +128,7 @@ def take_files(
 
     def on_need(size: float) -> None:
         if size >= _NOTEWORTHY:
-            note(f"about {size / 1e9:.1f} GB of disk are needed, half of it until the corpus is built")
+            note(f"about {size / 1e9:.1f} GB of disk are needed, more than half of it until the corpus is built")
 
     def on_taken(taken: Taken) -> None:
         bar.update(1)

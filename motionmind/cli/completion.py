@@ -45,6 +45,18 @@ def own_corpora(context: click.Context, _: click.Parameter, incomplete: str) -> 
     return [CompletionItem(name) for name in own if name.startswith(incomplete)]
 
 
+def published(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a corpus or a recipe in the indexes on this disk."""
+    from motionmind.registry.index import is_address, open_index
+
+    chosen = context.params.get("index")
+    names = dict[str, None]()
+    for place in [chosen, None] if chosen and not is_address(chosen) else [None]:
+        with suppress(MotionMindError):
+            names |= dict.fromkeys(one.name for one in open_index(place).index.all)
+    return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+
+
 def postures(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete a posture of a corpus, or a file; of a clip the first posture is given."""
     return _complete_named(context, incomplete, "@0")

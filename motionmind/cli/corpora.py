@@ -305,8 +305,7 @@ def delete(name: str, is_sure: bool, home: Path | None) -> None:
     place = store.own_place(name, home)
     if not is_sure:
         raise MotionMindError(f"{place}: would be deleted for good; say --yes")
-    store.delete(name, home)
-    click.echo(f"deleted {displayed_path(place)}")
+    click.echo(f"deleted {displayed_path(store.delete(name, home))}")
 
 
 for _command in (build, add, remove, list_corpora, info, check, rename, delete, publish, fetch):

@@ -35,7 +35,7 @@ _WIDTH = 100  # characters to which sentences are wrapped
 
 
 @command("motionmind corpus fetch hands --index public/index.json --as fingers")
-@click.argument("name")
+@click.argument("name", shell_complete=completion.published)
 @option(
     "--as", "new_name", section=Section.CORPORA, metavar="NAME", help="Give the corpus this name  [default: its own]"
 )

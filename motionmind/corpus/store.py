@@ -98,22 +98,40 @@ def _is_bundled(name: str) -> bool:
     return (bundled("corpora") / name / MANIFEST).is_file()
 
 
-def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
+def unfinished(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Return the folder of the work on a corpus that is not built yet."""
+    return home(folder).absolute() / "shards" / name
+
+
+def delete(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Delete a user's corpus at once; who has loaded it keeps what it read.
 
+    Work that was left of building it goes too, unless somebody is at it.
+
     Args:
-        name: of the corpus.
+        name: of the corpus, or of one that was never built to the end.
         folder: the user's home (`home`).
+
+    Returns:
+        The folder that was deleted.
 
     Raises:
         CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, or it
             cannot be deleted.
     """
-    place = _own(name, folder)
+    left = unfinished(name, folder)
+    place = left if left.exists() and not place_for(name, folder).exists() else _own(name, folder)
     try:
-        versions.remove(place)
+        if place != left:
+            versions.remove(place)
     except OSError as error:
         raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
+    versions.remove_unused(left)
+    if place == left and left.exists():
+        raise CorpusError(f"{left}: cannot be deleted while the corpus is being built")
+    with suppress(OSError):
+        left.parent.rmdir()
+    return place
 
 
 def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) -> Path:
@@ -218,6 +236,8 @@ def _write(folder: Path, manifest: Mapping[str, Any], arrays: Mapping[str, NDArr
         for name, array in arrays.items():
             with (version / f"{name}.npy").open("xb") as file:
                 whole = np.ascontiguousarray(array)
+                if whole.dtype.hasobject:
+                    raise ValueError(f"{name}: Object arrays cannot be saved")
                 np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(whole))
                 file.write(whole.data)  # as np.save does, but for an error that says why
                 file.flush()

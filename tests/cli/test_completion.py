@@ -61,6 +61,7 @@ def test_corpora_postures_clips_joints_and_flows_are_completed(complete: Complet
     assert {"ballet", "mine"} <= set(complete("corpus", "check", ""))
     for change in ("add", "remove", "rename", "delete"):
         assert complete("corpus", change, "") == ["mine"]
+    assert complete("corpus", "fetch", "la") == ["lafan1"]
     assert complete("measure", "x.bvh", "--corpus", "mi") == ["mine"]
     assert complete("vary", "ballet/jump", "--attractor", "l") == ["lorenz"]
     for words in (

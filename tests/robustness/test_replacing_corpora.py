@@ -120,7 +120,7 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
 ) -> None:
     before(mine)
     there = names(mine.parent)
-    calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], np: ["save"]}
+    calls = {os: ["fsync", "replace", "mkdir"], Path: ["mkdir", "replace"], np.lib.format: ["write_array_header_1_0"]}
     for owner, name in [(owner, name) for owner, all_of_it in calls.items() for name in all_of_it]:
         for error in (OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()):
             for number in count(1):
@@ -139,6 +139,18 @@ def test_an_error_or_ctrl_c_on_the_way_leaves_the_old_one_and_nothing_else(
                     break
             shutil.rmtree(mine)
             before(mine)
+
+
+def test_a_disk_without_room_says_so_in_its_own_words(mine: Path) -> None:
+    resource = pytest.importorskip("resource", reason="this system has no limit on the size of files")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        with pytest.raises(CorpusError, match=r"arms: cannot be written: File too large$"):
+            store.save(mine, MANIFEST, {"rotations": np.zeros(100_000)})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert names(mine.parent) == []
 
 
 # --- leftovers --------------------------------------------------------------------------------------------------------
