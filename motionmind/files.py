@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import mmap
 import os
 import re
 import stat
@@ -13,9 +14,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from motionmind.errors import FormatError, MotionMindError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FilePath = str | os.PathLike[str]
 
@@ -67,6 +71,15 @@ def _read(path: FilePath) -> bytes:
 
 
 _kept: ContextVar[dict[tuple[int, int], bytes] | None] = ContextVar("kept", default=None)
+
+
+def give_back(array: NDArray[Any]) -> None:
+    """Let go of the memory in which a mapped array was read, if it is one; what is needed again is read again."""
+    base: Any = array
+    while base is not None and not isinstance(base, mmap.mmap):
+        base = getattr(base, "base", None)
+    if base is not None and hasattr(mmap, "MADV_DONTNEED"):
+        base.madvise(mmap.MADV_DONTNEED)
 
 
 @contextmanager

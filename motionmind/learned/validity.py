@@ -7,7 +7,8 @@ limbs, D nodes of the trees over moments.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,12 +20,14 @@ from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.discretize import StateSpace
+from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.pace import LENGTHS
 from motionmind.learned.plausibility import MEASURES
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
 _SMALL, _TINY = 1e-9, 1e-300
+_PART = 1 << 22  # bytes of an array that are checked at a time
 _UNIT = 1e-5  # by which the square of a unit quaternion's length may differ from 1
 
 
@@ -126,9 +129,23 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
         shape = [_size(word, sizes) for word in words]
         if list(array.shape) != shape:
             raise ValueError(f"{name} is of the shape {list(array.shape)}, not {shape}")
-        numbers = array[~np.isnan(array)] if form.or_nan else array
-        if form.kind.startswith("f") and not ((numbers >= form.low) & (numbers <= form.high)).all():
+        if form.kind.startswith("f") and not _is_all(array, partial(_is_in_range, form)):
             raise ValueError(f"{name} holds a number that is not from {form.low:g} to {form.high:g}")
+
+
+def _is_in_range(form: _Form, part: NDArray[Any]) -> bool:
+    numbers = part[~np.isnan(part)] if form.or_nan else part
+    return bool(((numbers >= form.low) & (numbers <= form.high)).all())
+
+
+def _is_all(array: NDArray[Any], test: Callable[[NDArray[Any]], bool]) -> bool:
+    """Return whether all parts of an array pass a test; of one that is mapped, memory holds a part at a time."""
+    rows = max(_PART // max(array[:1].nbytes, 1), 1)
+    for start in range(0, len(array), rows):
+        if not test(array[start : start + rows]):
+            return False
+        give_back(array)
+    return True
 
 
 def _size(word: str, sizes: Mapping[str, int]) -> int:
@@ -192,7 +209,7 @@ def _check_trees(arrays: Mapping[str, NDArray[Any]]) -> None:
     count = order.shape[1]
     for name in ("neighbours.order", "neighbours.ranks"):
         _check_range(name, arrays, count)
-    if not np.array_equal(np.take_along_axis(ranks, order, 1), np.broadcast_to(np.arange(count), order.shape)):
+    if any((rank[own] != np.arange(count)).any() for rank, own in zip(ranks, order, strict=True)):
         raise ValueError("neighbours.ranks is not where the moments are in neighbours.order")
     if not np.array_equal(arrays["neighbours.bounds"], node_bounds(count)):
         raise ValueError(f"neighbours.bounds is not that of {count} moments")
@@ -201,7 +218,7 @@ def _check_trees(arrays: Mapping[str, NDArray[Any]]) -> None:
 def _check_units(name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Check that an array holds unit quaternions."""
     # Written so that a NaN fails too.
-    if not (np.abs(_squares(arrays[name]) - 1.0) <= _UNIT).all():
+    if not _is_all(arrays[name], lambda part: bool((np.abs(_squares(part) - 1.0) <= _UNIT).all())):
         raise ValueError(f"{name} holds a quaternion that is not of unit length")
 
 
@@ -211,7 +228,7 @@ def _squares(quaternions: Floats) -> Floats:
 
 def _check_range(name: str, arrays: Mapping[str, NDArray[Any]], size: int | Ints) -> None:
     """Check that all of an array are indices of what has this size, or these sizes by column."""
-    if not ((arrays[name] >= 0) & (arrays[name] < size)).all():
+    if not _is_all(arrays[name], lambda part: bool(((part >= 0) & (part < size)).all())):
         raise ValueError(f"{name} holds an index of what is not there")
 
 
@@ -221,7 +238,8 @@ def _check_rows(pointers: str, entries: str, arrays: Mapping[str, NDArray[Any]],
     lengths = np.diff(starts)
     if starts[0] != 0 or starts[-1] != len(found) or (lengths < 0).any():
         raise ValueError(f"{pointers} does not rise from 0 to {len(found)}")
-    _check_range(entries, arrays, np.repeat(sizes, lengths))
+    if not ((found >= 0) & (found < np.repeat(sizes, lengths))).all():
+        raise ValueError(f"{entries} holds an index of what is not there")
     row = np.repeat(np.arange(len(lengths)), lengths)
     if ((np.diff(found) <= 0) & (np.diff(row) == 0)).any():
         raise ValueError(f"{entries} does not rise within a row")

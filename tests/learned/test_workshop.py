@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from motionmind.errors import SkeletonError
 from motionmind.executors import workshop as workshops
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
-from motionmind.learned import carriage
+from motionmind.learned import carriage, validity
 from motionmind.learned.learning import learn
 from motionmind.learned.percentiles import Percentile
 
@@ -81,6 +82,28 @@ def test_a_percentile_holds_a_tail_alone() -> None:
     for block in np.random.default_rng(0).normal(size=(100, 1000, 1)):
         found.add(block)
         assert sum(map(len, found._rows)) <= 5002
+
+
+def test_an_array_is_checked_in_the_memory_of_a_part(tmp_path: Path) -> None:
+    status = Path("/proc/self/status")
+    if not status.exists():
+        pytest.skip("this system does not say which memory is files'")
+
+    def of_files() -> int:
+        return int(re.findall(r"RssFile:\s+(\d+)", status.read_text())[0])
+
+    np.save(tmp_path / "ones.npy", np.ones((500_000, 8)))
+    mapped = np.asarray(np.load(tmp_path / "ones.npy", mmap_mode="r"))
+    before, most = of_files(), [0]
+
+    def are_ones(part: np.ndarray) -> bool:
+        good = bool((part == 1.0).all())
+        most.append(of_files())
+        return good
+
+    assert validity._is_all(mapped, are_ones)
+    assert max(most) - before < 10_000  # kB of 32,000
+    assert len(most) > 5
 
 
 def test_settings_of_one_joint_do_not_stop_others() -> None:
