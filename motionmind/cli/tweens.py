@@ -19,7 +19,7 @@ from motionmind.cli.options import HOME, OUTPUTS, Section, command, option, outp
 from motionmind.cli.printing import Interruption, note, print_alternatives, print_tween
 from motionmind.cli.search_options import request_options, searching, via_files
 from motionmind.cli.types import FILE, Whole
-from motionmind.cli.warming import help_first_search
+from motionmind.cli.warming import announce_first_search, help_first_search
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.files import all_or_none, sha256_of
@@ -110,6 +110,7 @@ def tween(
     gc.disable()  # start-up makes a million objects and no garbage; to look for it takes a tenth of a second
     _load_numba()
     from motionmind.cli.postures import read_end
+    from motionmind.corpus.store import locate
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import plain
 
@@ -119,9 +120,12 @@ def tween(
     read_from = [path for one in (*named, *around) if one for path in one.source.paths]
     files.check([*read_from, *via_files(options, home)])
     request = request_options(options, home) | {"what_if": what_if}
-    engine = Engine.load(corpus or _corpus_of(named, home), home)
+    corpus = corpus or _corpus_of(named, home)
+    locate(corpus, home)
+    announce_first_search()  # before a bundled corpus is learned
     start, request["before"] = read_end(named[0], around[0], "before", home)
     end, request["after"] = read_end(named[1], around[1], "after", home)
+    engine = Engine.load(corpus, home)
     help_first_search()
     with _diagnosing(files), Interruption() as interruption:
         results = _find_tweens(engine, (start, end), request, files.count, interruption)

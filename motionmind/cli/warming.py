@@ -80,17 +80,20 @@ def compile_all(report: Callable[[int, int, str], None]) -> None:
         _end(workers)
 
 
+def announce_first_search() -> None:
+    """Say that the first search takes longer, if it is yet to come."""
+    from motionmind.jit import compiled_names
+
+    if _LAST not in compiled_names():
+        _say()
+
+
 def help_first_search() -> None:
-    """Say that the first search takes longer, if it is yet to come; compile beside it what it comes to last.
+    """Compile, beside a search that is the first, what it comes to last; the corpus is learned, for all to load.
 
     What is still running when the command ends is ended with it.
     """
-    from motionmind.jit import compiled_names, place_of_code
-
-    if _LAST in compiled_names():
-        return
-    _say()
-    if place_of_code() is not None and _processors() > 1:
+    if is_cold() and _processors() > 1:
         helpers = _start([[realise], [draw]])
         click.get_current_context().call_on_close(lambda: _end(helpers))
 

@@ -18,6 +18,7 @@ from motionmind import jit
 from motionmind.cli import changes, corpora, warming
 from motionmind.errors import MotionMindError
 from motionmind.formats import write_motion
+from motionmind.tween.engine import Engine
 
 
 def dispatchers() -> dict[str, Any]:
@@ -106,6 +107,24 @@ def test_a_build_compiles_once_its_files_are_read(run: Run, monkeypatch: pytest.
     ]:
         done = run("corpus", "build", "mine", *words)
         assert (done.code, message in done.err) == (2, True), done.err
+
+
+def test_the_first_search_says_what_it_waits_for_before_it_learns_a_corpus(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> Engine:
+        raise MotionMindError("learning")
+
+    monkeypatch.setattr(Engine, "load", interrupt)
+    monkeypatch.setattr(jit, "compiled_names", frozenset[str])
+    monkeypatch.setattr(warming, "NOTICE", "compiling")
+    for words, said in [
+        (("ballet/arabesque", "ballet/fifth"), "compiling\nerror: learning\n"),
+        (("ballet/arabesk", "ballet/fifth"), "compiling\nerror: ballet: no posture or clip 'arabesk'"),
+        (("ballet/arabesque", "ballet/fifth", "--corpus", "balet"), "error: no corpus 'balet'"),
+    ]:
+        assert run("tween", *words).err.startswith(said)
+    assert run("vary", "macarena", "-o", "v.json").err == "compiling\nerror: learning\n"
 
 
 def test_a_place_that_cannot_be_written_is_an_error_in_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
