@@ -143,7 +143,7 @@ def tween(
 
 def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
     """Return the corpus that names A, B or both; an error if there is none, or they are of two."""
-    from motionmind.names.finding import find_motion
+    from motionmind.names.finding import find_motion, find_posture
 
     corpora = [end.source.place for end in ends if end.source.kind == "corpus"]
     if not corpora:
@@ -152,6 +152,8 @@ def _corpus_of(ends: Sequence[PostureName], home: Path | None) -> str:
         context = click.get_current_context()
         raise click.UsageError("Missing option '--corpus': no corpus names A or B.", context)
     if len(set(corpora)) > 1:
+        for end in ends:
+            find_posture(end, home)  # or says that there is none of that name
         a, b = map(displayed, corpora)
         raise MotionMindError(f"A is a posture of {a} and B of {b}: say in which to move, --corpus {a} or --corpus {b}")
     return corpora[0]

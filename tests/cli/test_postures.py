@@ -223,6 +223,7 @@ def test_a_tween_of_named_postures_is_of_their_corpus(run: Run) -> None:
         "A is a posture of karate and B of ballet: say in which to move, --corpus karate or --corpus ballet"
         in mixed.err
     )
+    assert "karate: no posture or clip 'arabesque'" in run("tween", "karate/arabesque", "ballet/fifth").err
     assert tween(run, "karate/yoi", "ballet/fifth").code == 0
     alone = run("tween", FIFTH, FIFTH)
     assert alone.code == 2
