@@ -12,6 +12,8 @@ Movement is given as in `Motion`: local rotations [..., J, 4] and root positions
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Indices
@@ -27,6 +29,18 @@ STAYS = 0.05  # metres that a foot which stays in its place may slide, as it rol
 _SOFT = 0.025  # metres above the floor at which Zhang et al. stop counting a slide
 _NEAR = 0.1  # of the body's height: how near a leaf must end, at rest, to the lowest point to be a foot
 _FLOOR = 0.05  # share of the frames whose lowest point lies at or below the floor
+
+
+class Heel(NamedTuple):
+    """A heel: a point of the ankle's segment, not a joint.
+
+    Attributes:
+        ankle: number of the ankle.
+        place: place of the heel in the ankle's frame [3], metres.
+    """
+
+    ankle: int
+    place: Floats
 
 
 # --- heights ----------------------------------------------------------------------------------------------------------
@@ -101,13 +115,29 @@ def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatom
     """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
     [P] that each point belongs to."""
     joints, points = np.tile(np.arange(len(skeleton)), 2), skeleton.tips
-    if anatomy is not None and anatomy.leg is not None:
-        heel = np.array(anatomy.leg.heel)
-        if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
-            heel = heel * skeleton.height / anatomy.skeleton.height
-        joints = np.append(joints, [anatomy.named(anatomy.leg.ankle, side) for side in SIDES])
-        points = np.concatenate([points, [heel, heel * np.array([-1.0, 1.0, 1.0])]])
+    if anatomy is not None and (heels := _heels(skeleton, anatomy)):
+        joints = np.append(joints, [heel.ankle for heel in heels])
+        points = np.concatenate([points, [heel.place for heel in heels]])
     return skeleton.positions_with(rotations, root, joints[len(skeleton) :], points), joints
+
+
+def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
+    """Return the heels of a body that is known to have them, by name, in the order of `contact_points`."""
+    anatomy = anatomy_of(skeleton)
+    if anatomy is None:
+        return {}
+    return {f"{side}_heel": heel for side, heel in zip(SIDES, _heels(skeleton, anatomy), strict=False)}
+
+
+def _heels(skeleton: Skeleton, anatomy: Anatomy) -> list[Heel]:
+    """Return the heels of a body with an anatomy: one a side, none without legs."""
+    if anatomy.leg is None:
+        return []
+    place = np.array(anatomy.leg.heel)
+    if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
+        place = place * skeleton.height / anatomy.skeleton.height
+    places = place, place * np.array([-1.0, 1.0, 1.0])
+    return [Heel(anatomy.named(anatomy.leg.ankle, side), place) for side, place in zip(SIDES, places, strict=True)]
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------

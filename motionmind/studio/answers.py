@@ -326,13 +326,22 @@ class Posed(_Answer):
     words: str = ""
 
 
+class HandleView(_Answer):
+    """A joint or a heel that can be dragged: its name, words, and where it is on a joint, metres."""
+
+    joint: str
+    words: str
+    on: str
+    at: tuple[float, float, float]
+
+
 class Opened(Posed):
     """A posture, and all that the editor shows of its body."""
 
     key: str = ""
     title: str = ""
     joints: list[dict[str, str]] = []
-    handles: list[dict[str, str]] = []
+    handles: list[HandleView] = []
     mirrors: bool = False
 
 

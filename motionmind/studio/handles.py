@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind.body.anatomy_file import anatomy_of
+from motionmind.body.contact import heels_of
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Posture
 from motionmind.body.skeleton import Skeleton
@@ -46,10 +47,19 @@ _WORDS = {"lumbar": "lower back", "thorax": "upper back", "cervical": "neck", "a
 
 
 class Handle(NamedTuple):
-    """A joint that can be dragged, and the words for it."""
+    """A joint or a heel that can be dragged.
+
+    Attributes:
+        joint: its name, as `motionmind.studio.reach.drag` takes it.
+        words: words for it.
+        on: the joint that it is fixed to; itself, unless it is a heel.
+        at: its place in that joint's frame, metres.
+    """
 
     joint: str
     words: str
+    on: str
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Turn(NamedTuple):
@@ -82,20 +92,22 @@ def words_of(joint: str) -> str:
 
 
 def handles_of(skeleton: Skeleton) -> list[Handle]:
-    """Return a body's handles: a person's by name; of any other the root, the ends of its limbs and their middles."""
+    """Return a body's handles: a person's by name, with heels; of others the root, limbs' ends and their middles."""
     if anatomy_of(skeleton) is not None:
         out = []
         for name in skeleton.names:
             side, _, stem = name.partition("_")
             if name in _HANDLES:
-                out.append(Handle(name, _HANDLES[name]))
+                out.append(Handle(name, _HANDLES[name], name))
             elif side in ("left", "right") and stem in _HANDLES:
-                out.append(Handle(name, f"{side} {_HANDLES[stem]}"))
+                out.append(Handle(name, f"{side} {_HANDLES[stem]}", name))
+        for name, (ankle, (x, y, z)) in heels_of(skeleton).items():
+            out.append(Handle(name, name.replace("_", " "), skeleton.names[ankle], (float(x), float(y), float(z))))
         return out
     leaves = [joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)]
     middles = [skeleton.parents[leaf] for leaf in leaves]
     chosen = sorted({0, *leaves, *(joint for joint in middles if len(skeleton.children(joint)) == 1)})
-    return [Handle(skeleton.names[joint], words_of(skeleton.names[joint])) for joint in chosen]
+    return [Handle(name, words_of(name), name) for name in (skeleton.names[joint] for joint in chosen)]
 
 
 def turns_of(posture: Posture) -> list[Turn]:

@@ -11,7 +11,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.motion import Posture
 from motionmind.discretize.states import nearest
 from motionmind.geometry import rotations as rot
-from motionmind.studio.reach import drag, plant, standing_soles
+from motionmind.studio.reach import drag, place_of, plant, standing_soles
 
 if TYPE_CHECKING:
     from motionmind.learned.learning import Learned
@@ -60,7 +60,7 @@ class Memory:
 
         Args:
             posture: the posture.
-            kept: a joint whose place is kept if that can be.
+            kept: a joint or a heel whose place is kept if that can be.
         """
         _, numbers = self._nearest(posture.rotations)
         chains = self.corpus.to_chains(posture.rotations).copy()
@@ -71,8 +71,7 @@ class Memory:
         planted = plant(found, posture)
         held = planted
         if kept is not None:
-            place = posture.skeleton.positions(posture.rotations, posture.root)[posture.skeleton.index(kept)]
-            held = drag(planted, kept, place)
+            held = drag(planted, kept, place_of(posture, kept))
         return next((one for one in (held, planted) if "unseen" not in self.known(one)), found)
 
     def bring_whole(self, posture: Posture) -> tuple[Posture, str, float]:

@@ -62,7 +62,7 @@ class Dragging(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         pose: where the body is.
         start: where it was when the drag began.
-        joint: the joint that is dragged.
+        joint: the joint or the heel that is dragged.
         place: where to, metres.
         standing: the last joints of the feet that stay.
     """
@@ -96,7 +96,7 @@ class Changing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         pose: the posture.
         to: "mirror" exchanges left and right, "floor" puts it on the floor, "known" brings it joint by joint to what
             the corpus knows, "whole" to the corpus's nearest posture.
-        kept: the joint that stays in its place, if that can be.
+        kept: the joint or the heel that stays in its place, if that can be.
     """
 
     pose: Pose

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
-from motionmind.body.contact import contact_points, find_feet
+from motionmind.body.contact import contact_points, find_feet, heels_of
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.motion import Posture
 from motionmind.body.support import size_of
@@ -27,6 +27,7 @@ from motionmind.studio.joint_angles import JointAngles
 STANDS = 0.04  # metres above the floor below which a foot's sole stands, of a body as large as a person
 SNAPS = 0.04  # metres above its height in a foot that is flat within which a dragged joint puts its foot on the floor
 FOOT = 0.12  # metres above the sole at rest up to which a joint is a part of the foot
+LEVEL = 0.02  # metres by which heels that rise together differ in height at most
 SOLE = 0.03  # metres above a foot's lowest point at rest of what is its sole
 # Of a miss of a metre: feet and floor count most, at the end even more, then the dragged joint, then where joints were.
 _KEPT, _KEPT_AT_LAST, _PULL = 10.0, 100.0, 0.02
@@ -39,6 +40,7 @@ _CLEAR = 1e-4  # metres by which a point may be under the floor
 _STRIDE = 0.25  # metres that a step goes at most, of a body as large as a person
 _FURTHEST = 0.4  # radians that an angle changes in a step at most
 _TRUNK, _ROOT, _TRAVEL = 0.4, 0.25, 0.15  # how readily trunk and root turn beside limbs, and metres to a radian
+_RISE = 2.0  # metres to a radian by which the body rises with its heels
 
 
 class Wishes(NamedTuple):
@@ -75,20 +77,31 @@ def drag(
 
     Args:
         posture: where the body is.
-        joint: the joint that is dragged.
+        joint: the joint that is dragged, or a heel, "left_heel". Heels of feet that stand rise and sink over the
+            balls, which stay; others go along that were as high.
         place: where to [3], metres.
         start: the posture in which the drag began, near which joints stay; `posture` by default.
         standing: the last joints of the feet that stay where they are in `start`; None for all that stand there. The
             foot that the dragged joint is a part of never stays.
 
     Raises:
-        SkeletonError: there is no such joint.
+        SkeletonError: there is no such joint or heel.
     """
     start = posture if start is None else start
     body = _Body(start)
+    if joint in body.heels:
+        kept, wished = body.rise(standing, body.heels[joint], np.asarray(place, dtype=np.float64))
+        return body.solve(posture, kept, wished, travels=len(kept.points) > 0)
     dragged = posture.skeleton.index(joint)
     kept, wished = body.kept(standing, dragged), body.wished(dragged, place)
     return body.solve(posture, kept, wished, travels=len(kept.points) > 0 or dragged == 0)
+
+
+def place_of(posture: Posture, joint: str) -> Floats:
+    """Return the place of a joint or a heel [3], metres; SkeletonError if there is none."""
+    points, heels = contact_points(posture.skeleton, posture.rotations, posture.root)[0], [*heels_of(posture.skeleton)]
+    number = 2 * len(posture.skeleton) + heels.index(joint) if joint in heels else posture.skeleton.index(joint)
+    return np.asarray(points[number])
 
 
 def standing_feet(posture: Posture) -> list[str]:
@@ -145,6 +158,7 @@ class _Body:
             self.last[point] = np.where(carries[above], point, self.last[above])
         self.limbs = limbs_of(skeleton)
         self.heights = at_rest[:, 1]
+        self.heels = {name: 2 * count + number for number, name in enumerate(heels_of(skeleton))}
         self.bottom = np.minimum(self.began[:, 1], 0.0)
         self.soles = self._soles(self.heights, limb_of_points(skeleton)[joints])
         readily = np.full((count, 3), _TRUNK)
@@ -187,8 +201,29 @@ class _Body:
         if standing is None:
             points = [sole[self.low(sole)] for sole in points]
         chosen = np.concatenate([np.zeros(0, dtype=np.int64), *points])
-        places = self.began[chosen].reshape(-1)
-        return Wishes(np.repeat(chosen, 3), np.tile(np.eye(3), (len(chosen), 1)), places)
+        return self._where_they_were(chosen)
+
+    def rise(self, standing: Sequence[str] | None, heel: int, place: Floats) -> tuple[Wishes, Wishes]:
+        """Return the wishes that balls of feet stay where they stand, and for the height of a heel over its ball.
+
+        Other heels go along that were as high, and the body rises rather than bend its knees, unless another foot is on
+        the floor that does not go along. Of a foot that does not stand the heel is dragged like any other point.
+        """
+        soles = self.kept(standing, None).points[::3]
+        high = self.began[heel, 1]
+        feet = [sole for sole in self.soles.values() if np.isin(sole, soles).any()]
+        heels = [one for one in self.heels.values() if abs(self.began[one, 1] - high) <= LEVEL * self.size]
+        heels = [one for one in heels if any(one in sole for sole in feet)]
+        kept = self._where_they_were(soles[~np.isin(soles, [heel, *heels])])
+        if heel not in heels:
+            return kept, Wishes(np.full(3, heel), np.eye(3), place)
+        if all(np.isin(sole, heels).any() for sole in self.soles.values() if self.low(sole).any()):
+            self.readily[-2] = _RISE * self.size
+        return kept, _heights(np.array(heels), np.full(len(heels), place[1]))
+
+    def _where_they_were(self, points: Ints) -> Wishes:
+        """Return the wish that points stay where they were when the drag began."""
+        return Wishes(np.repeat(points, 3), np.tile(np.eye(3), (len(points), 1)), self.began[points].reshape(-1))
 
     def wished(self, dragged: int, place: Floats) -> Wishes:
         """Return the wish for a joint's place; near the floor a foot is put down flat."""

@@ -127,7 +127,7 @@ def test_handles_are_joints_of_the_body(ballet: Engine) -> None:
     for engine in (ballet, Engine.load("walk-hexapod")):
         skeleton = engine.corpus.skeleton
         handles = handles_of(skeleton)
-        assert {handle.joint for handle in handles} <= set(skeleton.names)
+        assert {handle.on for handle in handles} <= set(skeleton.names)
         assert len({handle.words for handle in handles}) == len(handles) >= 8
 
 

@@ -39,6 +39,13 @@ export class Body {
     });
   }
 
+  /** The place [x, y, z] of a point in a joint's frame, metres. */
+  place(joint, at) {
+    const out = [0, 0, 0];
+    turn(out, 0, this.turned, joint * 4, at);
+    return out.map((value, i) => value + this.joints[joint * 3 + i]);
+  }
+
   /** Put the posture's cones into `out`, eight numbers each: both ends' centre and radius. */
   writeCones(out, at = 0) {
     for (const cone of this.cones) {

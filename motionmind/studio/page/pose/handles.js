@@ -1,4 +1,4 @@
-/** The handles over the picture: a button on each joint that can be dragged, a mark on every other. */
+/** The handles over the picture: a button on each joint and heel that can be dragged, a mark on every other joint. */
 
 import { Vector3 } from "three";
 
@@ -23,7 +23,7 @@ export class Handles {
     this.element.setAttribute("role", "group");
     this.element.setAttribute("aria-label", "Handles of the body");
     this.viewer.overlay.append(this.element);
-    /** @type {HTMLElement[]} one a joint */
+    /** @type {{element: HTMLElement, point: import("./session.js").Handle}[]} one a joint, then those of heels */
     this.marks = [];
     this.point = new Vector3();
     /** @type {{joint: string, plane: Vector3, away: Vector3, moved: boolean} | null} */
@@ -48,13 +48,12 @@ export class Handles {
 
   #make() {
     const { editor } = this;
-    const handles = new Map(editor.handles.map(({ joint, words }) => [joint, words]));
-    this.marks = editor.joints.map(({ joint }) => {
-      const words = handles.get(joint);
-      return words === undefined ? mark() : this.#handle(joint, words);
-    });
+    const handles = new Map(editor.handles.map((handle) => [handle.joint, handle]));
+    const joints = editor.joints.map(({ joint }) => handles.get(joint) ?? bare(joint));
+    const heels = editor.handles.filter(({ joint, on }) => joint !== on);
+    this.marks = [...joints, ...heels].map((point) => ({ point, element: point.words ? this.#handle(point) : mark() }));
     // The Tab key goes from handle to handle as they are listed.
-    this.element.replaceChildren(...this.marks);
+    this.element.replaceChildren(...this.marks.map(({ element }) => element));
     this.#appear();
     this.#tell();
   }
@@ -64,20 +63,20 @@ export class Handles {
     this.viewer.stale();
   }
 
-  /** @param {string} joint @param {string} words */
-  #handle(joint, words) {
+  /** @param {import("./session.js").Handle} point */
+  #handle(point) {
+    const { joint, words, on } = point;
     const handle = document.createElement("button");
     Object.assign(handle, { type: "button", className: "pose-handle", title: words });
     handle.dataset.testid = `handle-${joint}`;
-    handle.dataset.words = words;
     handle.append(mark());
-    handle.addEventListener("focus", () => this.editor.select(joint));
-    handle.addEventListener("pointerdown", (event) => this.#hold(event, handle, joint));
+    handle.addEventListener("focus", () => this.editor.select(on));
+    handle.addEventListener("pointerdown", (event) => this.#hold(event, handle, point));
     handle.addEventListener("pointermove", (event) => this.#move(event, words));
     for (const over of ["pointerup", "pointercancel", "lostpointercapture"]) {
       handle.addEventListener(over, () => this.#release());
     }
-    handle.addEventListener("keydown", (event) => this.#press(event, joint, words));
+    handle.addEventListener("keydown", (event) => this.#press(event, point));
     return handle;
   }
 
@@ -85,15 +84,15 @@ export class Handles {
   #tell() {
     const { known, selected, joints, busy } = this.editor;
     this.element.ariaBusy = String(busy);
-    this.marks.forEach((element, i) => {
-      const how = known[i] ?? "seen";
+    const at = new Map(joints.map(({ joint }, i) => [joint, i]));
+    for (const { element, point } of this.marks) {
+      const how = known[/** @type {number} */ (at.get(point.on))] ?? "seen";
       element.dataset.known = known.length ? how : "";
-      if (element.dataset.words) {
-        const words = known.length ? `${element.dataset.words}: ${WORDS[how]}` : element.dataset.words;
-        if (element.getAttribute("aria-label") !== words) element.setAttribute("aria-label", words);
-        element.classList.toggle("selected", joints[i].joint === selected);
-      }
-    });
+      if (!point.words) continue;
+      const words = known.length ? `${point.words}: ${WORDS[how]}` : point.words;
+      if (element.getAttribute("aria-label") !== words) element.setAttribute("aria-label", words);
+      element.classList.toggle("selected", point.joint === selected);
+    }
   }
 
   /** Put the handles where their joints are seen. */
@@ -102,23 +101,22 @@ export class Handles {
     if (!editor.shown || !viewer.stage) return;
     const { camera } = viewer.stage;
     const { clientWidth: width, clientHeight: height } = this.element;
-    const places = editor.places();
-    this.marks.forEach((element, i) => {
-      this.point.fromArray(places, 3 * i).project(camera);
+    for (const { element, point } of this.marks) {
+      this.point.fromArray(editor.place(point)).project(camera);
       const [x, y] = [0.5 * (this.point.x + 1) * width, 0.5 * (1 - this.point.y) * height];
       element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
       element.style.zIndex = String(1000 - Math.round(1000 * this.point.z)); // the nearest is on top
-    });
+    }
   }
 
-  /** @param {PointerEvent} event @param {HTMLElement} handle @param {string} joint */
-  #hold(event, handle, joint) {
+  /** @param {PointerEvent} event @param {HTMLElement} handle @param {import("./session.js").Handle} point */
+  #hold(event, handle, point) {
     if (event.button !== 0) return;
     event.preventDefault();
     handle.focus({ preventScroll: true });
     handle.setPointerCapture(event.pointerId);
-    const plane = new Vector3().fromArray(this.editor.place(joint));
-    this.held = { joint, plane, away: new Vector3(), moved: false };
+    const plane = new Vector3().fromArray(this.editor.place(point));
+    this.held = { joint: point.joint, plane, away: new Vector3(), moved: false };
     this.held.away.copy(plane).sub(this.#under(event, plane) ?? plane);
   }
 
@@ -150,8 +148,9 @@ export class Handles {
     return ray.multiplyScalar(place.clone().sub(camera.position).dot(facing) / along).add(camera.position);
   }
 
-  /** @param {KeyboardEvent} event @param {string} joint @param {string} words */
-  #press(event, joint, words) {
+  /** @param {KeyboardEvent} event @param {import("./session.js").Handle} point */
+  #press(event, point) {
+    const { joint, words } = point;
     const way = WAYS[event.key];
     if (!way || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
@@ -160,12 +159,17 @@ export class Handles {
     const far = STEP * editor.motion.body.size * (event.shiftKey ? 5 : 1);
     const towards = new Vector3(...way).applyQuaternion(this.viewer.stage.camera.quaternion).multiplyScalar(far);
     // Keys in quick succession move on from where the last one leads to, and are one step.
-    const from = editor.began && this.goal?.joint === joint ? this.goal.place : editor.place(joint);
+    const from = editor.began && this.goal?.joint === joint ? this.goal.place : editor.place(point);
     this.goal = { joint, place: new Vector3(...from).add(towards).toArray() };
     editor.drag(joint, this.goal.place, words);
     clearTimeout(this.pause);
     this.pause = setTimeout(() => editor.end(), PAUSE);
   }
+}
+
+/** A joint that is no handle. @param {string} joint @returns {import("./session.js").Handle} */
+function bare(joint) {
+  return { joint, words: "", on: joint, at: [0, 0, 0] };
 }
 
 function mark() {

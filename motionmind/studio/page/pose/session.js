@@ -9,7 +9,8 @@ const STEPS = 200; // that can be taken back
 
 /**
  * @typedef {{rotations: number[], root: number[]}} Posture
- * @typedef {{joint: string, words: string}} Handle
+ * @typedef {{joint: string, words: string}} Joint
+ * @typedef {{joint: string, words: string, on: string, at: [number, number, number]}} Handle a joint, or a heel on one
  * @typedef {{joint: string, words: string, angle: string, label: string, least: number, most: number, degrees: number}} Turn
  * @typedef {"seen" | "near" | "unseen"} Known
  */
@@ -35,7 +36,7 @@ export class Editor extends EventTarget {
     this.key = "";
     this.title = "";
     this.corpus = "";
-    /** @type {Handle[]} */
+    /** @type {Joint[]} */
     this.joints = [];
     /** @type {Handle[]} */
     this.handles = [];
@@ -49,7 +50,7 @@ export class Editor extends EventTarget {
     this.released = new Set();
     this.mirrors = false;
     this.selected = "";
-    this.dragged = ""; // the joint that was dragged last
+    this.dragged = ""; // the joint or heel that was dragged last
     this.words = "";
     /** @type {Posture} */
     this.posture = { rotations: [], root: [] };
@@ -75,7 +76,7 @@ export class Editor extends EventTarget {
     ]);
     const { joints, handles, title, mirrors } = told;
     const shown = told.rotations.length ? { rotations: told.rotations, root: told.root } : this.posture;
-    Object.assign(this, { key, title, joints, handles, mirrors, selected: handles[0]?.joint ?? "", dragged: "", words: "" });
+    Object.assign(this, { key, title, joints, handles, mirrors, selected: handles[0]?.on ?? "", dragged: "", words: "" });
     Object.assign(this, { past: [], future: [], began: null, released: new Set(), motion: new Posed(source, shown) });
     this.#take(told);
     this.show();
@@ -112,17 +113,11 @@ export class Editor extends EventTarget {
     return this.motion !== null && this.studio.viewer.motion === this.motion;
   }
 
-  /** The places of all joints, metres [J * 3]. @returns {Float64Array} */
-  places() {
-    const { body } = this.motion;
+  /** The place of a handle, metres. @param {Handle} handle @returns {number[]} */
+  place({ on, at }) {
+    const { body, joints } = this.motion;
     body.pose(this.posture.rotations, this.posture.root);
-    return body.joints;
-  }
-
-  /** The place of a joint. @param {string} joint @returns {number[]} */
-  place(joint) {
-    const at = 3 * this.motion.joints.indexOf(joint);
-    return [...this.places().slice(at, at + 3)];
+    return body.place(joints.indexOf(on), at);
   }
 
   /** @param {string} joint */
@@ -140,7 +135,7 @@ export class Editor extends EventTarget {
     this.#changed();
   }
 
-  /** Drag a joint to a place, until `end`. @param {string} joint @param {number[]} place @param {string} words */
+  /** Drag a joint or a heel to a place, until `end`. @param {string} joint @param {number[]} place @param {string} words */
   drag(joint, place, words) {
     this.#begin(`drag the ${words}`);
     this.dragged = joint;
