@@ -19,11 +19,11 @@ import numpy as np
 
 from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion, Posture
+from motionmind.body.reaching import chain_to, reach
 from motionmind.errors import NoPathError
 from motionmind.geometry import rotations as rot
 from motionmind.search.solve import Progress, Watch
 from motionmind.serve.order import Order, Pin, Pose, Waypoint
-from motionmind.serve.pins import chain_to, reach
 from motionmind.serve.rig import Rig
 from motionmind.tween.engine import Engine
 from motionmind.tween.result import Tween

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
@@ -16,10 +17,11 @@ from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
 from motionmind.studio.alternatives import COUNT, Account, account, find, usual_likelihoods
 from motionmind.studio.api import Window, body_of, error, json
-from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Several, Single, Wish
+from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Pin, Several, Single, Wish
 from motionmind.studio.piece import End, Finding, Found, State, key_of, question_of
 from motionmind.studio.project import RefusedError
 from motionmind.studio.sides import options_of, sides_of
+from motionmind.studio.stays import in_place, stays_of
 from motionmind.studio.worker_loop import engine_of
 
 if TYPE_CHECKING:
@@ -54,7 +56,7 @@ class Acceptance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     window: Window
 
 
-def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any]) -> None:
+def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any], stays: Sequence[Pin]) -> None:
     """Find alternatives in a worker, and tell each as it is found: a motion and its `Account`.
 
     Args:
@@ -62,12 +64,16 @@ def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any]) -
         corpus: name of the corpus.
         sides: from where, and to where.
         options: of the engine.
+        stays: hands and feet that stay in their places.
     """
     engine = engine_of(corpus)
     own = usual_likelihoods(engine)
     found = find(engine, sides.a, sides.b, before=sides.before, after=sides.after, **options)
     for number, tween in enumerate(found, start=1):
-        report(number, COUNT, "looking for others", (tween.motion, account(tween, engine.corpus, own)))
+        said = account(tween, engine.corpus, own)
+        motion, missed = in_place(tween.motion, stays)
+        told = msgspec.structs.replace(said, beyond=[*missed, *said.beyond])
+        report(number, COUNT, "looking for others", (motion, told))
 
 
 class _Search:
@@ -130,7 +136,8 @@ class _Desk:
         corpus = project.state.corpus
         question = question_of(ends, asked.options, corpus, project.versions)
         seeking = _Search(Between(a, b, asked.options), question)
-        job = self._studio.workers.submit("between", search, corpus, sides, options, collect=seeking.take, urgent=True)
+        given = corpus, sides, options, stays_of(asked.options, sides.a.skeleton)
+        job = self._studio.workers.submit("between", search, *given, collect=seeking.take, urgent=True)
         self._searches[job.id] = seeking
         while len(self._searches) > _KEPT:
             self._searches.popitem(last=False)

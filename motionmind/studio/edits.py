@@ -18,7 +18,8 @@ Key = Annotated[str, msgspec.Meta(min_length=1, max_length=400)]  # of a movemen
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 Frame = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 Decision = Literal["open", "locked", "discarded"]
-Hold = Literal["start", "end", "throughout"]
+Hold = Literal["start", "end", "throughout", "place"]
+Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Place = str | tuple[str, str]  # that an edit touches: a block's id, or the ids on both sides of a seam
 
 
@@ -56,16 +57,26 @@ class Passing(_Struct, frozen=True):
 
 
 class Pin(_Struct, frozen=True):
-    """A hand or a foot that keeps its limb as it is on an insertion's way.
+    """A hand or a foot that stays on an insertion's way: as its limb is, or in its place in the room.
 
     Attributes:
         joint: the joint at the limb's end.
-        hold: "start" if it stays as it is at the start until the end comes, "end" if it takes up what it has at the end
-            at once, "throughout" if both ends agree and it stays all the way.
+        hold: "start" if the limb stays as it is at the start until the end comes, "end" if it takes up what it has at
+            the end at once, "throughout" if both ends agree and it stays all the way; "place" if the hand or foot stays
+            where it is in the room, and the limb makes up for that.
+        begins: share of the insertion's time from which it stays in its place.
+        ends: share until which it does, more than `begins`.
     """
 
     joint: Name
     hold: Hold = "start"
+    begins: Share = 0.0
+    ends: Share = 1.0
+
+    def __post_init__(self) -> None:
+        """Check that it begins before it ends."""
+        if self.begins >= self.ends:
+            raise ValueError("a hand or foot that stays must begin to before it ends to")
 
 
 class Ask(_Struct, frozen=True):

@@ -22,9 +22,10 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError, MotionMindWarning, enumerated
 from motionmind.studio import api
 from motionmind.studio.alternatives import Account, account, find, usual_likelihoods
-from motionmind.studio.edits import Ask
+from motionmind.studio.edits import Ask, Pin
 from motionmind.studio.piece import Finding, Found, Seam
 from motionmind.studio.sides import Sides, options_of, sides_of
+from motionmind.studio.stays import in_place, stays_of
 from motionmind.studio.worker_loop import engine_of
 from motionmind.studio.workers import JobCancelledError
 from motionmind.variation.seams import AbruptJoint, TransitionTest
@@ -47,12 +48,14 @@ class Question(NamedTuple):
         sides: the movement on both sides.
         options: the wish, as options of the engine.
         wished: whether movement is to be inserted even where the transition is not abrupt.
+        stays: hands and feet that stay in their places.
     """
 
     name: str
     sides: Sides
     options: dict[str, Any]
     wished: bool
+    stays: Sequence[Pin] = ()
 
 
 def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Finding]:
@@ -98,7 +101,9 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     try:
         tweens = find(engine, a, b, MOST_ALTERNATIVES, before=before, after=after, **question.options)
         for number, tween in enumerate(tweens, start=1):
-            distinct.setdefault(tween.path.tobytes(), (tween.motion, _words(account(tween, engine.corpus, own))))
+            if tween.path.tobytes() not in distinct:
+                motion, missed = in_place(tween.motion, question.stays)
+                distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own), missed)
             report(number, MOST_ALTERNATIVES, "smoothing a seam")
     except MotionMindError as error:  # after the first, nothing else differs enough
         if not distinct:
@@ -118,9 +123,9 @@ def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
     return "; ".join(said + ([f"not seen in {displayed(corpus)}: {enumerated(unseen, _NAMED)}"] if unseen else []))
 
 
-def _words(found: Account) -> str:
+def _words(found: Account, missed: Sequence[str]) -> str:
     """Say in a line what there is to know of an insertion."""
-    return "; ".join(said for said in (found.usual, found.words, *found.beyond) if said)
+    return "; ".join(said for said in (found.usual, found.words, *missed, *found.beyond) if said)
 
 
 def _line(error: Exception) -> str:
@@ -229,7 +234,8 @@ class Smoother:
     def _asked(self, name: str, seam: Seam) -> Question:
         movement, ask = self._studio.movements.get, seam.verdict.ask
         sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.state.corpus))
-        return Question(name, sides, options_of(ask, sides.a.skeleton, movement), ask != Ask())
+        skeleton = sides.a.skeleton
+        return Question(name, sides, options_of(ask, skeleton, movement), ask != Ask(), stays_of(ask, skeleton))
 
     async def _result(self, kind: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """The result of a job; JobCancelledError if it was cancelled, MotionMindError if it failed."""

@@ -96,6 +96,8 @@ def options_of(ask: Ask, skeleton: Skeleton, movement: Movements) -> dict[str, A
     pin: dict[str, str] = {}
     hold: list[str] = []
     for one in ask.pins:
+        if one.hold == "place":  # see `motionmind.studio.stays`
+            continue
         limb = _limb(skeleton, one.joint)
         if one.hold == "throughout":
             hold += [joint for joint in limb if joint not in hold]

@@ -110,7 +110,13 @@ export function Wishes({ piece, sight, thumbnail }) {
     ${wished.map((seam) => {
       const { passing, pins } = seam.ask;
       const middle = seam.at + seam.seconds / 2;
-      return html`<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${middle * sight.scale}px` }}>
+      const stays = pins.filter(({ hold }) => hold === "place");
+      return html`${stays.map(
+        ({ begins, ends }) => html`<i
+          class="stay"
+          style=${{ left: `${(seam.at + begins * seam.seconds) * sight.scale}px`, width: `${(ends - begins) * seam.seconds * sight.scale}px` }}
+        ></i>`,
+      )}<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${middle * sight.scale}px` }}>
         ${passing.map(({ posture, frame }) => html`<img alt="" class="passing" src=${thumbnail(posture, frame)} />`)}
         ${pins.map(({ joint }) => html`<span class="pin" title=${plain(joint)}>
           <svg viewBox="0 0 16 16"><path d="M8 9v5M5 2h6l-1 4 2 3H4l2-3z" /></svg>${plain(joint)}

@@ -4,7 +4,7 @@ import { lastBefore } from "./composed.js";
 
 /**
  * @typedef {{posture: string, frame: number}} Passing
- * @typedef {{joint: string, hold: "start"|"end"|"throughout"}} Pin
+ * @typedef {{joint: string, hold: "start"|"end"|"throughout"|"place", begins: number, ends: number}} Pin
  * @typedef {{seconds: number|null, passing: Passing[], pins: Pin[]}} Ask
  * @typedef {{id: string, source: string, first: number, last: number, mirrored: boolean, key: string, title: string,
  *   frames: number, missing: boolean, at: number, seconds: number}} Block

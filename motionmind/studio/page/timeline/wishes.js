@@ -4,7 +4,13 @@ import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/ht
 import { plain } from "./blocks.js";
 import { pass, wish } from "./items.js";
 
-const HOLDS = { start: "stays as at the start", end: "is at once as at the end", throughout: "stays all the way" };
+const HOLDS = {
+  start: "stays as at the start",
+  end: "is at once as at the end",
+  throughout: "stays all the way",
+  place: "stays in its place",
+};
+const LEAST = 0.1; // seconds that something stays in its place at least
 
 /** @param {{does: any, studio: any, seam: any, joints: string[], thumbnail: any, onClose: () => void}} props */
 export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
@@ -14,6 +20,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
   const [posture, setPosture] = useState("");
   const [joint, setJoint] = useState("");
   const [hold, setHold] = useState("start");
+  const [stay, setStay] = useState(() => stayFrom(seam, does.time));
   // At once: a key that comes before would act on the tracks, and close the sheet again.
   useLayoutEffect(() => element.current.querySelector("input").focus(), []);
   const locked = seam.decision === "locked";
@@ -28,7 +35,8 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
     setPosture("");
   };
   const addPin = () => {
-    if (joint) does.edit(wish(seam, { pins: [...ask.pins, { joint, hold }] }));
+    const { begins, ends } = hold === "place" ? stay : { begins: 0, ends: 1 };
+    if (joint) does.edit(wish(seam, { pins: [...ask.pins, { joint, hold, begins, ends }] }));
     setJoint("");
   };
   return html`<section
@@ -95,7 +103,7 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
       <${Wished}
         rows=${ask.pins.map((pin) => ({
           key: pin.joint,
-          words: `${plain(pin.joint)} ${HOLDS[pin.hold]}`,
+          words: `${plain(pin.joint)} ${HOLDS[pin.hold]}${pin.hold === "place" ? fromTo(pin, seam) : ""}`,
           label: `Let go of the ${plain(pin.joint)}`,
         }))}
         action="Let go"
@@ -126,8 +134,44 @@ export function WishSheet({ does, studio, seam, joints, thumbnail, onClose }) {
         </select>
         <button class="button" data-testid="wish-pin-add" disabled=${locked} onClick=${addPin}>Pin</button>
       </div>
+      ${hold === "place" && html`<${Stay} seam=${seam} stay=${stay} locked=${locked} onStay=${setStay} />`}
     </div>
   </section>`;
+}
+
+/** From when to when a hand or foot stays in its place. */
+function Stay({ seam, stay, locked, onStay }) {
+  const field = (name, words, least, most) => html`<label class="row">
+    ${words}
+    <input
+      class="field numbers"
+      type="number"
+      min=${(least * seam.seconds).toFixed(1)}
+      max=${(most * seam.seconds).toFixed(1)}
+      step="0.1"
+      aria-label=${`${words}, seconds`}
+      data-testid=${`wish-${name}`}
+      disabled=${locked}
+      value=${(stay[name] * seam.seconds).toFixed(1)}
+      onChange=${(event) => onStay({ ...stay, [name]: Math.min(Math.max(Number(event.target.value) / seam.seconds, least), most) })}
+    />
+  </label>`;
+  const gap = Math.min(LEAST / seam.seconds, 0.5);
+  return html`<div class="row" role="group" aria-label="How long it stays">
+    ${field("begins", "from", 0, stay.ends - gap)} ${field("ends", "to", stay.begins + gap, 1)}
+    <span class="hint">of ${seam.seconds.toFixed(1)} s</span>
+  </div>`;
+}
+
+/** All of an insertion, or from the moment in it that is shown. @param {import("./items.js").Seam} seam */
+function stayFrom({ at, seconds }, time) {
+  const share = (time - at) / seconds;
+  return { begins: share > 0 && share < 0.9 ? share : 0, ends: 1 };
+}
+
+/** From when to when something stays, in words. @param {import("./items.js").Pin} pin @param {import("./items.js").Seam} seam */
+function fromTo({ begins, ends }, { seconds }) {
+  return begins === 0 && ends === 1 ? "" : `, ${(begins * seconds).toFixed(1)} to ${(ends * seconds).toFixed(1)} s`;
 }
 
 /** A list of what is wished, each with a button that takes it back. */

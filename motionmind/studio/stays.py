@@ -1,0 +1,107 @@
+"""Hands and feet that stay in their place in the room for a part of an insertion's way.
+
+The limb that they hang from makes up for what the rest of the body does, after the movement has been found: states are
+many degrees wide, and a search that held one would leave the hand some centimetres off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from motionmind._typing import Floats
+from motionmind.body.motion import Motion
+from motionmind.body.reaching import chain_to, reach
+from motionmind.body.skeleton import Skeleton
+from motionmind.display import displayed
+from motionmind.geometry import rotations as rot
+from motionmind.studio.edits import Ask, Pin
+
+_EASES = 0.3  # seconds at least in which a limb comes to its place, and leaves it
+_HASTE = 0.6  # body heights a second by which it is faster then, at most where there is time
+_MISSED = 0.01  # metres by which a place may be missed without a word
+
+
+def stays_of(ask: Ask, skeleton: Skeleton) -> list[Pin]:
+    """Return those of a wish's pins that stay in a place; SkeletonError if the body has no such joint."""
+    found = [pin for pin in ask.pins if pin.hold == "place"]
+    for pin in found:
+        skeleton.index(pin.joint)
+    return found
+
+
+def in_place(motion: Motion, pins: Sequence[Pin]) -> tuple[Motion, list[str]]:
+    """Return a movement in which hands and feet stay in their places, and words on what is missed.
+
+    A place is where the hand or foot is as the pin begins; or as the movement ends, where the pin ends with it and does
+    not begin with it. The first and the last frame are not changed.
+
+    Args:
+        motion: the movement.
+        pins: what stays, each from `begins` to `ends`.
+    """
+    rotations, words = motion.rotations.copy(), []
+    for pin in pins:
+        joint = motion.skeleton.index(pin.joint)
+        places = motion.skeleton.positions(rotations, motion.root)[:, joint]
+        shares = (motion.times - motion.times[0]) / (motion.times[-1] - motion.times[0])
+        first, last = np.searchsorted(shares, [pin.begins, pin.ends])
+        anchor = last if pin.ends == 1.0 and pin.begins > 0.0 else first
+        missed = _hold(motion, rotations, joint, _weights(motion, pin, places - places[anchor]), int(anchor))
+        if missed > _MISSED:
+            words.append(f"{_limb(pin.joint)} is up to {100 * missed:.0f} cm off its place")
+    return replace(motion, rotations=rotations), words
+
+
+def _limb(joint: str) -> str:
+    """Return what hangs from a joint, in words."""
+    return displayed(joint).replace("wrist", "hand").replace("ankle", "foot").replace("_", " ")
+
+
+def _weights(motion: Motion, pin: Pin, away: Floats) -> Floats:
+    """Return how far a joint is in its place in each frame [T], from 0 to 1.
+
+    It eases in and out, unless it is there as the movement begins or ends.
+
+    Args:
+        motion: the movement.
+        pin: from when to when it stays.
+        away: the joint's way from its place in each frame [T, 3], metres.
+    """
+    seconds = motion.times - motion.times[0]
+    long = float(seconds[-1])
+    first, last = pin.begins * long, pin.ends * long
+    # The steepest of an ease is half as steep again as the whole.
+    ways = np.linalg.norm([away[np.searchsorted(seconds, at - 1e-9)] for at in (first, last)], axis=1)
+    eases = np.maximum(1.5 * ways / (_HASTE * motion.skeleton.height), _EASES)
+    ramps = np.ones((2, len(seconds)))
+    if pin.begins > 0.0:
+        first = max(first, min(_EASES, 0.25 * long))
+        ramps[0] = 1.0 - (first - seconds) / min(float(eases[0]), first)
+    if pin.ends < 1.0 or pin.begins == 0.0:
+        room = float(eases[1]) if pin.ends == 1.0 else _EASES  # to get away from there
+        last = min(last, max(long - room, 0.5 * (first + last)))
+        ramps[1] = 1.0 - (seconds - last) / min(float(eases[1]), long - last)
+    ramp = np.clip(ramps.min(axis=0), 0.0, 1.0)
+    ramp[[0, -1]] = 0.0
+    return np.asarray(ramp * ramp * (3.0 - 2.0 * ramp))
+
+
+def _hold(motion: Motion, rotations: Floats, joint: int, weights: Floats, anchor: int) -> float:
+    """Turn a limb in `rotations` so that its joint stays where it is in a frame; return the farthest miss, metres."""
+    skeleton, missed = motion.skeleton, 0.0
+    place = skeleton.positions(rotations[anchor], motion.root[anchor])[joint]
+    facing = skeleton.global_rotations(rotations[anchor])[joint]
+    chain = [*chain_to(skeleton, joint), joint]
+    for frame in np.flatnonzero(weights):
+        held = reach(skeleton, rotations[frame], motion.root[frame], joint, place)
+        above = skeleton.global_rotations(held)[skeleton.parents[joint]]
+        held[joint] = rot.inv_mul(above, facing)
+        if weights[frame] == 1.0:
+            off = skeleton.positions(held, motion.root[frame])[joint] - place
+            missed = max(missed, float(np.linalg.norm(off)))
+        turns = rot.log(rot.mul_inv(held[chain], rotations[frame, chain]))
+        rotations[frame, chain] = rot.normalise(rot.mul(rot.exp(weights[frame] * turns), rotations[frame, chain]))
+    return missed
