@@ -74,6 +74,7 @@ def pointer(function: Callable[..., object], signature: Any, *, keep: bool) -> A
     return compiled
 
 
+@cache
 def decorated_names() -> frozenset[str]:
     """Return the functions of this package that are to be compiled, as "search/astar.search"; none need be loaded."""
     return frozenset(

@@ -13,7 +13,7 @@ from motionmind.cli.listening import address_of, listen
 from motionmind.cli.options import HOME, Section, command, given_option, option
 from motionmind.cli.printing import note
 from motionmind.cli.types import FILE, PORT
-from motionmind.cli.warming import compile_all, is_cold
+from motionmind.cli.warming import compile_in_steps, is_cold
 from motionmind.display import displayed, displayed_path
 from motionmind.errors import MotionMindError
 
@@ -88,7 +88,7 @@ def studio(
                     f"whoever has the URL below and reaches {url.removeprefix('http://')} can work on this project, "
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
-            work, keys = Studio(project, home, first=compile_all if is_cold() else None), Keys()
+            work, keys = Studio(project, home, first=compile_in_steps() if is_cold() else None), Keys()
             with suppress(MotionMindError):  # which is missing, and said to be
                 work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"

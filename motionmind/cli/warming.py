@@ -11,7 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -24,11 +24,15 @@ from motionmind.cli.options import command
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
+    from motionmind.learned.carriage import Carriage
     from motionmind.search.problem import Problem
+    from motionmind.tween.engine import Engine
 
 NOTICE = "compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)"
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _LOOK = 0.2  # seconds between two looks at what is compiled
+_AT_ONCE = 3  # processes at most that share the work
+_BACK = 10  # by which processes that stand back are nicer than others
 
 
 @command("motionmind warm")
@@ -67,17 +71,24 @@ def is_cold() -> bool:
     return _LAST not in compiled_names() and place_of_code() is not None
 
 
-def compile_all(report: Callable[[int, int, str], None]) -> None:
-    """Compile all, as a job of the studio's, which tells how far it has come."""
-    from motionmind.jit import compiled_names, decorated_names
+def compile_in_steps() -> Generator[tuple[int, int, bool]]:
+    """Compile all beside other work, what a search needs first; to close the iterator ends it.
 
-    total, workers = len(decorated_names()), _start([[work] for work in (search, realise, draw)])
-    try:
-        while any(worker.poll() is None for worker in workers):
-            report(min(len(compiled_names()), total), total, "getting ready, once, for half a minute")
-            sleep(_LOOK)
-    finally:
-        _end(workers)
+    Yields the number of functions that are compiled, that of all, and whether those of a search are among them.
+    """
+    from motionmind.jit import compiled_names, decorated_names, note_all_compiled
+
+    total, failed = len(decorated_names()), 0
+    for is_ready, programs in ((False, [[search], [realise, seek]]), (True, [[draw, learn]])):
+        workers = _start(programs, stands_back=True)
+        try:
+            while any(worker.poll() is None for worker in workers):
+                yield min(len(compiled_names()), total), total, is_ready
+        finally:
+            _end(workers)
+        failed += sum(worker.returncode != 0 for worker in workers)
+    if not failed:
+        note_all_compiled()
 
 
 def announce_first_search() -> None:
@@ -94,7 +105,7 @@ def help_first_search() -> None:
     What is still running when the command ends is ended with it.
     """
     if is_cold() and _processors() > 1:
-        helpers = _start([[realise], [draw]])
+        helpers = _start([[realise, seek], [draw]])
         click.get_current_context().call_on_close(lambda: _end(helpers))
 
 
@@ -110,8 +121,8 @@ def _compile() -> None:
     from motionmind.jit import compiled_names, decorated_names, note_all_compiled
 
     total, known = len(decorated_names()), 0
-    works = [draw, search, realise]
-    side_by_side = min(_processors(), len(works))
+    works = [search, realise, draw, learn, seek]
+    side_by_side = min(_processors(), _AT_ONCE)
     programs = [works[first::side_by_side] for first in range(side_by_side)]
     with click.progressbar(length=total, label="compiling", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
         workers = _start(programs)
@@ -127,16 +138,20 @@ def _compile() -> None:
         note_all_compiled()
 
 
-def _start(programs: Sequence[Sequence[Callable[[], None]]]) -> list[subprocess.Popen[bytes]]:
+def _start(
+    programs: Sequence[Sequence[Callable[[], None]]], *, stands_back: bool = False
+) -> list[subprocess.Popen[bytes]]:
     """Start a process for each program, with this package on its path, and without the working directory.
 
     Args:
         programs: functions of this module to call in turn, for each process.
+        stands_back: whether other processes go first where there are too few processors.
     """
     root = str(Path(__file__).parents[2])
     # Compiling makes many objects that stay: with rarer collections it takes a tenth less time and a sixth more memory.
     begin = f"import gc, sys; gc.set_threshold(100_000); sys.path.insert(0, {root!r})"
     begin += "; from motionmind.cli import warming"
+    begin += f"; import os; os.nice({_BACK})" * (stands_back and hasattr(os, "nice"))
     calls = ["; ".join(f"warming.{work.__name__}()" for work in works) for works in programs]
     return [
         subprocess.Popen(
@@ -163,60 +178,86 @@ def _processors() -> int:
 
 
 def search() -> None:
-    """Find a path, and sample one."""
-    from motionmind.search.sample import sample_path
-    from motionmind.search.solve import solve
-
-    problem = _problem()
-    sample_path(problem, solve(problem), 0)
-
-
-def realise() -> None:
-    """Realise moves of the corpus, which no search has to find, by all its moments and by few; learn it anew; search by
-    A* alone."""
-    import numpy as np
-
-    from motionmind.body.motion import Velocity
-    from motionmind.discretize import make_discretization
-    from motionmind.learned.neighbours import build_neighbours
-    from motionmind.realise.detail import likest_moves
-    from motionmind.realise.realise import realise as realise_path
-    from motionmind.search import astar, trws
-    from motionmind.search.heuristic import Heuristic
-    from motionmind.search.pieces import Pieces
-    from motionmind.search.segments import Piece
+    """Find a movement between two postures, and another one that differs."""
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
     clip = engine.corpus.motion(engine.corpus.clips[0])
-    path = engine.space.assign(engine.corpus.to_chains(clip.rotations))
-    none = np.zeros(len(engine.space), dtype=np.bool_)
-    trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
-    for array in trees.arrays.values():
-        array.setflags(write=False)  # as those of a corpus that was loaded
-    for carriage in (engine.carriage, replace(engine.carriage, trees=trees)):
-        realise_path(
-            path,
-            clip.posture(0),
-            clip.posture(len(clip) - 1),
-            engine.corpus,
-            engine.grammar,
-            carriage,
-            np.radians(engine.space.tolerances),
-            none,
-            none,
-            30.0,
-            leaving=Velocity.at_start(clip),
-            fastest=engine.pace.fastest,
-            peaks=engine.pace.peaks_in,
-        )
-    likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
-    Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
+    for _ in engine.alternatives(clip.posture(0), clip.posture(9), 2):
+        pass
+
+
+def realise() -> None:
+    """Realise moves of the corpus, which no search has to find, and see how deep limbs are in each other."""
+    from motionmind.body.capsules import penetration
+    from motionmind.tween.engine import Engine
+
+    engine = Engine.load("ballet")
+    _realise(engine, engine.carriage)
+    penetration(engine.corpus.skeleton, engine.corpus.rotations[:2])
+
+
+def seek() -> None:
+    """Search by A* alone, which a search comes to last."""
+    import numpy as np
+
+    from motionmind.search import astar, trws
+    from motionmind.search.heuristic import Heuristic
+    from motionmind.search.pieces import Pieces
+    from motionmind.search.segments import Piece
+
     problem = _problem()
     trellis = Pieces(problem).trellis(Piece(0, 0, problem.rules.longest), np.inf)
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
     bound = Heuristic.of_messages(trws.no_messages(trellis))
     astar.search(trellis, bound, np.inf, astar.SAME, chosen, 1000, 1, np.zeros(1, dtype=np.bool_))
+
+
+def learn() -> None:
+    """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path."""
+    from motionmind.discretize import make_discretization
+    from motionmind.learned.neighbours import build_neighbours
+    from motionmind.realise.detail import likest_moves
+    from motionmind.search.sample import sample_path
+    from motionmind.search.solve import solve
+    from motionmind.tween.engine import Engine
+
+    engine = Engine.load("ballet")
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    trees = build_neighbours(engine.corpus.skeleton, engine.carriage.orientations, engine.carriage.weights)
+    for array in trees.arrays.values():
+        array.setflags(write=False)  # as those of a corpus that was loaded
+    _realise(engine, replace(engine.carriage, trees=trees))
+    likest_moves(engine.corpus.moves, engine.corpus.rotations, clip.rotations)
+    Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
+    problem = _problem()
+    sample_path(problem, solve(problem), 0)
+
+
+def _realise(engine: Engine, carriage: Carriage) -> None:
+    """Realise a clip's moves by what the corpus knows of how bodies carry themselves."""
+    import numpy as np
+
+    from motionmind.body.motion import Velocity
+    from motionmind.realise.realise import realise as realise_path
+
+    clip = engine.corpus.motion(engine.corpus.clips[0])
+    none = np.zeros(len(engine.space), dtype=np.bool_)
+    realise_path(
+        engine.space.assign(engine.corpus.to_chains(clip.rotations)),
+        clip.posture(0),
+        clip.posture(len(clip) - 1),
+        engine.corpus,
+        engine.grammar,
+        carriage,
+        np.radians(engine.space.tolerances),
+        none,
+        none,
+        30.0,
+        leaving=Velocity.at_start(clip),
+        fastest=engine.pace.fastest,
+        peaks=engine.pace.peaks_in,
+    )
 
 
 def draw() -> None:

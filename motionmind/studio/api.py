@@ -16,11 +16,10 @@ from motionmind.render.page import player_data
 from motionmind.studio.edits import Edit
 from motionmind.studio.project import RefusedError
 from motionmind.studio.studio import Studio
-from motionmind.studio.thumbnails import thumbnail
+from motionmind.studio.thumbnails import HEIGHT, thumbnail
 
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
-_HEIGHT = 96  # pixels of a small picture
 _FOREVER = "private, max-age=31536000, immutable"
 
 
@@ -146,7 +145,7 @@ def _movement_routes(studio: Studio) -> list[BaseRoute]:
 
     async def picture(request: Request) -> Response:
         key, frame = request.path_params["key"], number(request.path_params["frame"], "a frame")
-        height = number(request.query_params.get("height", str(_HEIGHT)), "the height")
+        height = number(request.query_params.get("height", str(HEIGHT)), "the height")
         stable = studio.project.state.stable(key)
         try:
             motion = studio.movements.get(stable)

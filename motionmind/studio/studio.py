@@ -5,26 +5,27 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionmind.errors import MotionMindError
-from motionmind.names.finding import open_collection
-from motionmind.names.spelling import Source
 from motionmind.render.page import player_data
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
 from motionmind.studio.project import Project
-from motionmind.studio.thumbnails import SMALLEST, Thumbnails, thumbnail
+from motionmind.studio.thumbnails import HEIGHT, Thumbnails, thumbnail
 from motionmind.studio.view import view_of
-from motionmind.studio.workers import Job, Report, Workers
+from motionmind.studio.workers import Job, Workers
 
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
+Preparation = Generator[tuple[int, int, bool]]  # see `Workers.prepare`
 _ENGINES = 2  # that the server keeps loaded
+_READY = "getting ready, once, for half a minute"
+_DRAWN = 9  # pictures of the gallery that are drawn beforehand
 _FIRST = 2.0  # seconds in which the page comes first, and workers that start would keep it waiting
 
 
@@ -47,7 +48,7 @@ class Studio:
         project: Project,
         home: Path | None = None,
         processes: int | None = None,
-        first: Callable[[Report], None] | None = None,
+        first: Preparation | None = None,
     ) -> None:
         """Set up a studio.
 
@@ -55,7 +56,7 @@ class Studio:
             project: the project.
             home: the folder of the user's corpora; None for the usual one.
             processes: the number of workers; by default as many as this computer has room for.
-            first: what a worker does first, as a job.
+            first: what makes jobs fast, for which they wait.
         """
         self.project, self.home = project, home
         self.events, self.thumbnails = Events(), Thumbnails()
@@ -71,14 +72,27 @@ class Studio:
 
     def start(self) -> None:
         """Start the workers, in the event loop."""
-        self.workers = Workers(self.home, self._tell_of_job, self.project.state.corpus, self._processes)
-        threading.Thread(target=_warm, args=(self.project.state.corpus, self.home), daemon=True).start()
+        corpus = self.project.state.corpus
+        self.workers = Workers(self.home, self._tell_of_job, corpus, self._processes)
+        threading.Thread(target=self._draw_first, daemon=True).start()
         asyncio.get_running_loop().call_later(_FIRST, self.workers.begin)
         if self._first is not None:
-            self.workers.submit("getting ready", self._first)
+            self._preparing = asyncio.create_task(self.workers.prepare("getting ready", _READY, self._first))
+
+    def _draw_first(self) -> None:
+        """Read what the gallery lists, and draw its first pictures, while the browser is yet to open the page."""
+        with suppress(MotionMindError):
+            collection = self.movements.collection(self.project.state.corpus)
+            names = [*collection.postures, *collection.clips]
+            for name in names[:_DRAWN]:
+                motion = collection.find(name, as_clip=False)
+                player_data(motion)
+                self.thumbnails.hold(f"{collection.word}/{name}", 0, HEIGHT, thumbnail(motion, 0, HEIGHT))
 
     def close(self) -> None:
         """End the workers, and let others open the project."""
+        if self._first is not None:
+            self._first.close()
         self.workers.close()
         self.project.close()
 
@@ -131,13 +145,3 @@ class Studio:
 
     def _tell_of_job(self, job: Job) -> None:
         self.events.send("job", job.view(), job.id)
-
-
-def _warm(corpus: str, home: Path | None) -> None:
-    """Draw a small picture beforehand: what it takes is loaded while the browser is yet to open the page."""
-    with suppress(MotionMindError):
-        collection = open_collection(Source(corpus, "corpus", corpus), home)
-        name = next(iter([*collection.postures, *collection.clips]))
-        motion = collection.find(name, as_clip=False)
-        player_data(motion)
-        thumbnail(motion, 0, SMALLEST)

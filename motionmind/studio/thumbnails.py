@@ -20,6 +20,7 @@ from motionmind.render.solids import posture_solids
 from motionmind.render.view import VIEWS, to_view
 
 SMALLEST, LARGEST = 32, 480  # pixels of a picture's height
+HEIGHT = 96  # of one in the gallery, as movements.js has it
 _WIDE = 0.9  # of its height
 _ROOM = 1.32  # of the body's height that a picture shows, for raised arms
 _HELD = 16 * 2**20  # bytes of pictures that are kept in memory

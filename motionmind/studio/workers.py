@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
@@ -24,6 +24,7 @@ JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 _TRIES = 3  # starts of a worker that ends before it has begun
 _JOBS = 200  # that are over and can still be asked for
 _FEW = 2  # processors with which a second worker does not slow the first
+_LOOK = 0.2  # seconds between two looks at how far a preparation is
 _MEMORY = 2**30  # bytes that are free, of which a second worker takes less than a fifth
 
 
@@ -150,13 +151,14 @@ class Workers:
             warm: a corpus that each worker loads at once.
             number: of processes; by default as many as this computer has room for.
         """
-        self._home, self._tell, self._warm = home, tell, warm
+        self._theirs, self._tell = (home, warm), tell
         self._loop = asyncio.get_running_loop()
         self._numbers = count(1)
         self._waiting: deque[Job] = deque()
         self._jobs: OrderedDict[str, Job] = OrderedDict()
         self._number = number or _room()
         self._has_begun = False  # whether the processes are started
+        self._held_by: Job | None = None  # the job that all others wait for
         self._workers: list[_Worker] = []
         self._failures = 0  # workers that have ended before they began, one after another
 
@@ -169,7 +171,7 @@ class Workers:
         """Start the processes, unless they are started."""
         if not self._has_begun:
             self._has_begun = True
-            self._workers = [_Worker(self, self._home, self._warm) for _ in range(self._number)]
+            self._workers = [_Worker(self, *self._theirs) for _ in range(self._number)]
 
     def submit(
         self,
@@ -190,15 +192,48 @@ class Workers:
             collect: called here with each partial result, in the same way.
             urgent: whether somebody waits for it.
         """
-        job = Job(self, next(self._numbers), kind, (function, arguments), finish, collect, urgent)
-        self._jobs[job.id] = job
-        over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
-        for old in over[: max(0, len(over) - _JOBS)]:
-            del self._jobs[old]
+        job = self._add(Job(self, next(self._numbers), kind, (function, arguments), finish, collect, urgent))
         self._waiting.append(job)
         self._tell(job)
         self.begin()
         self.go_on()
+        return job
+
+    async def prepare(self, kind: str, words: str, steps: Generator[tuple[int, int, bool]]) -> None:
+        """Take steps that spare the workers work, as a job that all others wait for until they may begin.
+
+        Args:
+            kind: what it is for, as the page knows it.
+            words: what is going on.
+            steps: yield how far it has come, of how much, and whether the others may begin; to close them ends it.
+        """
+        job = self._held_by = self._add(Job(self, next(self._numbers), kind, (_nothing, ()), None, None, False))
+        job.state, job.words = "running", words
+        try:
+            while job.state == "running" and (step := next(steps, None)):
+                job.done, job.of, may_begin = step
+                if may_begin:
+                    self._release(job)
+                self._tell(job)
+                await asyncio.sleep(_LOOK)
+        finally:
+            steps.close()
+            job.end("done")
+            self._tell(job)
+            self._release(job)
+
+    def _release(self, job: Job) -> None:
+        """Let the jobs begin that wait for this one."""
+        if self._held_by is job:
+            self._held_by = None
+            self.go_on()
+
+    def _add(self, job: Job) -> Job:
+        """Know a job, and forget those that have been over for long."""
+        self._jobs[job.id] = job
+        over = [one.id for one in self._jobs.values() if one.state not in ("waiting", "running")]
+        for old in over[: max(0, len(over) - _JOBS)]:
+            del self._jobs[old]
         return job
 
     def find(self, job: str) -> Job:
@@ -214,7 +249,7 @@ class Workers:
         for place, worker in enumerate(self._workers):
             if worker.job is job:
                 worker.kill()
-                self._workers[place] = _Worker(self, self._home, self._warm)
+                self._workers[place] = _Worker(self, *self._theirs)
         if job.state in ("waiting", "running"):
             job.end("cancelled", words="cancelled")
             self._tell(job)
@@ -237,7 +272,7 @@ class Workers:
             job.end("failed", words="the engine does not start; the terminal says why")
             self._tell(job)
         for worker in self._workers:
-            if worker.has_begun and worker.job is None and (chosen := self._next()):
+            if self._held_by is None and worker.has_begun and worker.job is None and (chosen := self._next()):
                 self._waiting.remove(chosen)
                 worker.run(chosen)
                 self._tell(chosen)
@@ -259,7 +294,7 @@ class Workers:
             self._failures += not worker.has_begun
             self._workers.remove(worker)
             if self._failures < _TRIES:
-                self._workers.append(_Worker(self, self._home, self._warm))
+                self._workers.append(_Worker(self, *self._theirs))
             if job:
                 job.end("failed", words="this took more than this computer has, and was ended")
         elif message[0] == "begun":
@@ -344,6 +379,10 @@ def _context() -> Any:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["motionmind.studio.preloaded"])
     return context
+
+
+def _nothing(_: Report) -> None:
+    """Do nothing: a preparation has no function that a worker calls."""
 
 
 def _room() -> int:

@@ -52,7 +52,7 @@ def names_called(function: FunctionType) -> set[str]:
 
 
 def test_the_workers_reach_every_function_that_is_to_be_compiled() -> None:
-    for work in (warming.draw, warming.search, warming.realise):
+    for work in (warming.draw, warming.search, warming.realise, warming.seek, warming.learn):
         work()
     reached = {name for one in dispatchers().values() if one.overloads for name in names_called(one.py_func)}
     assert jit.decorated_names() - reached == set()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Generator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -250,3 +252,44 @@ def test_streams_are_limited_and_those_that_end_make_room() -> None:
         hub.open({})
 
     asyncio.run(check())
+
+
+def test_jobs_wait_for_what_makes_them_fast_and_no_longer() -> None:
+    ended: list[bool] = []
+
+    def steps(may_begin: threading.Event, over: threading.Event) -> Generator[tuple[int, int, bool]]:
+        try:
+            for number in count(1):
+                if over.is_set():
+                    return
+                yield number, 1000, may_begin.is_set()
+        finally:
+            ended.append(True)
+
+    async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
+        may_begin, over = threading.Event(), threading.Event()
+        await workers.submit("sum", working.add, 1, 1).result()  # the worker has begun
+        preparing = asyncio.create_task(workers.prepare("getting ready", "once", steps(may_begin, over)))
+        await asyncio.sleep(0)
+        job = workers.submit("sum", working.add, 2, 3, urgent=True)
+        while sum(one["kind"] == "getting ready" for one in told) < 3:
+            await asyncio.sleep(0.01)
+        assert job.state == "waiting"
+        may_begin.set()
+        assert await job.result() == 5
+        assert [one["state"] for one in told if one["kind"] == "getting ready"][-1] == "running"
+        over.set()
+        await preparing
+        last = [one for one in told if one["kind"] == "getting ready"][-1]
+        assert (last["state"], last["words"], last["of"]) == ("done", "once", 1000)
+        # One that is cancelled keeps nobody waiting.
+        over.clear()
+        again = asyncio.create_task(workers.prepare("getting ready", "again", steps(threading.Event(), over)))
+        await asyncio.sleep(0)
+        waiting = workers.submit("sum", working.add, 3, 4)
+        next(one for one in workers.jobs if one.kind == "getting ready").cancel()
+        assert await waiting.result() == 7
+        await again
+        assert ended == [True, True]
+
+    run(check)
