@@ -27,7 +27,7 @@ from motionmind.studio.piece import Finding, Found, Seam
 from motionmind.studio.sides import Sides, options_of, sides_of
 from motionmind.studio.stays import in_place, stays_of
 from motionmind.studio.worker_loop import engine_of
-from motionmind.studio.workers import JobCancelledError
+from motionmind.studio.workers import JobCancelledError, WorkerLostError
 from motionmind.variation.seams import AbruptJoint, TransitionTest
 
 if TYPE_CHECKING:
@@ -145,6 +145,7 @@ class Smoother:
         self._changed.set()
         self._state = studio.project.state
         self._seen: dict[str, int] = {}  # when each question first came up
+        self._lost: set[str] = set()  # questions on which a worker ended
         self._job: Job | None = None
         studio.project.subscribe(self._look)
 
@@ -222,6 +223,11 @@ class Smoother:
             alternatives, failure = await self._result("seam", smooth, corpus, question)
         except JobCancelledError:
             raise
+        except WorkerLostError as error:
+            if question.name not in self._lost:  # which says nothing of the seam: it is tried once more
+                self._lost.add(question.name)
+                return
+            alternatives, failure = [], _line(error)
         except MotionMindError as error:
             alternatives, failure = [], _line(error)
         found = tuple(

@@ -12,18 +12,16 @@ from collections.abc import Callable, Generator
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from motionmind.errors import MotionMindError
 from motionmind.studio.worker_loop import words_of, work
-
-if TYPE_CHECKING:
-    pass
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 _TRIES = 3  # starts of a worker that ends before it has begun
 _JOBS = 200  # that are over and can still be asked for
 _FEW = 2  # processors with which a second worker does not slow the first
+_LOST = "this took more than this computer has, and was ended"
 _LOOK = 0.2  # seconds between two looks at how far a preparation is
 _MEMORY = 2**30  # bytes that are free, of which a second worker takes less than a fifth
 
@@ -44,6 +42,10 @@ class Report(Protocol):
 
 class JobCancelledError(MotionMindError):
     """The job was cancelled before it was done."""
+
+
+class WorkerLostError(MotionMindError):
+    """The worker ended in the middle of the job, as where memory is short; another one may do it."""
 
 
 class Job:
@@ -83,6 +85,7 @@ class Job:
 
         Raises:
             JobCancelledError: it was cancelled.
+            WorkerLostError: its worker ended.
             MotionMindError: the function failed with it.
         """
         return await asyncio.shield(self._result)
@@ -110,21 +113,22 @@ class Job:
         """Take in a part of the result."""
         self.partial.append(self._collect(value) if self._collect else value)
 
-    def end(self, state: JobState, value: Any = None, words: str = "") -> None:
+    def end(
+        self, state: JobState, value: Any = None, words: str = "", error: type[MotionMindError] = MotionMindError
+    ) -> None:
         """Take in how it ended; whatever goes wrong with the result makes it fail."""
         if self._result.done():
             return
         if state == "done":
             try:
                 self.shown = self._finish(value) if self._finish else None
-            except Exception as error:
-                state, words = "failed", words_of(error)
+            except Exception as wrong:
+                state, words = "failed", words_of(wrong)
         self.state, self.words = state, words or self.words
         if state == "done":
             self._result.set_result(value)
         else:
-            kind = JobCancelledError if state == "cancelled" else MotionMindError
-            self._result.set_exception(kind(words))
+            self._result.set_exception((JobCancelledError if state == "cancelled" else error)(words))
 
 
 def _seen(future: asyncio.Future[Any]) -> None:
@@ -296,7 +300,7 @@ class Workers:
             if self._failures < _TRIES:
                 self._workers.append(_Worker(self, *self._theirs))
             if job:
-                job.end("failed", words="this took more than this computer has, and was ended")
+                job.end("failed", words=_LOST, error=WorkerLostError)
         elif message[0] == "begun":
             worker.has_begun, self._failures = True, 0
         elif job is None:
