@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 Preparation = Generator[tuple[int, int, bool]]  # see `Workers.prepare`
 _ENGINES = 2  # that the server keeps loaded
 _READY = "getting ready, once, for half a minute"
-_DRAWN = 9  # pictures of the gallery that are drawn beforehand
 _FIRST = 2.0  # seconds in which the page comes first, and workers that start would keep it waiting
 
 
@@ -80,14 +79,13 @@ class Studio:
             self._preparing = asyncio.create_task(self.workers.prepare("getting ready", _READY, self._first))
 
     def _draw_first(self) -> None:
-        """Read what the gallery lists, and draw its first pictures, while the browser is yet to open the page."""
+        """Read what the gallery lists, and draw its first picture, while the browser is yet to open the page."""
         with suppress(MotionMindError):
             collection = self.movements.collection(self.project.state.corpus)
-            names = [*collection.postures, *collection.clips]
-            for name in names[:_DRAWN]:
-                motion = collection.find(name, as_clip=False)
-                player_data(motion)
-                self.thumbnails.hold(f"{collection.word}/{name}", 0, HEIGHT, thumbnail(motion, 0, HEIGHT))
+            name = next(iter([*collection.postures, *collection.clips]))
+            motion = collection.find(name, as_clip=False)
+            player_data(motion)
+            self.thumbnails.hold(f"{collection.word}/{name}", 0, HEIGHT, thumbnail(motion, 0, HEIGHT))
 
     def close(self) -> None:
         """End the workers, and let others open the project."""

@@ -109,6 +109,7 @@ def test_buttons_set_the_ends_and_dragging_does(studio_page: Any) -> None:
     ends = "JSON.stringify([studio.desk.ends.a?.key, studio.desk.ends.b?.key])"
     assert page.evaluate(ends) == '["ballet/first","ballet/first"]'
     page.get_by_test_id("posture-passe").drag_to(page.locator(".end").nth(1))
+    page.locator(".end").nth(1).get_by_text("passe").wait_for()  # the browser tells of the drop when it comes to it
     assert page.evaluate(ends) == '["ballet/first","ballet/passe"]'
     page.get_by_label("Exchange A and B").click()
     assert page.evaluate(ends) == '["ballet/passe","ballet/first"]'
