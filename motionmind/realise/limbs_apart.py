@@ -27,7 +27,9 @@ from motionmind.realise.least_squares import solve_rows
 from motionmind.realise.legs import find_legs, reach
 from motionmind.realise.limb_turns import LEAST, Limbs, Placed, least_turns, planes_between, turn
 
-ROUNDS = 12  # corrections, each of what those before it have left
+ROUNDS = 18  # corrections, each of what those before it have left
+GENTLE = 6  # of them in which limbs are to turn as far as they have to
+FARTHER = 1.8  # times as far, in those after them: what smoothness takes from the turns keeps some from coming apart
 TOUCHES = 0.005  # metres that any two limbs may be in each other
 SPREADS = 0.12  # seconds in which a correction begins and ends
 FIRMLY = 100.0  # weight of a correction where it is needed, that of none being 1
@@ -95,11 +97,11 @@ def keep_limbs_apart(
             best, least = turned, left
         if not needed.any() or number == ROUNDS:
             break
-        turns = np.zeros_like(steps)
+        turns, farther = np.zeros_like(steps), FARTHER if number >= GENTLE else 1.0
         for limb in np.flatnonzero(needed.any(axis=0)):
             axis = placed.anchors[:, limb] - placed.pivots[:, limb]
             axis /= np.maximum(rot.norm(axis), 1e-9)[:, None]
-            own = steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
+            own = farther * steps[:, limb], needed[:, limb], axis, still[:, limb], placed.held[:, limb]
             turns[:, limb] = _smooth(*own, frozen, SPREADS * fps)
         turn(placed, limbs, turns)
         turned = rot.mul(rot.exp(turns), turned)

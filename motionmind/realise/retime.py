@@ -6,17 +6,20 @@ the clock slows down: all of the body, so that joints stay together, and smoothl
 
 Then feet, knees and the weight take what they need, and some of it is quick. So the clock slows down once more where
 the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), but
-not in the air, where the body falls as it does.
+not in the air, where the body falls as it does. One that dips as fast with its feet on the floor can be slower.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from motionmind._typing import Floats
-from motionmind.body.contact import lowest_height
+from motionmind._typing import Bools, Floats
+from motionmind.body.contact import LOW, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
+from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -29,6 +32,7 @@ FALLS = 0.5  # of gravity: what falls faster is in the air
 ENDS_AT = 0.95  # share of the peaks that is kept to in the end
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
+ROUNDS = 3  # of slowing down at most
 SLIGHT = 1e-3  # by which a clock is not worth slowing
 SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
 
@@ -73,29 +77,41 @@ def keep_pace(
 def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:
     """Return a movement and its clock, slower where a part of the body is faster than the most.
 
+    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that: it is done again.
+
     Args:
         motion: the movement, at the clock's frames.
         clock: its clock.
         most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s [J + 3].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
     """
+    for _ in range(ROUNDS):
+        slower = _slower(motion, most, moving)
+        if slower.max() < 1.0 + SLIGHT:
+            break
+        motion, clock = _slowed(motion, clock, slower)
+    return motion, clock
+
+
+def _slower(motion: Motion, most: Floats, moving: tuple[bool, bool]) -> Floats:
+    """Return how many times longer each step of a movement is to take [N - 1]; arguments are those of `slow_down`."""
     times = motion.times
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
-    falls = fps**2 * np.diff(motion.root[:, 1], 2) < -FALLS * GRAVITY
-    since = np.full(len(middles), np.inf)
-    for fixed, time in ((moving[0], times[0]), (moving[1], times[-1]), *((True, time) for time in times[1:-1][falls])):
-        if fixed:
-            since = np.minimum(since, np.abs(middles - time))
-    free = np.clip((since - 0.5 / fps) / SETTLES, 0.0, 1.0)
+    ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
+    free = _away(middles, [*ends, *times[1:-1][_falls(motion, fps)]], fps)
     slower = np.maximum((fps * steps_of(motion) / most).max(axis=1), 1.0)
     slower[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)
     weights = np.hanning(2 * reach + 3)[1:-1]
-    slower = 1.0 + free * (np.convolve(np.pad(around, reach, mode="edge"), weights / weights.sum(), "valid") - 1.0)
-    if slower.max() < 1.0 + SLIGHT:
-        return motion, clock
-    later, at = stretch(clock, times, slower, fps)
+    around = np.convolve(np.pad(around, reach, mode="edge"), weights / weights.sum(), "valid")
+    return np.asarray(1.0 + free * (around - 1.0))
+
+
+def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Timeline]:
+    """Return a movement whose steps take so many times longer [N - 1], and its clock."""
+    times = motion.times
+    later, at = stretch(clock, times, slower, 1.0 / float(times[1] - times[0]))
     was = np.interp(later.frames, at, times)
     rotations, root = (
         rot.normalise(rotation_spline(times, motion.rotations, was)),
@@ -108,3 +124,18 @@ def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool,
     root[:, 1] += np.maximum(deep, 0.0)
     rotations[[0, -1]], root[[0, -1]] = motion.rotations[[0, -1]], motion.root[[0, -1]]
     return Motion(motion.skeleton, rotations, root, later.frames), later
+
+
+def _away(middles: Floats, times: Sequence[float], fps: float) -> Floats:
+    """Return how far steps are from some times, by their middles [N]: from 0 beside one to 1 from SETTLES on."""
+    since = np.full(len(middles), np.inf)
+    for time in times:
+        since = np.minimum(since, np.abs(middles - time))
+    return np.clip((since - 0.5 / fps) / SETTLES, 0.0, 1.0)
+
+
+def _falls(motion: Motion, fps: float) -> Bools:
+    """Return in which frames between the first and the last a body falls, off the floor [N - 2]."""
+    low = lowest_height(motion.skeleton, motion.rotations, motion.root)
+    up = low[1:-1] > low.min() + LOW * size_of(motion.skeleton)
+    return np.asarray(up & (fps**2 * np.diff(motion.root[:, 1], 2) < -FALLS * GRAVITY))

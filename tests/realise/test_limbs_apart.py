@@ -72,6 +72,23 @@ def test_ends_and_other_joints_stay_to_the_bit(movement: Floats) -> None:
     np.testing.assert_array_equal(out[:, others], movement[:, others])
 
 
+def walking(rotations: Floats) -> Floats:
+    """Places of a root [FRAMES, 3] on which the left foot stays for ten frames, then the right one, and so on."""
+    places = BODY.positions(rotations, np.zeros((FRAMES, 3)))
+    feet = ["right_toes" if (frame // 10) % 2 else "left_toes" for frame in range(1, FRAMES)]
+    moved = [places[k + 1, BODY.index(foot)] - places[k, BODY.index(foot)] for k, foot in enumerate(feet)]
+    return np.concatenate([np.zeros((1, 3)), -np.cumsum(moved, axis=0)])
+
+
+@pytest.mark.parametrize(("frames", "forward"), [(8, 0.3), (12, 0.3), (12, 0.4)])
+def test_legs_that_stand_in_turn_come_apart(frames: int, forward: float) -> None:
+    since = np.clip((np.arange(FRAMES) - 15) / frames + 0.5, 0.0, 1.0)
+    share = 0.5 - 0.5 * np.cos(np.pi * since)
+    movement = rot.slerp(crossed(forward, 0.3)[None], crossed(-forward, 0.3)[None], share[:, None])
+    assert legs_depth(BODY, movement).max() > 0.09
+    assert legs_depth(BODY, apart(movement, walking(movement))).max() < 0.01
+
+
 def test_feet_keep_their_orientations() -> None:
     ankles = [BODY.index("left_ankle"), BODY.index("right_ankle")]
     before, after = (BODY.global_rotations(each)[:, ankles] for each in (THROUGH, apart(THROUGH)))

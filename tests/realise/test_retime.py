@@ -77,6 +77,22 @@ def test_what_falls_falls_as_it_did() -> None:
     assert slower.root[:, 1].max() == pytest.approx(heights.max(), abs=1e-3)
 
 
+def test_a_body_that_bobs_on_the_floor_is_slowed_as_others_are() -> None:
+    heights = 1.0 + 0.015 * np.sin(0.9 * np.arange(91))
+    motion, clock = bent(quick(4.0), heights)
+    assert np.diff(heights, 2).min() * FPS**2 < -9.81
+    slower, _ = slow_down(motion, clock, most(2.0), STILL)
+    assert speeds(slower).max() < 2.0 * 1.03
+
+
+def test_what_shows_more_between_frames_is_slowed_again() -> None:
+    angles = np.where(np.arange(91) % 30 == 15, 0.12, 0.0)  # for one frame in thirty
+    motion, clock = bent(angles)
+    slower, _ = slow_down(motion, clock, most(2.0), STILL)
+    assert speeds(motion).max() > 3.5
+    assert speeds(slower).max() < 2.0 * 1.06
+
+
 @pytest.mark.parametrize("end", [0, 1])
 def test_an_end_that_is_passed_at_a_velocity_keeps_it(end: int) -> None:
     angles = np.concatenate([[0.0], np.cumsum(np.linspace(6.0, 0.5, 90)) / FPS])
