@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -14,7 +15,6 @@ from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.body.plausibility import GRAVITY
-from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -25,11 +25,10 @@ from motionmind.realise.detail import detail_of, likest_moves, moves_near, share
 from motionmind.realise.expectation import Expectation, expect
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
-from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
-from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import ENDS_AT, HEADROOM, LONGER, keep_pace, slow_down
+from motionmind.realise.retime import ENDS_AT, HEADROOM, JUMPS_AT, LONGER, keep_pace, slow_down
+from motionmind.realise.settling import keeper, settled
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
 
@@ -140,7 +139,7 @@ def realise(
     rotations = rot.mul(smooth, rot.exp(detail))
     rotations = _with_rates(rotations, clock, [*stops], leaving, arriving)
     # Once so that feet find places to stand at, and once for where they have been put.
-    keep_apart = _keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
+    keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
@@ -153,8 +152,8 @@ def realise(
     leaps = size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9)
     most = None
     if peaks is not None:
-        most = ENDS_AT * pace * peaks(pace * LONGER * float(clock.frames[-1]))
-        flies[np.sqrt(2.0 * GRAVITY * leaps) > most[-1] * a.skeleton.height] = 0.0
+        most = pace * peaks(pace * LONGER * float(clock.frames[-1]))
+        flies[np.sqrt(2.0 * GRAVITY * leaps) > JUMPS_AT * most[-1] * a.skeleton.height] = 0.0
     flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,
@@ -181,23 +180,23 @@ def realise(
         np.inf if fastest is None else float(HEADROOM * pace * fastest[-1] * a.skeleton.height),
         without,
     )
-    rotations = keep_apart(rotations, root)
-    if "balance" not in without:
-        held = _given_frames(clock, [*stops], (leaving is not None, arriving is not None))
-        rotations, root = shift_weight(
-            a.skeleton,
-            rotations,
-            root,
-            stance.overhang,
-            held,
-            carriage.loose,
-            fixed[: len(a.skeleton)],
-            fps,
-            None if fastest is None else pace * fastest[: len(a.skeleton)],
-        )
-    motion = Motion(a.skeleton, rotations, root, clock.frames)
+    moving = leaving is not None, arriving is not None
+    settle = partial(
+        settled,
+        stops=[*stops],
+        moving=moving,
+        fixed=fixed,
+        wished=wished,
+        carriage=carriage,
+        overhang=stance.overhang,
+        fastest=None if fastest is None else pace * fastest[: len(a.skeleton)],
+        without=without,
+    )
+    motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock, fps)
     if most is not None:
-        motion, clock = slow_down(motion, clock, most, (leaving is not None, arriving is not None))
+        slowed, later = slow_down(motion, clock, ENDS_AT * most, moving)
+        if later is not clock:  # limbs may meet between frames, and who is slower has to be in balance
+            motion, clock = settle(slowed, later, fps), later
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 
@@ -324,40 +323,6 @@ def _with_rates(
         return rotations
     until = clock.moves[stops[1]], clock.moves[stops[-2]]
     return rot.mul(rotations, rot.exp(departure(times, first, last, until)))
-
-
-def _keeper(
-    clock: Timeline,
-    stops: Sequence[int],
-    fixed: Bools,
-    wished: Bools,
-    carriage: Carriage,
-    skeleton: Skeleton,
-    without: Collection[Correction],
-) -> Callable[[Floats, Floats | None], Floats]:
-    """Return what keeps limbs apart in rotations [N, J, 4] of a body whose root is at some places [N, 3], if known.
-
-    As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
-    """
-    if "limbs" in without:
-        return lambda rotations, root: rotations
-    legs = [joint for leg, _ in find_legs(skeleton)[1] for joint in leg]
-    stays = wished[: len(skeleton)].copy()
-    stays[legs] = fixed[legs]
-    given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
-    return lambda rotations, root: keep_limbs_apart(
-        skeleton, rotations, root, clock.frames, given, stays, carriage.touches
-    )
-
-
-def _given_frames(clock: Timeline, stops: Sequence[int], moving: tuple[bool, bool]) -> Bools:
-    """Return the frames that must not change [N]: those of given postures or beside them, and of given velocities."""
-    at = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
-    out = np.zeros(len(clock.frames), dtype=np.bool_)
-    out[np.floor(at + 1e-6).astype(np.int64)] = True
-    out[np.ceil(at - 1e-6).astype(np.int64)] = True
-    out[[1, -2]] |= moving
-    return out
 
 
 def _limit(rotations: Floats, postures: Mapping[int, Posture], loose: Bools) -> Floats:

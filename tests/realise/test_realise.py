@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats, Int32s
+from motionmind.body.capsules import legs_depth
 from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.limbs import parts_of
@@ -28,7 +29,7 @@ from motionmind.realise.mean_walk import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.root import root_trajectory, stand
-from motionmind.realise.timeline import durations
+from motionmind.realise.timeline import Timeline, durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -461,6 +462,24 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
         found = realised(known, rows, *ends, 30.0, 1e-6, peaks=lambda seconds, peaks=peaks: peaks)
         heights = lowest_height(human23(), found.rotations, found.root)
         assert (heights.max() > 0.12) == jumps
+
+
+def test_limbs_that_meet_as_the_clock_slows_come_apart(walking: Learned, monkeypatch: pytest.MonkeyPatch) -> None:
+    def slowed(motion: Motion, clock: Timeline, *_: object) -> tuple[Motion, Timeline]:
+        inward = np.zeros((len(motion), 3))
+        inward[:, 2] = 0.35 * np.hanning(len(motion))
+        rotations = motion.rotations.copy()
+        for side, sign in (("left", -1.0), ("right", 1.0)):
+            hip = human23().index(f"{side}_hip")
+            rotations[:, hip] = rot.mul(rotations[:, hip], rot.exp(sign * inward))
+        assert legs_depth(human23(), rotations).max() > 0.035
+        return replace(motion, rotations=rotations), clock._replace()
+
+    monkeypatch.setattr("motionmind.realise.realise.slow_down", slowed)
+    known = replace(walking, carriage=replace(walking.carriage, touches=np.zeros_like(walking.carriage.touches)))
+    rows, ends = list(range(5, 12)), (walk().posture(5), walk().posture(11))
+    found = realised(known, rows, *ends, 30.0, peaks=lambda seconds: np.full(26, 50.0))
+    assert legs_depth(human23(), found.rotations).max() < 0.015
 
 
 def test_no_frame_jumps(walking: Learned) -> None:

@@ -1,0 +1,91 @@
+"""Settling: limbs that passed through each other are kept apart, and the weight is shifted over what bears it.
+
+It is done to a movement whose feet have their places, and again where its clock has slowed: its frames fall elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from motionmind._typing import Bools, Floats
+from motionmind.body.motion import Motion
+from motionmind.body.skeleton import Skeleton
+from motionmind.learned.carriage import Carriage
+from motionmind.realise.corrections import Correction
+from motionmind.realise.leaning import shift_weight
+from motionmind.realise.legs import find_legs
+from motionmind.realise.limbs_apart import keep_limbs_apart
+from motionmind.realise.timeline import Timeline
+
+
+def keeper(
+    clock: Timeline,
+    stops: Sequence[int],
+    fixed: Bools,
+    wished: Bools,
+    carriage: Carriage,
+    skeleton: Skeleton,
+    without: Collection[Correction],
+) -> Callable[[Floats, Floats | None], Floats]:
+    """Return what keeps limbs apart in rotations [N, J, 4] of a body whose root is at some places [N, 3], if known.
+
+    As for planted feet, legs may leave their states if something is asked of them; other limbs may not.
+    """
+    if "limbs" in without:
+        return lambda rotations, root: rotations
+    legs = [joint for leg, _ in find_legs(skeleton)[1] for joint in leg]
+    stays = wished[: len(skeleton)].copy()
+    stays[legs] = fixed[legs]
+    given = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
+    return lambda rotations, root: keep_limbs_apart(
+        skeleton, rotations, root, clock.frames, given, stays, carriage.touches
+    )
+
+
+def settled(
+    motion: Motion,
+    clock: Timeline,
+    fps: float,
+    stops: Sequence[int],
+    moving: tuple[bool, bool],
+    fixed: Bools,
+    wished: Bools,
+    carriage: Carriage,
+    overhang: float,
+    fastest: Floats | None,
+    without: Collection[Correction],
+) -> Motion:
+    """Return a movement whose feet have their places, with its limbs apart and its weight over what bears it.
+
+    Args:
+        motion: the movement, at the clock's frames.
+        clock: its clock.
+        fps: frames a second, about.
+        stops: moves at which it passes given postures, the first and the last among them.
+        moving: whether it passes the first and the last with a given velocity.
+        fixed: chains that do not move for the feet's sake [L].
+        wished: chains of which something is asked [L].
+        carriage: how the corpus's bodies hold themselves.
+        overhang: how far beyond its support the centre of mass may be, metres.
+        fastest: speeds of the joints [J], rad/s; None for any speed.
+        without: corrections to leave out.
+    """
+    skeleton, root = motion.skeleton, motion.root
+    rotations = keeper(clock, stops, fixed, wished, carriage, skeleton, without)(motion.rotations, root)
+    if "balance" not in without:
+        given, joints = _given_frames(clock, stops, moving), fixed[: len(skeleton)]
+        rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
+    return replace(motion, rotations=rotations, root=root)
+
+
+def _given_frames(clock: Timeline, stops: Sequence[int], moving: tuple[bool, bool]) -> Bools:
+    """Return the frames that must not change [N]: those of given postures or beside them, and of given velocities."""
+    at = (len(clock.frames) - 1) * clock.moves[[*stops]] / clock.moves[-1]
+    out = np.zeros(len(clock.frames), dtype=np.bool_)
+    out[np.floor(at + 1e-6).astype(np.int64)] = True
+    out[np.ceil(at - 1e-6).astype(np.int64)] = True
+    out[[1, -2]] |= moving
+    return out
