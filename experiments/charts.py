@@ -93,10 +93,10 @@ def _axes(panel: Panel, x_ticks: Sequence[tuple[float, float]], y_ticks: Sequenc
     out = [f'<text x="{LEFT}" y="18" font-weight="bold">{escape(panel.title)}</text>']
     for tick, y in y_ticks:
         out.append(f'<path d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}" stroke="#e4e4e4"/>')
-        out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{tick:.4g}</text>')
+        out.append(f'<text x="{LEFT - 5}" y="{y + 4:.1f}" text-anchor="end">{_number(tick)}</text>')
     for tick, x in x_ticks:
         shown = 10.0**tick if panel.log else tick
-        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{shown:.4g}</text>')
+        out.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 15}" text-anchor="middle">{_number(shown)}</text>')
     middle = (LEFT + WIDTH - RIGHT) / 2
     out.append(f'<text x="{middle}" y="{HEIGHT - 10}" text-anchor="middle" fill="#666">{escape(panel.x)}</text>')
     out.append(
@@ -104,6 +104,11 @@ def _axes(panel: Panel, x_ticks: Sequence[tuple[float, float]], y_ticks: Sequenc
         f"{escape(panel.y)}</text>"
     )
     return out
+
+
+def _number(value: float) -> str:
+    """Write a number in four digits, or all digits of a larger one."""
+    return f"{value:,.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
 
 
 def _ticks(low: float, high: float) -> list[float]:

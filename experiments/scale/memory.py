@@ -29,6 +29,7 @@ class Memory:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self.most = max(self.most, own_memory())
         self._ended.set()
         self._thread.join()
 

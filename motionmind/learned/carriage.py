@@ -162,7 +162,8 @@ def _standing(corpus: Corpus, workshop: Workshop) -> Floats:
     """
     begins, ends = corpus.moves.begins, corpus.moves.ends
     limb = limb_of_points(corpus.skeleton)
-    out = np.ones((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
+    out = workshop.empty((len(corpus) + len(begins), len(limbs_of(corpus.skeleton)) + 1))
+    out[:] = 1.0
     counts = np.maximum(np.bincount(np.concatenate([begins, ends]), minlength=len(corpus)), 1)
 
     def move(here: slice) -> None:

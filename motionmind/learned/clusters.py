@@ -45,22 +45,22 @@ def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | N
         workshop: threads, for which each part is a job, and room for large arrays; None for this thread and memory.
     """
     workshop, parts = workshop or Workshop(), parts_of(skeleton)
-    out = np.empty((len(orientations), len(parts)), dtype=np.int32)
+    out = workshop.empty((len(orientations), len(parts)), np.int32)
 
     def of_part(part: int) -> None:
         joints = parts[part]
         own = workshop.empty((len(orientations), len(joints), 4))
         for start in range(0, len(orientations), BLOCK):
             own[start : start + BLOCK] = orientations[start : start + BLOCK, joints]
-        out[:, part] = clusters(own, len(joints) * ALIKE**2)
+        out[:, part] = clusters(own, len(joints) * ALIKE**2, workshop)
 
     workshop.do(of_part, range(len(parts)))
     return out
 
 
-def clusters(orientations: Floats, within: float) -> Ints:
+def clusters(orientations: Floats, within: float, workshop: Workshop | None = None) -> Ints:
     """Return the clusters [N] of one part's orientations [N, m, 4]; founders are more than `within` apart, squared."""
-    seen = _seen(orientations)
+    seen = _seen(orientations, workshop or Workshop())
     forest, founders = _Forest(seen), np.zeros(0, dtype=np.int64)
     for start in range(0, len(orientations), BLOCK):
         here = np.arange(start, min(start + BLOCK, len(orientations)))
@@ -102,14 +102,17 @@ def _tree(points: Floats) -> cKDTree:
     return cKDTree(points)
 
 
-def _seen(orientations: Floats) -> Floats:
+def _seen(orientations: Floats, workshop: Workshop) -> Floats:
     """Return the postures along a few directions [N, d], those in which some of them differ most; distances are at most
     the root of `squared_distance`."""
     shown = _points(orientations[:: max(len(orientations) // SHOWN, 1)])
     middle = shown.mean(axis=0)
     directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :DIRECTIONS]
-    blocks = range(0, len(orientations), BLOCK)
-    return np.concatenate([(_points(orientations[k : k + BLOCK]) - middle) @ directions for k in blocks])
+    seen = workshop.empty((len(orientations), directions.shape[1]))
+    for start in range(0, len(orientations), BLOCK):
+        here = slice(start, start + BLOCK)
+        seen[here] = (_points(orientations[here]) - middle) @ directions
+    return seen
 
 
 def _points(orientations: Floats) -> Floats:

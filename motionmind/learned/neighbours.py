@@ -83,10 +83,9 @@ def build_neighbours(
     """
     workshop = workshop or Workshop()
     parts, bounds = parts_of(skeleton), node_bounds(len(orientations))
-    order = np.empty((len(parts), len(orientations)), dtype=np.int32)
-    ranks = np.empty_like(order)
+    order, ranks = (workshop.empty((len(parts), len(orientations)), np.int32) for _ in range(2))
     radii, sums = np.empty((2, len(parts), len(bounds)))
-    centres = np.empty((len(bounds), sum(map(len, parts)), 4), dtype=np.float32)
+    centres = workshop.empty((len(bounds), sum(map(len, parts)), 4), np.float32)
     trees = Neighbours(parts, order, ranks, bounds, centres, radii, sums)
 
     def grow(number: int) -> None:

@@ -28,7 +28,7 @@ class Percentile:
         """Add rows [n, columns]."""
         self._rows.append(self._sign * rows)
         self._held += len(rows)
-        if self._held > 4 * self._keep:
+        if self._held > 2 * self._keep:
             self._thin()
 
     def value(self) -> Floats:

@@ -81,7 +81,7 @@ def test_a_percentile_holds_a_tail_alone() -> None:
     found = Percentile(99.0, 100_000)
     for block in np.random.default_rng(0).normal(size=(100, 1000, 1)):
         found.add(block)
-        assert sum(map(len, found._rows)) <= 5002
+        assert sum(map(len, found._rows)) <= 3002
 
 
 def test_an_array_is_checked_in_the_memory_of_a_part(tmp_path: Path) -> None:
