@@ -79,7 +79,8 @@ def add(
     learned, place = _own(name, home)
     own = [clip for clip in learned.corpus.clips if not clip.corpus]
     rate: Rate = "auto" if learned.corpus.rate is None else learned.corpus.rate
-    takes = Taking(rate, learned.corpus.skip, options["flips"], mirror=any(clip.mirrored for clip in own))
+    mirror = any(clip.mirrored for clip in own)
+    takes = Taking(rate, learned.corpus.skip, options["flips"], learned.corpus.flip_degrees, mirror)
     source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
     with open_team(1, None) as team, shards_of(name, home) as folder:
         taken = take_files(clip_names(files), source, folder, team, strict=True)

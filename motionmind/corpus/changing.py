@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Clip, Corpus
-from motionmind.corpus.flips import FLIP_DEGREES
 from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Flips, Recording
 from motionmind.errors import CorpusError, suggestion
@@ -25,18 +24,17 @@ def add_recordings(
     motions: Iterable[Motion | Recording],
     *,
     flips: Flips = "repair",
-    flip_degrees: float = FLIP_DEGREES,
     performer: str = "",
 ) -> Corpus:
     """Return a corpus with the clips of more recordings, in the order in which `gather` would have put them.
 
-    They are taken as the corpus's own were: at its rate, mirrored if these are, backwards at the same price. The body
-    stays, with its proportions.
+    They are taken as the corpus's own were: at its rate, mirrored if these are, backwards at the same price, with the
+    same angle for a flip. The body stays, with its proportions.
 
     Args:
         corpus: the corpus.
         motions: the recordings, as `motionmind.corpus.gather.gather` takes them, on the same joints.
-        flips, flip_degrees, performer: as of `gather`.
+        flips, performer: as of `gather`.
 
     Raises:
         CorpusError: a clip's name is taken, there is nothing to take, or the recordings are on other joints or cannot
@@ -52,7 +50,7 @@ def add_recordings(
         skip=corpus.skip,
         facing=corpus.facing,
         flips=flips,
-        flip_degrees=flip_degrees,
+        flip_degrees=corpus.flip_degrees,
         mirror=any(clip.mirrored for clip in own),
         reverse=like.reverse,
         performer=performer,

@@ -24,6 +24,7 @@ Facing = Literal["free", "stage"]
 Repair = Literal["put back", "reconstructed", "none"]
 
 FACING = "facing"  # the joint chain of the body's turn about the vertical
+FLIP_DEGREES = 45.0  # that a joint turns in one frame where its recording is at fault, unless another angle is given
 MAX_PRICE = 100.0  # nats per move backwards; no search will use a count of exp(-100)
 
 
@@ -156,6 +157,7 @@ class Corpus:
         skip: frames that were dropped at each recording's start, such as an added T-pose.
         origins: the corpora that its other clips were taken from.
         citation: how to cite it; "" if nobody asks for that.
+        flip_degrees: the turn in one frame that counted as a flip in its own recordings.
     """
 
     name: str
@@ -175,6 +177,7 @@ class Corpus:
     skip: int = 0
     origins: tuple[Origin, ...] = ()
     citation: str = ""
+    flip_degrees: float = FLIP_DEGREES
 
     def __post_init__(self) -> None:
         if len(self.rotations) == 0:

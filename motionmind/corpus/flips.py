@@ -21,10 +21,9 @@ import numpy as np
 from motionmind._typing import Bools, Floats
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import JointFlip, JointRepair, Repair
+from motionmind.corpus.corpus import FLIP_DEGREES, JointFlip, JointRepair, Repair
 from motionmind.geometry import rotations as rot
 
-FLIP_DEGREES = 45.0
 FLIP_SPEED = 3000.0  # degrees a second
 # Chosen on a dancer whose legs and hands flip in half of the clips (CMU's subject 05): flips of one fault are at most
 # 0.18 s apart, different faults at least 0.4 s.

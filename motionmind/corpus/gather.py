@@ -23,8 +23,7 @@ from motionmind.arguments import (
     check_type,
 )
 from motionmind.body.motion import Motion
-from motionmind.corpus.corpus import MAX_PRICE, Clip, Corpus, Facing
-from motionmind.corpus.flips import FLIP_DEGREES
+from motionmind.corpus.corpus import FLIP_DEGREES, MAX_PRICE, Clip, Corpus, Facing
 from motionmind.corpus.origins import gather_origins, warn_of_licences
 from motionmind.corpus.recordings import (
     Flips,
@@ -199,6 +198,7 @@ def gather(
         skip,
         gather_origins(other for other, _ in mix),
         citation,
+        flip_degrees,
     )
     if mix:
         warn_of_licences(corpus)

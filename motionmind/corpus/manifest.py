@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from motionmind.corpus.corpus import Clip, Facing, JointFlip
+from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Facing, JointFlip
 from motionmind.credits.credit import Origin
 from motionmind.errors import FormatError
 
@@ -78,6 +78,7 @@ class BuiltManifest(Provenance, frozen=True, kw_only=True):
     faults: tuple[JointFlip, ...]
     space: SpaceEntry
     origins: tuple[Origin, ...] = ()
+    flip_degrees: float = FLIP_DEGREES
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:

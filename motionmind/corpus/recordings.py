@@ -15,8 +15,8 @@ from motionmind.body.mirror import find_sides, mirrored
 from motionmind.body.motion import Motion
 from motionmind.body.rates import FILM_RATE
 from motionmind.body.skeleton import Skeleton
-from motionmind.corpus.corpus import Clip, Corpus, JointFlip, JointRepair, subdivide_times
-from motionmind.corpus.flips import FLIP_DEGREES, find_flips, repair_flips
+from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus, JointFlip, JointRepair, subdivide_times
+from motionmind.corpus.flips import find_flips, repair_flips
 from motionmind.errors import CorpusError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import rotation_spline

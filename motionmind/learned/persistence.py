@@ -20,7 +20,7 @@ from motionmind._typing import States
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus
 from motionmind.corpus.gather import gather
 from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Discretization, StateSpace, from_spec
@@ -123,6 +123,8 @@ def _manifest(learned: Learned) -> dict[str, Any]:
             "labels": space.labels,
         },
     }
+    if corpus.flip_degrees != FLIP_DEGREES:
+        manifest["flip_degrees"] = corpus.flip_degrees
     if corpus.origins:
         manifest["origins"] = [asdict(origin) for origin in corpus.origins]
     return manifest
@@ -223,6 +225,7 @@ def _read_arrays(
             detail=arrays["detail"],
             faults=manifest.faults,
             origins=manifest.origins,
+            flip_degrees=manifest.flip_degrees,
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
         )
         space = StateSpace(

@@ -86,6 +86,18 @@ def test_what_cannot_be_added_or_removed_is_refused(dances: list[Motion]) -> Non
         add_recordings(gather("keys", [ballet_clip("jump")]), dances[:1])
 
 
+def test_what_is_added_is_repaired_as_the_rest_was(run: Run, dances: list[Motion], tmp_path: Path) -> None:
+    for dance in dances[:2]:
+        write_motion(tmp_path / f"{dance.name}.bvh", dance)
+    home, files = ("--home", str(tmp_path / "home")), [str(tmp_path / f"{dance.name}.bvh") for dance in dances[:2]]
+    assert run("corpus", "build", "mine", files[0], "--flip-angle", 170, *home).code == 0
+    assert run("corpus", "add", "mine", files[1], *home).code == 0
+    corpus = Engine.load("mine", tmp_path / "home").corpus
+    assert (corpus.flip_degrees, corpus.faults) == (170.0, ())
+    assert gather("dances", dances[1:2]).faults  # at the usual angle there are some
+    assert add_recordings(gather("dances", dances[:1], flip_degrees=170.0), dances[1:2]).faults == ()
+
+
 def test_a_corpus_is_added_to_and_taken_from_in_place(run: Run, dances: list[Motion], tmp_path: Path) -> None:
     for dance in dances:
         write_motion(tmp_path / f"{dance.name}.bvh", dance)
