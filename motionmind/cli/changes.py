@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from motionmind.corpus.recordings import Rate, Recording
     from motionmind.corpus.shards import Reading, Taken
     from motionmind.executors.team import Team
+    from motionmind.executors.workshop import Workshop
     from motionmind.learned.learning import Learned
 
 DETAILS = option(
@@ -74,6 +75,7 @@ def add(
     from motionmind.corpus.recordings import Taking
     from motionmind.corpus.shards import Reading, shards_of
     from motionmind.executors.opening import open_team
+    from motionmind.executors.workshop import Workshop
     from motionmind.learned import persistence
 
     learned, place = _own(name, home)
@@ -84,7 +86,9 @@ def add(
     source = Reading(takes, read_mapping(joints), unit, str(asf) if asf else None, source_fps)
     with open_team(1, None) as team, shards_of(name, home) as folder:
         taken = take_files(clip_names(files), source, folder, team, strict=True)
-        changed = _learn_again(learned, add_recordings(learned.corpus, taken, **options))
+        workshop = Workshop(folder=folder)
+        more = add_recordings(learned.corpus, taken, workshop=workshop, **options)
+        changed = _learn_again(learned, more, workshop)
         persistence.save(changed, place)
     _tell(changed, f"added {count(len(files), 'file')} to {displayed_path(place)}", details=details)
 
@@ -100,11 +104,15 @@ def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) 
     The name of a recording removes all of its parts. The states of what is left stay.
     """
     from motionmind.corpus.changing import remove_clips
+    from motionmind.corpus.shards import shards_of
+    from motionmind.executors.workshop import Workshop
     from motionmind.learned import persistence
 
     learned, place = _own(name, home)
-    changed = _learn_again(learned, remove_clips(learned.corpus, clips))
-    persistence.save(changed, place)
+    with shards_of(name, home) as folder:
+        workshop = Workshop(folder=folder)
+        changed = _learn_again(learned, remove_clips(learned.corpus, clips, workshop), workshop)
+        persistence.save(changed, place)
     gone = len(learned.corpus.clips) - len(changed.corpus.clips)
     _tell(changed, f"removed {count(gone, 'clip')} from {displayed_path(place)}", details=details)
 
@@ -157,7 +165,7 @@ def _own(name: str, home: Path | None) -> tuple[Learned, Path]:
     return persistence.load(name, home), place
 
 
-def _learn_again(learned: Learned, corpus: Corpus) -> Learned:
+def _learn_again(learned: Learned, corpus: Corpus, workshop: Workshop) -> Learned:
     """Learn from changed movement in the same states, and note how much of it is outside of them."""
     from motionmind.learned.learning import learn_in, outside
 
@@ -168,7 +176,7 @@ def _learn_again(learned: Learned, corpus: Corpus) -> Learned:
             f"{100.0 * share:.1f}% of all joints' orientations are in no state ({joint} by {degrees:.0f} degrees): "
             "to learn states anew, build the corpus from all files"
         )
-    return learn_in(corpus, learned.space)
+    return learn_in(corpus, learned.space, workshop)
 
 
 def _tell(learned: Learned, done: str, *, details: bool) -> None:

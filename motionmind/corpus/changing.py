@@ -15,6 +15,7 @@ from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Flips, Recording
 from motionmind.errors import CorpusError, suggestion
+from motionmind.executors.workshop import Workshop
 
 _Taken = tuple[Corpus, Clip]
 
@@ -25,6 +26,7 @@ def add_recordings(
     *,
     flips: Flips = "repair",
     performer: str = "",
+    workshop: Workshop | None = None,
 ) -> Corpus:
     """Return a corpus with the clips of more recordings, in the order in which `gather` would have put them.
 
@@ -34,7 +36,7 @@ def add_recordings(
     Args:
         corpus: the corpus.
         motions: the recordings, as `motionmind.corpus.gather.gather` takes them, on the same joints.
-        flips, performer: as of `gather`.
+        flips, performer, workshop: as of `gather`.
 
     Raises:
         CorpusError: a clip's name is taken, there is nothing to take, or the recordings are on other joints or cannot
@@ -54,6 +56,7 @@ def add_recordings(
         mirror=any(clip.mirrored for clip in own),
         reverse=like.reverse,
         performer=performer,
+        workshop=workshop,
     )
     if (difference := corpus.skeleton.difference(more.skeleton)) is not None:
         raise CorpusError(f"{more.clips[0].name} is on another skeleton than corpus {corpus.name!r}: {difference}")
@@ -76,15 +79,16 @@ def add_recordings(
     images: list[_Taken] = [(more, clip) for clip in new if clip.mirrored]
     last_image = max(last, last_image)
     parts = [*kept[:last], *plain, *kept[last:last_image], *images, *kept[last_image:]]
-    return replace(_of_clips(corpus, parts), faults=(*corpus.faults, *more.faults))
+    return replace(_of_clips(corpus, parts, workshop), faults=(*corpus.faults, *more.faults))
 
 
-def remove_clips(corpus: Corpus, names: Sequence[str]) -> Corpus:
+def remove_clips(corpus: Corpus, names: Sequence[str], workshop: Workshop | None = None) -> Corpus:
     """Return a corpus without some of its own clips, and their mirror images.
 
     Args:
         corpus: the corpus.
         names: of clips, or of recordings: then all their parts go ("dance" takes "dance.1" and "dance.2" along).
+        workshop: as of `gather`.
 
     Raises:
         CorpusError: there is no such clip of its own, or nothing would be left to learn from.
@@ -100,10 +104,10 @@ def remove_clips(corpus: Corpus, names: Sequence[str]) -> Corpus:
     kept = {clip.name for _, clip in parts if not clip.corpus}
     recordings = {whole[name] for name in kept} | kept
     faults = tuple(fault for fault in corpus.faults if fault.clip in recordings)
-    return replace(_of_clips(corpus, parts), faults=faults)
+    return replace(_of_clips(corpus, parts, workshop), faults=faults)
 
 
-def _of_clips(corpus: Corpus, parts: Sequence[_Taken]) -> Corpus:
+def _of_clips(corpus: Corpus, parts: Sequence[_Taken], workshop: Workshop | None) -> Corpus:
     """Return a corpus of clips of this one and of others on the same joints, the heaviest clip having weight 1."""
     stops = np.cumsum([len(clip) for _, clip in parts])
     heaviest = max(clip.weight for _, clip in parts)
@@ -113,7 +117,10 @@ def _of_clips(corpus: Corpus, parts: Sequence[_Taken]) -> Corpus:
     )
 
     def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(one, name)[clip.start : clip.stop] for one, clip in parts])
+        pile = (workshop or Workshop()).pile()
+        for one, clip in parts:
+            pile.add(getattr(one, name)[clip.start : clip.stop])
+        return pile.array()
 
     return replace(
         corpus,

@@ -121,4 +121,4 @@ def _nameless(folder: Path) -> IO[bytes]:
 
 def _map(file: IO[bytes], shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return the array that a file holds; a plain view, for the subclass slows every slice."""
-    return np.asarray(np.memmap(file, dtype, "r+", shape=shape))
+    return np.asarray(np.memmap(file, dtype, "r+", shape=shape)) if math.prod(shape) else np.empty(shape, dtype)

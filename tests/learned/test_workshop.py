@@ -55,6 +55,17 @@ def test_what_is_learned_depends_neither_on_workers_nor_on_room(
     assert [*tmp_path.iterdir()] == []  # the files have no names
 
 
+def test_a_pile_is_its_rows_on_each_other(tmp_path: Path) -> None:
+    rows = [np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), np.ones((1, 3))[:, ::-1]]
+    for folder in (None, tmp_path):
+        pile, empty = Workshop(folder=folder).pile(), Workshop(folder=folder).pile()
+        for some in rows:
+            pile.add(some)
+            empty.add(some[:, :0])
+        np.testing.assert_array_equal(pile.array(), np.concatenate(rows))
+        assert empty.array().shape == (3, 0)
+
+
 def test_a_full_disk_is_an_error_before_anything_is_written() -> None:
     small = Path("/dev/shm")
     if not small.is_dir():
