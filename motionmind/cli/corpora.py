@@ -299,13 +299,16 @@ def rename(name: str, new: str, home: Path | None) -> None:
 @option("--yes", "is_sure", section=Section.EDITS, is_flag=True, help="Delete it; there is no way back.")
 @HOME
 def delete(name: str, is_sure: bool, home: Path | None) -> None:
-    """Delete a corpus that you built."""
+    """Delete a corpus that you built, or what is left of a build that was broken off."""
     from motionmind.corpus import store
 
-    place = store.own_place(name, home)
+    place = store.removable(name, home)
     if not is_sure:
         raise MotionMindError(f"{place}: would be deleted for good; say --yes")
-    click.echo(f"deleted {displayed_path(store.delete(name, home))}")
+    store.delete(name, home)
+    if place.exists():
+        raise MotionMindError(f"{place}: another build is at work there, and it stays")
+    click.echo(f"deleted {displayed_path(place)}")
 
 
 for _command in (build, add, remove, list_corpora, info, check, rename, delete, publish, fetch):

@@ -103,35 +103,33 @@ def unfinished(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     return home(folder).absolute() / "shards" / name
 
 
-def delete(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
-    """Delete a user's corpus at once; who has loaded it keeps what it read.
+def removable(name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Return the folder that `delete` deletes: of a user's corpus, or of the work on one that was never built."""
+    left = unfinished(name, folder)
+    return left if left.exists() and not place_for(name, folder).exists() else own_place(name, folder)
 
-    Work that was left of building it goes too, unless somebody is at it.
+
+def delete(name: str, folder: str | os.PathLike[str] | None = None) -> None:
+    """Delete a user's corpus at once; who has loaded it keeps what it read. Work that was left of building it goes too.
 
     Args:
         name: of the corpus, or of one that was never built to the end.
         folder: the user's home (`home`).
-
-    Returns:
-        The folder that was deleted.
 
     Raises:
         CorpusError: there is no such corpus of the user's own, it holds files that are no part of a built corpus, or it
             cannot be deleted.
     """
     left = unfinished(name, folder)
-    place = left if left.exists() and not place_for(name, folder).exists() else _own(name, folder)
-    try:
-        if place != left:
+    if removable(name, folder) != left:
+        place = _own(name, folder)
+        try:
             versions.remove(place)
-    except OSError as error:
-        raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
+        except OSError as error:
+            raise CorpusError(f"{place}: cannot be deleted: {error.strerror or error}") from error
     versions.remove_unused(left)
-    if place == left and left.exists():
-        raise CorpusError(f"{left}: cannot be deleted while the corpus is being built")
     with suppress(OSError):
         left.parent.rmdir()
-    return place
 
 
 def rename(name: str, new: str, folder: str | os.PathLike[str] | None = None) -> Path:

@@ -447,7 +447,7 @@ def test_a_corpus_is_renamed_and_deleted(run: Run, tmp_path: Path) -> None:
     assert run("corpus", "delete", "walks", "--yes").out == f"deleted {place / 'walks'}\n"
     assert list(place.iterdir()) == []
     (left := tmp_path / "home" / "shards" / "broken-off" / "3f").mkdir(parents=True)
-    assert run("corpus", "delete", "broken-off").out == f"deleted {left.parent}\n"
+    assert run("corpus", "delete", "broken-off", "--yes").out == f"deleted {left.parent}\n"
     assert not left.parents[1].exists()
     for words in (("delete", "ballet", "--yes"), ("rename", "ballet", "mine"), ("delete", "walks", "--yes")):
         assert run("corpus", *words).code == 2
