@@ -1,6 +1,6 @@
 """Reads, retargets and learns a hundred hours, or as many times what one dancer recorded as is said.
 
-python -m experiments.scale.hours PATH/TO/shared/data [--times 2270] [--workers 2] [--folder FOLDER]
+python experiments/scale/hours.py PATH/TO/shared/data [--times 2270] [--workers 2] [--folder FOLDER]
 
 The movement is made from recordings (see `experiments.scale.run`), each performance by the worker that reads it, and
 none is kept. FOLDER takes large arrays, and the corpus, until the run ends; what it must hold is said first.
@@ -8,8 +8,11 @@ none is kept. FOLDER takes large arrays, and the corpus, until the run ends; wha
 
 import argparse
 import shutil
+import sys
 import tempfile
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.scale.run import NAME, measure, tell
 from motionmind import read_motion

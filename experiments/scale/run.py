@@ -30,6 +30,7 @@ from motionmind.corpus.recordings import Recording, Taking, take
 from motionmind.executors.opening import open_team
 from motionmind.executors.workshop import Workshop
 from motionmind.formats.bvh import write_bvh
+from motionmind.learned.neighbours import build_neighbours
 
 NAME = "cmu-05"
 # Times as much as was recorded, and workers; for a trial, as one clip of a bundled corpus.
@@ -78,7 +79,8 @@ def work(data: str | None, times: int, workers: int) -> list[Row]:
 def measure(data: str | None, times: int, workers: int, room: str | None = None) -> Row:
     """Read, retarget and learn so many times what was recorded, in a folder for large arrays and the corpus."""
     kind = make_discretization("codebook", TOLERANCE)
-    Engine.learn(gather("first", [own_skeleton(_recorded(data)[0])], rate=RATE), kind)  # loads what learning needs
+    first = Engine.learn(gather("first", [own_skeleton(_recorded(data)[0])], rate=RATE), kind)
+    build_neighbours(first.corpus.skeleton, first.carriage.orientations, first.carriage.weights)  # loads what is needed
     spent: list[Spent] = []
     with tempfile.TemporaryDirectory(dir=room) as scratch, open_team(workers) as team, Memory() as memory:
         workshop = Workshop.of(workers, Path(scratch))
