@@ -1,4 +1,4 @@
-"""What every worker has loaded when it starts: imported once, by the process that workers are forked from.
+"""Modules and compiled code that every worker starts with: loaded once, by the process that workers are forked from.
 
 Importing the engine and its compiled code takes more than a second, which each worker that takes the place of a
 cancelled one would spend again.

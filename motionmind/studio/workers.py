@@ -363,11 +363,11 @@ class _Worker:
             self._connection.send(task)
 
     def _listen(self) -> None:
-        self._process.start()
-        self._theirs.close()
-        if self._is_killed:
-            self._process.kill()
         try:
+            self._process.start()  # which fails if the process that it is forked from dies just then
+            self._theirs.close()
+            if self._is_killed:
+                self._process.kill()
             while True:
                 self._workers.post(self, self._connection.recv())
         except (EOFError, OSError):
