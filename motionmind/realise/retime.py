@@ -78,7 +78,8 @@ def keep_pace(
 def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:
     """Return a movement and its clock, slower where a part of the body is faster than the most.
 
-    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that: it is done again.
+    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that. Where they show what
+    the corpus does not, it is done again.
 
     Args:
         motion: the movement, at the clock's frames.
@@ -86,9 +87,9 @@ def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool,
         most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s [J + 3].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
     """
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         slower = _slower(motion, most, moving)
-        if slower.max() < 1.0 + SLIGHT:
+        if slower.max() < (1.0 / ENDS_AT if number else 1.0 + SLIGHT):
             break
         motion, clock = _slowed(motion, clock, slower)
     return motion, clock
