@@ -153,7 +153,7 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
     page.get_by_test_id("wish-hold").select_option("end")
     page.get_by_test_id("wish-pin-add").click()
     wait_for(page, "piece.seams[1].ask.pins.length === 1 && !['waiting', 'abrupt'].includes(piece.seams[1].state)")
-    assert piece(page)["seams"][1]["ask"]["pins"] == [{"joint": "left_wrist", "hold": "end"}]
+    assert piece(page)["seams"][1]["ask"]["pins"] == [{"joint": "left_wrist", "hold": "end", "begins": 0, "ends": 1}]
     page.get_by_test_id("wishes-close").click()
     # A posture that is dropped beside the insertions becomes a stretch of its own.
     tracks = page.locator(".stretches")
