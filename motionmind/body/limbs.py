@@ -14,6 +14,9 @@ branches or joints of one side hang from a common stem; neither can stand in for
 
 from __future__ import annotations
 
+from collections import Counter
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Ints
@@ -36,13 +39,19 @@ def limbs_of(skeleton: Skeleton) -> list[list[int]]:
 
     On a person these are the legs, the arms, and neck with head.
     """
-    limbs = []
-    for leaf in (joint for joint in range(1, len(skeleton)) if not skeleton.children(joint)):
+    return [[*limb] for limb in _limbs_of(tuple(map(int, skeleton.parents)))]
+
+
+@lru_cache(maxsize=64)
+def _limbs_of(parents: tuple[int, ...]) -> tuple[tuple[int, ...], ...]:
+    """Return the joints of each limb of a tree of joints, by the number of each one's parent."""
+    limbs, children = [], Counter(parents)
+    for leaf in (joint for joint in range(1, len(parents)) if joint not in children):
         limb = [leaf]
-        while (above := skeleton.parents[limb[0]]) > 0 and len(skeleton.children(above)) == 1:
+        while (above := parents[limb[0]]) > 0 and children[above] == 1:
             limb.insert(0, above)
-        limbs.append(limb)
-    return limbs
+        limbs.append(tuple(limb))
+    return tuple(limbs)
 
 
 def limb_of_points(skeleton: Skeleton) -> Ints:
