@@ -85,7 +85,6 @@ def planes_between(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, 
     return sides
 
 
-@jit
 def least_turns(
     placed: Placed, limbs: Limbs, radii: Floats, pairs: Ints, allowed: Floats, sides: Floats
 ) -> tuple[Floats, Floats]:
@@ -102,13 +101,34 @@ def least_turns(
         allowed: how deep each pair may be in each other [N, P], metres.
         sides: normals of planes, 0 where there is none [N, P, 3].
     """
-    count = len(placed.ends)
+    return _least_turns(*placed, limbs.owner, limbs.carried, radii, pairs, allowed, sides)
+
+
+@jit
+def _least_turns(
+    ends: Floats,
+    pivots: Floats,
+    anchors: Floats,
+    firmly: Floats,
+    owner: Ints,
+    carried: Bools,
+    radii: Floats,
+    pairs: Ints,
+    allowed: Floats,
+    sides: Floats,
+) -> tuple[Floats, Floats]:
+    """Return what `least_turns` does, of the arrays in its arguments: named tuples take numba long to tell apart."""
+    count = len(ends)
     deep, steps = np.zeros((count, 4)), np.zeros((count, 4, 3))
     points, levers, gives = np.empty((2, 3)), np.empty((2, 3)), np.empty(2, np.bool_)
+    middles, spans = np.empty((len(radii), 3)), np.empty(len(radii))
     for t in range(count):
         worst = np.zeros(4)
+        _enclose(ends[t], radii, middles, spans)
         for p in range(len(pairs)):
-            one, other = placed.ends[t, pairs[p, 0]], placed.ends[t, pairs[p, 1]]
+            if _apart(middles[pairs[p, 0]], middles[pairs[p, 1]]) > spans[pairs[p, 0]] + spans[pairs[p, 1]]:
+                continue
+            one, other = ends[t, pairs[p, 0]], ends[t, pairs[p, 1]]
             gap, s, u = nearest_points(one, other)
             reach = radius_at(radii[pairs[p, 0]], s) + radius_at(radii[pairs[p, 1]], u)
             depth = reach - gap - allowed[t, p]
@@ -126,19 +146,19 @@ def least_turns(
             excess = reach - gap - allowed[t, p]
             size = LEVER**2
             for k in range(2):
-                limb, against = limbs.owner[pairs[p, k]], limbs.owner[pairs[p, 1 - k]]
+                limb, against = owner[pairs[p, k]], owner[pairs[p, 1 - k]]
                 gives[k] = limb > 1 or (limb >= 0 and against < 2)  # a leg does not give way to an arm
                 if not gives[k]:
                     continue
-                touched = placed.anchors[t, limb] if limbs.carried[pairs[p, k]] else points[k]
-                lever = np.cross(touched - placed.pivots[t, limb], side) * (1.0 - 2.0 * k)
-                axis = placed.anchors[t, limb] - placed.pivots[t, limb]
+                touched = anchors[t, limb] if carried[pairs[p, k]] else points[k]
+                lever = np.cross(touched - pivots[t, limb], side) * (1.0 - 2.0 * k)
+                axis = anchors[t, limb] - pivots[t, limb]
                 along = np.sum(lever * axis) / max(np.sum(axis**2), 1e-9) * axis
-                held = placed.held[t, limb]
+                held = firmly[t, limb]
                 levers[k] = (1.0 - held) * lever + held * along
                 size += np.sum(lever * levers[k])
             for k in range(2):
-                limb = limbs.owner[pairs[p, k]]
+                limb = owner[pairs[p, k]]
                 if not gives[k]:
                     continue
                 deep[t, limb] = max(deep[t, limb], depth)
@@ -147,6 +167,22 @@ def least_turns(
                     step = levers[k] * excess / size
                     steps[t, limb] = step * min(1.0, MOST / max(np.sqrt(np.sum(step**2)), 1e-9))
     return deep, steps
+
+
+@jit
+def _enclose(ends: Floats, radii: Floats, middles: Floats, spans: Floats) -> None:
+    """Write the middles [C, 3] and radii [C], metres, of balls around capsules with these ends [C, 2, 3]."""
+    for c in range(len(ends)):
+        for k in range(3):
+            middles[c, k] = 0.5 * (ends[c, 0, k] + ends[c, 1, k])
+        spans[c] = 0.5 * _apart(ends[c, 0], ends[c, 1]) + max(radii[c, 0], radii[c, 1])
+
+
+@jit
+def _apart(one: Floats, other: Floats) -> float:
+    """Return how far two points [3] are from each other, metres."""
+    x, y, z = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return float(np.sqrt(x * x + y * y + z * z))
 
 
 @jit
@@ -159,24 +195,29 @@ def _along(ends: Floats, direction: Floats) -> Floats:
     return out
 
 
-@jit
 def turn(placed: Placed, limbs: Limbs, turns: Floats) -> None:
     """Turn limbs about their first joints by rotation vectors [N, 4, 3]; what is carried moves along."""
+    _turn(placed.ends, placed.pivots, placed.anchors, limbs.owner, limbs.carried, turns)
+
+
+@jit
+def _turn(ends: Floats, pivots: Floats, anchors: Floats, owner: Ints, carried: Bools, turns: Floats) -> None:
+    """Turn as `turn` does."""
     for t in range(len(turns)):
         for limb in range(4):
-            vector, pivot, anchor = turns[t, limb], placed.pivots[t, limb], placed.anchors[t, limb]
+            vector, pivot, anchor = turns[t, limb], pivots[t, limb], anchors[t, limb]
             angle = np.sqrt(np.sum(vector**2))
             if angle < 1e-12:
                 continue
             moved = -anchor
             _turn_point(anchor, pivot, vector, angle)
             moved += anchor
-            for capsule in range(len(limbs.owner)):
-                if limbs.owner[capsule] != limb:
+            for capsule in range(len(owner)):
+                if owner[capsule] != limb:
                     continue
                 for end in range(2):
-                    point = placed.ends[t, capsule, end]
-                    if limbs.carried[capsule]:
+                    point = ends[t, capsule, end]
+                    if carried[capsule]:
                         point += moved
                     else:
                         _turn_point(point, pivot, vector, angle)

@@ -7,12 +7,13 @@ import pytest
 from bodies import insect
 
 from motionmind._typing import Floats
-from motionmind.body.capsules import capsules_of, legs_depth, penetration
+from motionmind.body.capsules import capsules_of, legs_depth, pair_depths, penetration
 from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
-from motionmind.realise.limbs_apart import _give_way, keep_limbs_apart
+from motionmind.realise.limb_turns import LEAST, Placed, least_turns
+from motionmind.realise.limbs_apart import _give_way, _limbs_of, keep_limbs_apart
 from motionmind.tween.engine import Engine
 
 BODY = human23()
@@ -180,6 +181,25 @@ def test_a_hand_goes_round_the_thigh() -> None:
     out = apart(swing)
     assert max(depth.max() for depth in penetration(BODY, out).values()) < 0.01
     assert np.all(out[:, BODY.index("left_hip")] == swing[:, BODY.index("left_hip")])
+
+
+def test_a_limb_is_as_deep_as_in_the_deepest_of_its_pairs() -> None:
+    rng, capsules = np.random.default_rng(0), capsules_of(BODY)
+    pairs, limbs = capsules.pairs(), _limbs_of(BODY, capsules)
+    places = BODY.positions_and_tips(rot.exp(rng.normal(0.0, 0.6, (60, len(BODY), 3))), np.zeros(3))
+    ends = capsules.place(places)
+    placed = Placed(ends, places[:, limbs.first], places[:, limbs.last], np.zeros((60, 4)))
+    allowed = rng.uniform(0.0, 0.05, (60, len(pairs)))
+    deep, steps = least_turns(placed, limbs, capsules.radii, pairs, allowed, np.zeros((60, len(pairs), 3)))
+    beyond = pair_depths(ends, capsules.radii, pairs)[0] - allowed
+    expected = np.zeros_like(deep)
+    for (limb, other), depth in zip(limbs.owner[pairs], beyond.T, strict=True):
+        for mine, against in ((limb, other), (other, limb)):
+            if mine > 1 or (mine >= 0 and against < 2):
+                expected[:, mine] = np.maximum(expected[:, mine], np.where(depth > LEAST, depth, 0.0))
+    assert (expected > 0.0).any(axis=0).all()
+    np.testing.assert_allclose(deep, expected, rtol=0.0, atol=1e-12)
+    assert not steps[deep == 0.0].any()
 
 
 def test_limbs_that_are_apart_do_not_change() -> None:
