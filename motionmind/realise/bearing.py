@@ -182,9 +182,13 @@ def find_bearing(
         costs[staying] = np.zeros(len(root)), np.full(len(root), np.inf)
         stands[:, staying] = True
     stances: list[list[Stance]] = [[] for _ in feet]
+    borne = [np.zeros(0, dtype=np.bool_) for _ in feet]
     for _ in range(2):  # each foot steps where others stand, as they did the last time
         for k in range(len(feet)):
             bears = np.delete(stands, k, axis=1).any(axis=1) | rests
+            if np.array_equal(bears, borne[k]):
+                continue  # as the last time
+            borne[k] = bears
             stances[k] = find_stances(tracks[:, k], shape.outward[:, k], *costs[k], bears, flying, fps)
             stands[:, k] = False
             for stance in stances[k]:

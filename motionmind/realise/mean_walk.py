@@ -176,7 +176,8 @@ def _mean_between(
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
     with ThreadPoolExecutor(threads) as pool:
-        distances = [*pool.map(off, np.array_split(passed, threads))] if trees is None else []
+        each = pool.map if threads > 1 else map
+        distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> tuple[Chosen, Floats, float, float]:
             part = parts[number]
@@ -190,7 +191,7 @@ def _mean_between(
                 own = squared_distances(here, whole, 1, np.ascontiguousarray(passed[:, part]))[0]
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
-        known = dict(zip(larger, pool.map(walk, larger), strict=True))
+        known = dict(zip(larger, each(walk, larger), strict=True))
 
         def move(number: int) -> float:
             mine = known[number] if number in known else walk(number)
@@ -213,8 +214,7 @@ def _mean_between(
                 poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
             return mine[-1]
 
-        lost = [*pool.map(move, sorted({numbers[-1] for numbers in groups}))]
-    lost += [left_out for *_, left_out in known.values()]
+        lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one[-1] for one in known.values())]
     moments = tuple((marginals, chosen.moments) for chosen, marginals, *_ in (known[0], known[1]))
     return _Walk(poses, moments, trusted, max(lost))
 
@@ -311,17 +311,19 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
-    out = about.copy()
-    for j in range(len(joints)):
-        shown = orientations[:, joints[j]]
-        for t in range(len(weights)):
+    out, some = about.copy(), np.empty(weights.shape[1], np.int64)
+    for t in range(len(weights)):
+        count = 0
+        for i in range(weights.shape[1]):
+            if weights[t, i] >= 1e-6:
+                some[count] = i
+                count += 1
+        for j in range(len(joints)):
             ax, ay, az, aw = about[t, j]
             x, y, z, w = 0.0, 0.0, 0.0, 0.0
-            for i in range(weights.shape[1]):
-                weight = weights[t, i]
-                if weight < 1e-6:
-                    continue
-                bx, by, bz, bw = shown[i, 0], shown[i, 1], shown[i, 2], shown[i, 3]
+            for i in some[:count]:
+                weight, shown = weights[t, i], orientations[i, joints[j]]
+                bx, by, bz, bw = shown[0], shown[1], shown[2], shown[3]
                 if ax * bx + ay * by + az * bz + aw * bw < 0.0:
                     weight = -weight
                 x += weight * bx

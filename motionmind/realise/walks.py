@@ -45,17 +45,18 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
         parts: how many parts there are.
         postures: orientations of the joints that distances are measured from [K, J, 4].
     """
-    out, sizes = np.empty((parts, len(postures), len(orientations))), np.bincount(members.ravel(), minlength=parts)
-    sums = np.empty(parts)
+    out, sizes = np.zeros((parts, len(postures), len(orientations))), np.bincount(members.ravel(), minlength=parts)
+    own = np.empty(len(orientations))
     for k in range(len(postures)):
-        for i in range(len(orientations)):
-            sums[:] = 0.0
-            for joint in range(len(members)):
-                squared = squared_turn(orientations[i, joint], postures[k, joint])
-                for part in members[joint]:
-                    sums[part] += squared
-            for part in range(parts):
-                out[part, k, i] = sums[part] / sizes[part]
+        for joint in range(len(members)):
+            for i in range(len(orientations)):
+                own[i] = squared_turn(orientations[i, joint], postures[k, joint])
+            for part in members[joint]:
+                for i in range(len(own)):
+                    out[part, k, i] += own[i]
+        for part in range(parts):
+            for i in range(len(own)):
+                out[part, k, i] /= sizes[part]
     return out
 
 
