@@ -33,7 +33,8 @@ settings.register_profile(
 )
 settings.load_profile("motionmind")
 
-_FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+# Drawing in software takes most of the time of a page's tests: only canvases are drawn by WebGL, not the page around.
+_FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
 TESTS = Path(__file__).parent
 SHARED_DATA = TESTS.parents[1] / "shared" / "data"
 

@@ -21,7 +21,7 @@ from pgmpy.parameter_estimator import DiscreteBayesianEstimator
 from toys import solution
 
 from motionmind._typing import Bools, Floats, Int32s, Ints
-from motionmind.corpus.bundled import bundled
+from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.grammar.coordination import PSEUDO_COUNT, Coordination
@@ -344,7 +344,7 @@ def test_paths_are_drawn_as_often_as_they_are_likely() -> None:
         chains, domains = trellis.chains, [trellis.dom[a:b] for a, b in pairwise(trellis.dom_ptr)]
         path = np.array([np.searchsorted(d, s) for d, s in zip(domains, best.path.ravel(), strict=True)])
         path += trellis.dom_ptr[:-1]
-        rng, draws, seen = np.random.default_rng(seed), 4000, dict.fromkeys(likely, 0)
+        rng, draws, seen = np.random.default_rng(seed), 2000, dict.fromkeys(likely, 0)
         for _ in range(draws):
             gibbs_sample(trellis, path, 1, rng)
             seen[places(model, trellis.dom[path].reshape(4, chains)).tobytes()] += 1

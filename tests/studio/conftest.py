@@ -47,9 +47,16 @@ def studio_server(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def studio_page(studio_server: Served, browser: Any) -> Iterator[Any]:
-    """A page of Playwright, 1440x900, that is let into `studio_server`; an error on its console fails the test."""
-    context = browser.new_context(viewport={"width": 1440, "height": 900})
+def studio_page(request: pytest.FixtureRequest, studio_server: Served, browser: Any) -> Iterator[Any]:
+    """A page of Playwright, LARGE or of the size that is its parameter, that is let into `studio_server`; an error on
+    its console fails the test."""
+    from studio_server import LARGE
+
+    width, height = getattr(request, "param", LARGE)
+    # Few pixels and, until somebody asks for it, nothing that plays: drawing in software is most of a test's time.
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, device_scale_factor=0.5, reduced_motion="reduce"
+    )
     page = context.new_page()
     errors: list[str] = []
 

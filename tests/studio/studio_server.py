@@ -26,6 +26,7 @@ from motionmind.studio.studio import Studio
 from motionmind.studio.token import Keys
 
 ROOT = Path(__file__).parents[2]
+LARGE, SMALL = (1440, 900), (1024, 768)  # windows in pixels
 
 
 class Answer(NamedTuple):

@@ -73,13 +73,13 @@ def test_where_a_joint_was_seen_is_a_movement_that_there_is(found: list[tuple[Tw
         assert motion.times[0] <= at <= motion.times[-1]
 
 
-def test_seen_stretches_name_the_place_in_words(found: list[tuple[Tween, Account]]) -> None:
+def test_seen_stretches_name_the_place_in_words(ballet: Engine, found: list[tuple[Tween, Account]]) -> None:
     for tween, said in found:
         for way in said.joints.values():
             for one in way:
                 assert (one.how == "seen") == bool(one.key)
                 assert (one.how == "seen") == one.where.endswith(f" at {clock(one.at)}")
-        sources = {key_of(source, Engine.load("ballet").corpus) for row in tween.sources for source in row if source}
+        sources = {key_of(source, ballet.corpus) for row in tween.sources for source in row if source}
         assert {one.key for way in said.joints.values() for one in way} - {""} <= sources
 
 

@@ -41,7 +41,8 @@ def open_page(served: Served, browser: Any) -> Iterator[Open]:
     contexts = []
 
     def visit(width: int = 1440, height: int = 900, scheme: str = "light") -> Any:
-        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+        size = {"width": width, "height": height}
+        context = browser.new_context(viewport=size, device_scale_factor=0.5, color_scheme=scheme)
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(LONG)

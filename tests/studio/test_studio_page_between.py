@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from studio_server import LARGE, SMALL
 
 LONG = 120_000  # milliseconds: whoever searches first compiles
 FOUND = "[data-testid=alternatives][data-state=found]"
@@ -48,6 +49,7 @@ def painted(page: Any, canvas: str) -> int:
     return int(page.locator(canvas).evaluate(script))
 
 
+@pytest.mark.parametrize("studio_page", [LARGE, SMALL], ids=["large", "small"], indirect=True)
 def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: Path) -> None:
     mouse = Counted(studio_page)
     mouse.click("posture-arabesque")
@@ -68,6 +70,7 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
 
 
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
+    studio_page.emulate_media(reduced_motion="no-preference")
     from_a_to_b(studio_page)
     assert [studio_page.get_by_test_id(f"alternative-{n}").count() for n in range(1, 6)] == [1, 1, 1, 1, 0]
     cards = studio_page.locator(".alternative .words")
@@ -137,6 +140,7 @@ def test_a_whole_clip_goes_onto_the_line_of_time(studio_page: Any) -> None:
     until(page, "studio.viewer.isHome && studio.viewer.player.motion.end > 10")
 
 
+@pytest.mark.parametrize("studio_page", [SMALL], ids=["small"], indirect=True)
 def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
     page = studio_page
     page.wait_for_selector("[data-testid=posture-arabesque]")

@@ -65,7 +65,8 @@ def _piece(server: Served) -> None:
 
 
 def _enter(server: Served, browser: Any, scheme: Literal["light", "dark"], width: int) -> tuple[Any, list[str]]:
-    context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    size = {"width": width, "height": 900}
+    context = browser.new_context(viewport=size, device_scale_factor=0.5, color_scheme=scheme, reduced_motion="reduce")
     page, errors = context.new_page(), []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: errors.append(str(error)))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from studio_server import LARGE, SMALL
 
 from motionmind.geometry import rotations as rot
 from motionmind.studio.placement import performance
@@ -82,6 +83,7 @@ def selection(page: Any) -> Any:
     return page.evaluate("studio.store.selection")
 
 
+@pytest.mark.parametrize("studio_page", [LARGE, SMALL], ids=["large", "small"], indirect=True)
 def test_a_piece_is_made_by_mouse(page: Any) -> None:
     width = page.get_by_test_id("block-b1").bounding_box()["width"]
     # Reorder, trim by an edge, split, duplicate, mirror, delete.
@@ -173,6 +175,7 @@ def press_on(page: Any) -> Callable[..., None]:
     return press
 
 
+@pytest.mark.parametrize("studio_page", [SMALL], ids=["small"], indirect=True)
 def test_stretches_are_arranged_by_keys_alone(page: Any) -> None:
     press = press_on(page)
     page.get_by_test_id("open-between").focus()
@@ -210,6 +213,7 @@ def test_stretches_are_arranged_by_keys_alone(page: Any) -> None:
     wait_for(page, "piece.blocks.length === 4")
 
 
+@pytest.mark.parametrize("studio_page", [SMALL], ids=["small"], indirect=True)
 def test_insertions_are_chosen_by_keys_alone(page: Any) -> None:
     press = press_on(page)
     # To the insertion before the last stretch: flip, lock, discard, restore, longer, a posture and a hand.
@@ -315,7 +319,7 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
 
 
 def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, page: Any, browser: Any) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True)
+    context = browser.new_context(viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, has_touch=True)
     touched = context.new_page()
     try:
         touched.goto(studio_server.entry)

@@ -11,7 +11,7 @@ import pytest
 from command_line import Run
 
 from motionmind.body.motion import Posture
-from motionmind.corpus.bundled import bundled
+from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_posture
 from motionmind.search.bounding import PROVEN

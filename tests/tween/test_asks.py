@@ -19,8 +19,8 @@ from toys import Toy, best, evaluate, random_toy, solution, trellis_of
 
 from motionmind._typing import Bools, Int32s
 from motionmind.body.motion import Posture
+from motionmind.bundled import bundled
 from motionmind.cli.printing import Interruption
-from motionmind.corpus.bundled import bundled
 from motionmind.errors import MotionMindError, NoPathError
 from motionmind.formats import read_motion, read_posture
 from motionmind.geometry import rotations as rot

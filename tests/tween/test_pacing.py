@@ -12,7 +12,7 @@ import pytest
 from command_line import Run
 
 from motionmind.body.motion import Posture
-from motionmind.corpus.bundled import bundled
+from motionmind.bundled import bundled
 from motionmind.errors import MotionMindError, MotionMindWarning, NoPathError
 from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot

@@ -13,8 +13,8 @@ from command_line import Run
 from toys import best, random_toy
 
 from motionmind._typing import Floats
+from motionmind.bundled import bundled
 from motionmind.cli.printing import format_what_if
-from motionmind.corpus.bundled import bundled
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_posture
 from motionmind.realise.timeline import usual

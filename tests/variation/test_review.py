@@ -82,7 +82,7 @@ def seen(variation: Variation) -> list[object]:
     return [report, [id(seam.insertion) for seam in variation.seams]]
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(edits=edits)
 def test_undo_takes_back_one_edit_after_another(
     variation: Variation, karate: Engine, edits: list[tuple[str, object]]
