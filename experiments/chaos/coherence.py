@@ -24,11 +24,11 @@ from numpy.random import Generator
 
 from motionmind import compose
 from motionmind._typing import Floats
+from motionmind.bundled import bundled
 from motionmind.chaos.baselines import dabby, shuffled
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.chaos.reorder import itinerary, runs
 from motionmind.chaos.trajectories import largest_exponent, trajectory
-from motionmind.corpus.bundled import bundled
 
 Row = dict[str, Any]
 

@@ -38,7 +38,7 @@ def corpora(context: click.Context, _: click.Parameter, incomplete: str) -> list
 
 def own_corpora(context: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete the name of a corpus that the user built."""
-    from motionmind.corpus.bundled import bundled
+    from motionmind.bundled import bundled
 
     places = _folders(context).items()
     own = [name for name, folder in places if folder.parent != bundled("corpora")]

@@ -24,6 +24,7 @@ from motionmind.cli.options import command
 from motionmind.errors import MotionMindError
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
     from motionmind.learned.carriage import Carriage
     from motionmind.search.problem import Problem
     from motionmind.tween.engine import Engine
@@ -214,7 +215,7 @@ def seek() -> None:
 
 
 def learn() -> None:
-    """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path."""
+    """Learn a clip anew, find its moves in the corpus, realise them by few of its moments; sample a path; read it."""
     from motionmind.discretize import make_discretization
     from motionmind.learned.neighbours import build_neighbours
     from motionmind.realise.detail import likest_moves
@@ -232,6 +233,18 @@ def learn() -> None:
     Engine.fit([clip], discretization=make_discretization("codebook", 15.0)).check()
     problem = _problem()
     sample_path(problem, solve(problem), 0)
+    _read(clip)
+
+
+def _read(clip: Motion) -> None:
+    """Read a clip from a file, as it would have been recorded."""
+    from motionmind.body.plausibility import at_rate
+    from motionmind.formats import read_motion, write_motion
+
+    with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
+        path = Path(folder) / "clip.bvh"
+        write_motion(path, at_rate(clip))
+        read_motion(path)
 
 
 def _realise(engine: Engine, carriage: Carriage) -> None:

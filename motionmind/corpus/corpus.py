@@ -318,6 +318,7 @@ class Corpus:
             self.times[here],
             clip.name,
             keyframed=self.rate is None,
+            recorded=(self.credit_of(clip),),
         )
 
     def recording(self, clip: Clip, start: int = 0, stop: int | None = None) -> Motion:
@@ -342,7 +343,7 @@ class Corpus:
         spline = rotation_spline(self.times[here], self.rotations[here], times)
         rotations = rot.normalise(rot.mul(spline, rot.exp(detail)))
         root = natural_spline(self.times[here], self.root[here], times)
-        return Motion(self.skeleton, rotations, root, times, clip.name)
+        return Motion(self.skeleton, rotations, root, times, clip.name, recorded=(self.credit_of(clip),))
 
     def recorded_times(self, clip: Clip) -> Floats:
         """Return the times of the frames of `recording`, seconds."""

@@ -16,8 +16,8 @@ import msgspec
 import platformdirs
 
 from motionmind.arguments import check_path
+from motionmind.bundled import bundled
 from motionmind.corpus import versions
-from motionmind.corpus.bundled import bundled
 from motionmind.errors import CorpusError, FormatError, suggestion
 from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
 
@@ -32,8 +32,8 @@ _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a chang
 _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
 # The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
 LEARNED_BY = (
-    *("_cells.py", "_typing.py", "arguments.py", "display.py", "errors.py", "files.py", "jit.py", "plugins.py"),
-    *("executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
+    *("_cells.py", "_typing.py", "arguments.py", "bundled.py", "display.py", "errors.py", "files.py", "jit.py"),
+    *("plugins.py", "executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
     *("discretize", "grammar", "learned"),
 )
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from motionmind.body.motion import Posture
+from motionmind.bundled import bundled
 from motionmind.corpus import store
-from motionmind.corpus.bundled import bundled
 from motionmind.names.finding import open_collection
 from motionmind.names.spelling import Source
 

@@ -135,7 +135,8 @@ def _nearest(
     """
     least, place = np.full(len(postures), np.inf), np.zeros(len(postures), dtype=np.int64)
     left, known = np.arange(len(postures)), 0
-    for count in (min(most, len(founders)) for most in LOOKED_AT):
+    looked_at = LOOKED_AT if enough < 0.0 else (1, *LOOKED_AT)  # mostly the one that looks nearest is near enough
+    for count in (min(most, len(founders)) for most in looked_at):
         if len(left) and count > known:
             bound, near = tree.query(seen[postures[left]], k=np.arange(known + 1, count + 1))
             _compare(orientations, postures[left], founders, near, least, place, left)

@@ -263,7 +263,13 @@ def _search(
                 heapq.heappush(heap, (away - INSIDE * radii[child], child))
             continue
         leaves -= 1
-        for k in range(bounds[node, 0], bounds[node, 1]):
+        start, stop = bounds[node]
+        for k in range(start, stop):  # so that the memory of all is on its way before that of the first is waited for
+            touched = 0.0
+            for j in range(0, len(part), 2):
+                touched += orientations[order[k], part[j], 0]
+            squared[many + k - start] = touched
+        for k in range(start, stop):
             found[many], squared[many] = order[k], _apart(orientations[order[k]], part, posture) / len(part)
             many += 1
     return found[:many], squared[:many]

@@ -286,13 +286,13 @@ def _read_source(folder: Path, manifest: SourceManifest) -> tuple[Corpus, Discre
     """Read a corpus that people wrote: its movement, and the discretization that its manifest names."""
     # Imported here, for a corpus that is already built takes no scores.
     from motionmind.notation.compose import motions
-    from motionmind.notation.read import read_score
+    from motionmind.notation.read import read_scores
 
     try:
         discretization = from_spec(manifest.discretization)
     except FormatError as error:
         raise FormatError(str(error), path=folder / store.MANIFEST) from error
-    scores = [read_score(folder / score) for score in manifest.scores]
+    scores, _ = read_scores(folder / score for score in manifest.scores)
     clips = [own_skeleton(replace(read_motion(folder / clip.file), name=clip.name)) for clip in manifest.clips]
     about = {clip.name: clip.about for clip in manifest.clips}
     about |= {clip.name: clip.about for score in scores for clip in score.clips}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggest
 from motionmind.formats import read_motion
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
 from motionmind.notation import compose
-from motionmind.notation.read import read_score
+from motionmind.notation.read import read_score, read_scores
 from motionmind.notation.score import Score
 
 _MOST = 60  # names in a message
@@ -117,10 +117,7 @@ class _CorpusCollection(Collection):
         if manifest["format"] == store.BUILT:
             return {}
         written = parse_manifest(manifest, SourceManifest, self._folder / store.MANIFEST)
-        found: dict[str, Score] = {}
-        for score in (read_score(self._folder / name) for name in written.scores):
-            found = dict.fromkeys(score.postures, score) | found
-        return found
+        return _scores_by_posture(tuple(self._folder / name for name in written.scores))
 
     @cached_property
     def _corpus(self) -> Corpus:
@@ -145,6 +142,26 @@ class _CorpusCollection(Collection):
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         return [replace(self._corpus.motion(self._clips[name]), name=name) for name in names]
+
+
+_Stamps = dict[Path, tuple[int, int] | None]
+_kept: dict[tuple[Path, ...], tuple[_Stamps, dict[str, Score]]] = {}
+
+
+def _scores_by_posture(places: tuple[Path, ...]) -> dict[str, Score]:
+    """Return the score that names each posture, the first if several do; they are read anew once a file has changed."""
+    if places not in _kept or _stamps(_kept[places][0]) != _kept[places][0]:
+        scores, files = read_scores(places)
+        found: dict[str, Score] = {}
+        for score in scores:
+            found = dict.fromkeys(score.postures, score) | found
+        _kept[places] = _stamps(files), found
+    return _kept[places][1]
+
+
+def _stamps(files: Iterable[Path]) -> _Stamps:
+    """Return the time of each file's last change, and its size; None for one that is not there."""
+    return {file: (file.stat().st_mtime_ns, file.stat().st_size) if file.is_file() else None for file in files}
 
 
 def open_collection(source: Source, home: Path | None = None) -> Collection:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from unicodedata import normalize
@@ -29,6 +29,7 @@ from motionmind.notation.score import (
     number,
     tempo,
 )
+from motionmind.notation.sources import place_of
 
 MAX_INCLUDES = 100  # scores that one is made of
 MAX_OPEN = 20  # words that a phrase leaves open
@@ -77,17 +78,30 @@ def read_score(path: FilePath) -> Score:
     ['bends']
     """
     check_path("path", path)
-    return _read(Path(path), (), {})
+    return _read(Path(path), (), {}, MAX_INCLUDES)
 
 
-def _read(path: Path, above: tuple[Path, ...], known: dict[Path, Score]) -> Score:
-    """Read a score that those `above` include; each file once, for those that are `known` by their resolved paths."""
+def read_scores(paths: Iterable[Path]) -> tuple[list[Score], list[Path]]:
+    """Read several scores, and each that they include once; return them, and all files that they are made of.
+
+    Raises:
+        FormatError: something in one of them is not understood; names file, line and word.
+    """
+    known: dict[Path, Score] = {}
+    scores = [_read(path, (), known, len(known) + MAX_INCLUDES) for path in paths]
+    files = [Path(file) for score in (*scores, *known.values()) for file in (score.path, score.body.path)]
+    return scores, sorted(set(files))
+
+
+def _read(path: Path, above: tuple[Path, ...], known: dict[Path, Score], most: int) -> Score:
+    """Read a score that those `above` include; each file once, for those that are `known` by their resolved paths, of
+    which there may be so many at `most`."""
     lines = [Line(Where(str(path), number), text) for number, text in enumerate(read_lines(path), start=1)]
     blocks = list(_blocks(lines))
     heads = [head for head, _ in blocks if _word(head) == "include"]
     if len(heads) > MAX_INCLUDES:
         raise heads[MAX_INCLUDES].where.error(f"more than {MAX_INCLUDES} scores are included")
-    includes = [_read_include(path, head, (*above, path.resolve()), known) for head in heads]
+    includes = [_read_include(path, head, (*above, path.resolve()), known, most) for head in heads]
     score = Score(str(path), _find_body(path, [head for head, _ in blocks], [other for _, _, other in includes]))
     for where, name, other in includes:
         _include(score, where, name, other)
@@ -102,12 +116,12 @@ def _word(head: Line) -> str:
 
 
 def _read_include(
-    path: Path, head: Line, above: tuple[Path, ...], known: dict[Path, Score]
+    path: Path, head: Line, above: tuple[Path, ...], known: dict[Path, Score], most: int
 ) -> tuple[Where, str, Score]:
     """Read the score of an `include` heading; return its line, the name that it gets, and the score."""
     file, _, name = (part.strip() for part in head.text.removeprefix("include").partition(" as "))
     try:
-        included = path.parent / file
+        included = place_of(path, file)
         if not included.is_file():
             raise head.where.error(f"there is no file {included}")
         # Errors quote what they do not understand: no lines of what is no score, though a link to it has such a name.
@@ -119,9 +133,9 @@ def _read_include(
     except (OSError, ValueError):
         raise head.where.error(f"{file:.60} cannot be a file") from None
     if place not in known:
-        if len(known) == MAX_INCLUDES or len(above) > MAX_INCLUDES // 2:
+        if len(known) == most or len(above) > MAX_INCLUDES // 2:
             raise head.where.error(f"more than {MAX_INCLUDES} scores are included, or too many within one another")
-        known[place] = _read(included, above, known)
+        known[place] = _read(included, above, known, most)
     return head.where, name, known[place]
 
 

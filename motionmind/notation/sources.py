@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from unicodedata import normalize
 
+from motionmind.bundled import bundled
 from motionmind.formats.text import read_lines
 
 
 def sources(path: Path) -> list[Path]:
-    """List a score's file, the scores that it includes, and the body files beside them; resolved paths.
+    """List a score's file, the scores that it includes, and their body files; resolved paths.
 
     Raises:
         FormatError: a file cannot be read.
@@ -21,8 +22,17 @@ def sources(path: Path) -> list[Path]:
             word, _, rest = normalize("NFC", line).partition("#")[0].replace("\t", " ").partition(" ")
             file = rest.split(" as ")[0].strip()
             if word == "include" or (word == "body" and file.endswith(".toml")):
-                beside = (score.parent / file).resolve()
-                if beside not in found:
-                    found.add(beside)
-                    waiting.append(beside)
+                other = (place_of(score, file) if word == "include" else score.parent / file).resolve()
+                if other not in found:
+                    found.add(other)
+                    waiting.append(other)
     return waiting
+
+
+def place_of(score: Path, file: str) -> Path:
+    """Return the path of a file that a score includes.
+
+    It is beside the score or, where there is none, a score of a corpus that comes with MotionMind, CORPUS/NAME.score.
+    """
+    beside, bundle = score.parent / file, bundled("corpora") / file
+    return bundle if not beside.is_file() and bundle.is_file() else beside

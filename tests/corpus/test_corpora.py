@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull
 from motionmind import Engine, Posture, read_posture
 from motionmind.body.anatomy_file import anatomy_named
 from motionmind.body.motion import Motion
+from motionmind.bundled import bundled
 from motionmind.corpus import store
-from motionmind.corpus.bundled import bundled
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.geometry import rotations as rot
 from motionmind.notation.compose import played, posture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from motionmind.corpus import store
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
 from motionmind.learned.model import LearnedCorpus
+from motionmind.names import finding
 from motionmind.names.finding import find_motion, find_posture, locate_score, open_collection
 from motionmind.names.spelling import Moment, parse_frames, parse_posture, parse_source
 from motionmind.notation.compose import posture
-from motionmind.notation.read import read_score
+from motionmind.notation.read import read_score, read_scores
+from motionmind.notation.score import Score
 
 CENTRE = BALLET / "centre.score"
 BUNDLED = ("ballet", "hands", "karate", "macarena", "medley", "walk-hexapod")
@@ -116,6 +119,39 @@ def test_every_posture_that_a_corpus_names_is_that_of_its_scores(corpus: str) ->
     assert set(found.postures) == set(written)
     for name, score in written.items():
         assert_same(find_posture(f"{corpus}/{name}"), posture(score, name))
+
+
+@pytest.mark.parametrize(
+    ("corpus", "name", "file", "old", "new"),
+    [
+        ("ballet", "arms-fifth", "vocabulary.score", "posture arms-fifth   = first", "posture arms-fifth   = second"),
+        ("walk-hexapod", "stand", "hexapod.toml", "offset = [0.0, 0.0, -0.14]", "offset = [0.0, 0.0, -0.15]"),
+    ],
+)
+def test_a_posture_is_as_its_files_have_it_now(
+    corpus: str, name: str, file: str, old: str, new: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files that scores include, and their bodies' too; they are read again only after a change."""
+    shutil.copytree(store.locate(corpus), "mine")
+    read: list[object] = []
+
+    def counted(places: Iterable[Path]) -> tuple[list[Score], list[Path]]:
+        read.append(places)
+        return read_scores(places)
+
+    monkeypatch.setattr(finding, "read_scores", counted)
+    word = f"{Path('mine').resolve()}/{name}"
+    before, again = find_posture(word), find_posture(word)
+    assert len(read) == 1
+    assert_same(before, again)
+    path = Path("mine", file)
+    text = path.read_text("utf-8")
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new), "utf-8")
+    after = find_posture(word)
+    assert len(read) == 2
+    shape = [np.concatenate([one.rotations.ravel(), one.skeleton.offsets.ravel()]) for one in (before, after)]
+    assert not np.array_equal(*shape)
 
 
 @pytest.mark.parametrize("corpus", ["ballet", "walk-hexapod"])

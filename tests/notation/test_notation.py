@@ -22,6 +22,7 @@ from motionmind.body.anatomy_file import anatomy_named, read_body
 from motionmind.body.contact import lowest_point
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Motion, Posture
+from motionmind.bundled import bundled
 from motionmind.cli import main
 from motionmind.errors import FormatError
 from motionmind.formats import read_motion, read_posture, write_motion
@@ -30,7 +31,7 @@ from motionmind.notation import compose as notation
 from motionmind.notation import rows as phrases
 from motionmind.notation.compose import compose, motions
 from motionmind.notation.posture_line import Row
-from motionmind.notation.read import read_score
+from motionmind.notation.read import MAX_INCLUDES, read_score, read_scores
 from motionmind.notation.sources import sources
 
 Mutate = Callable[[str, random.Random], bytes]
@@ -1090,6 +1091,32 @@ def test_the_same_score_is_the_same_bytes(tmp_path: Path, monkeypatch: pytest.Mo
         write_motion(out, compose(name))
         outputs.append(out.read_bytes())
     assert len(set(outputs)) == 1
+
+
+def test_a_score_anywhere_includes_one_of_a_corpus_that_comes_along(tmp_path: Path) -> None:
+    """Unless a file of that name is beside it."""
+    text = "include ballet/vocabulary.score\n"
+    path = write(tmp_path, f"{text}clip c\n  start | fifth left | fifth | upright | front\n  1 | first\n")
+    vocabulary = bundled("corpora") / "ballet" / "vocabulary.score"
+    assert set(read_score(path).postures) == set(read_score(vocabulary).postures)
+    assert sources(path) == [path.resolve(), vocabulary.resolve()]
+    assert len(compose(path)) == 2
+    (tmp_path / "ballet").mkdir()
+    own, path = write(tmp_path, VOCABULARY, "ballet/vocabulary.score"), write(tmp_path, text, "b.score")
+    assert set(read_score(path).phrases) == set(read_score(own).phrases)
+    assert sources(path) == [path.resolve(), own.resolve()]
+
+
+def test_scores_that_are_read_together_have_the_bounds_of_each(tmp_path: Path) -> None:
+    words = [write(tmp_path, "", f"{number}.score") for number in range(2 * MAX_INCLUDES)]
+    halves = [words[:MAX_INCLUDES], words[MAX_INCLUDES:]]
+    texts = ["".join(f"include {word.name}\n" for word in half) for half in halves]
+    paths = [write(tmp_path, text, f"{name}.score") for text, name in zip(texts, "ab", strict=True)]
+    scores, files = read_scores(paths)
+    assert [score.path for score in scores] == [str(path) for path in paths]
+    assert {*paths, *words} <= set(files)
+    with pytest.raises(FormatError, match=f"more than {MAX_INCLUDES} scores are included"):
+        read_scores([write(tmp_path, "".join(texts), "all.score")])
 
 
 def test_what_a_score_is_made_of_is_found(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ def bundled(folder: str) -> Path:
     """
     if folder not in FOLDERS:
         raise CorpusError(f"no bundled folder {folder!r}; there are {' and '.join(FOLDERS)}")
-    package = Path(__file__).resolve().parents[1]
+    package = Path(__file__).resolve().parent
     places = (package / "_bundled" / folder, package.parent / folder)
     for place in places:
         if place.is_dir():
