@@ -23,7 +23,7 @@ HEAVY = 6.0  # a second: cost of swinging a foot that bears the whole weight of 
 FALLS = 30.0  # a second: cost of swinging a foot without which the body falls; chosen on ballet and karate
 RESTS = 0.3  # seconds from an end at which nothing moves in which low feet stand
 UPSIDE = 0.15  # metres above a body's lowest point up to which its lowest foot may bear it
-NEAR = 0.1  # metres within which a foot is in one place
+NEAR = 0.1  # metres that a part of a foot is off at most which is in one place, though it rolls, or turns on that
 
 
 class Shape(NamedTuple):
@@ -212,6 +212,8 @@ def _weights(shape: Shape, mass: Floats) -> Floats:
 def find_staying(shape: Shape, root: Floats) -> int | None:
     """Return the foot that stays where it stands: one that bears alone in the first and the last frame, in one place.
 
+    It may roll from its heel to its toes there, or turn on either.
+
     Args:
         shape: the body.
         root: level places of the root [N, 2], metres.
@@ -221,8 +223,9 @@ def find_staying(shape: Shape, root: Floats) -> int | None:
     if np.any(bears.sum(axis=1) != 1) or np.any(bears[0] != bears[1]) or not bears[0, : shape.low.shape[1]].any():
         return None
     foot = int(bears[0].argmax())
-    moved = shape.tracks[-1, foot] + root[-1] - shape.tracks[0, foot] - root[0]
-    return foot if np.linalg.norm(moved) < NEAR else None
+    places = shape.places[[0, -1]][:, shape.feet[foot]][..., [0, 2]]
+    moved = places[1] + root[-1] - places[0] - root[0]
+    return foot if np.linalg.norm(moved, axis=1).min() < NEAR else None
 
 
 def _load(stance: Stance, count: int, fps: float) -> Floats:

@@ -64,6 +64,7 @@ class Carried(NamedTuple):
         holds: how much each foot holds its place [N, feet], from 0 to 1.
         heights: of the feet's lowest points that these lead to [N, feet], metres.
         bound: how much the feet, and no flight, say how high it is [N], from 0 to 1.
+        staying: a foot that stands throughout, or None.
     """
 
     root: Floats
@@ -71,6 +72,7 @@ class Carried(NamedTuple):
     holds: Floats
     heights: Floats
     bound: Floats
+    staying: int | None
 
 
 def carry(
@@ -156,7 +158,7 @@ def carry(
     detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
     falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
     start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
-    return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom)
+    return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom, staying)
 
 
 def _departures(

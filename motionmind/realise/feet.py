@@ -10,7 +10,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.footfalls import Stance
-from motionmind.realise.knees import bend_of, distance_of, keep_detail, slow_down, smoothed
+from motionmind.realise.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
 from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
@@ -21,13 +21,13 @@ FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of i
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
 SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
 RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
-LIFT = 0.09  # metres to which a step lifts a foot that the movement does not lift
+LIFT = 0.1  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
 KNEE = 8.0  # radians a second at which knees bend at most, where nothing is known of the corpus's
 FLICKS = 11.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
 QUICK = 1.2  # times as fast as all but a hundredth of the corpus's moments: as knees bend at most
 STEEP = 0.4, 0.7  # cosines of a leg's lean from which its foot is raised and lowered, not drawn along the leg
 GIVES = 0.15  # seconds over which the height of a body changes that gives way to a knee
-FAR = 0.15  # metres from its own track to which a foot must go to be lifted so far
+FAR = 0.4  # metres that a foot must go to be lifted so far
 
 
 class Foot(NamedTuple):
@@ -129,8 +129,8 @@ def departure(
     """Return a foot's displacement from the movement's own track [N, 3], metres: 0 in the first and the last frame.
 
     Where the foot stands it is what keeps it in its place, on the floor; between two places it is as smooth as can be,
-    and tends to 0. A foot that swings is kept above the floor. As far as it is taken elsewhere it is lifted, and then
-    moves level the less the lower it is.
+    and tends to 0. A foot that swings is kept above the floor, lifted the more the farther it goes, and moves level the
+    less the lower it is.
 
     Args:
         places: of the foot where it stands [N, 2], metres, level.
@@ -143,18 +143,22 @@ def departure(
     """
     count = len(places)
     wanted, stands, lift, slides = np.zeros((count, 3)), np.zeros(count), np.zeros(count), np.zeros(count - 1)
-    last = None
     for stance in stances:
         here = slice(stance.start, stance.end + 1)
         wanted[here, 0], wanted[here, 2] = (places[here] - track[here]).T
         wanted[here, 1] = _settled(height, stance, fps) - height[here]
         stands[here] = 1.0
-        if last is not None:
-            far = np.linalg.norm(places[stance.start] - places[last] - track[stance.start] + track[last])
-            rises = _lift(stance.start - last, float(far), leg, fps)
-            lift[last : stance.start + 1] = rises
-            slides[last : stance.start] = (1.0 - 0.5 * (rises[1:] + rises[:-1]) / max(rises.max(), 1e-9)) ** 2
-        last = stance.end
+    at = np.where(stands[:, None] > 0.0, places, track)
+    edges = [0, *(edge for stance in stances for edge in (stance.start, stance.end)), count - 1]
+    for last, first in zip(edges[::2], edges[1::2], strict=True):
+        # A foot that is given in the air steps, too, but for one that is given on its way.
+        on_its_way = (last == 0 and moving[0]) or (first == count - 1 and moving[1])
+        if first - last < 2 or on_its_way or not stances:
+            continue
+        rises = _lift(first - last, float(np.linalg.norm(at[first] - at[last])), leg, fps)
+        lift[last : first + 1] = rises
+        up = np.minimum(np.maximum(rises, height[last : first + 1]) / max(rises.max(), 1e-9), 1.0)
+        slides[last:first] = (1.0 - 0.5 * (up[1:] + up[:-1])) ** 2
     out = _bend(wanted, np.diff(track, axis=0), stands, slides, fps)
     free = stands == 0.0
     above = height + out[:, 1] - lift
@@ -183,7 +187,7 @@ def _lift(frames: int, far: float, leg: float, fps: float) -> Floats:
 
     Args:
         frames: that the step takes.
-        far: how far it takes the foot from the movement's own track, metres.
+        far: how far it takes the foot, metres.
         leg: length of the leg, metres.
         fps: frames a second.
     """
@@ -268,6 +272,7 @@ def ease_knees(
     bound: Floats,
     room: Floats,
     fine: bool,
+    staying: int | None,
     moving: tuple[bool, bool],
     fastest: Floats,
     fps: float,
@@ -286,6 +291,7 @@ def ease_knees(
         bound: how much the body's height may give way [N], from 0 to 1.
         room: how much lower than there each foot may be [N, feet], metres.
         fine: whether the movement has fine detail.
+        staying: a foot that stands throughout, or None: detail takes it off its place by millimetres alone.
         moving: whether the velocity is given in the first and in the last frame.
         fastest: speeds of the joints [J], rad/s, that knees keep to if they do so in the movement itself.
         fps: frames a second.
@@ -329,6 +335,9 @@ def ease_knees(
     firm, out = (_lengthened(aims, longer) for longer in (lengths, finer))
     # Detail that would take a foot into the floor is left out there: to lift the foot for a while would be seen.
     out[..., 1] = np.maximum(out[..., 1], np.minimum(firm[..., 1], lowest))
+    if staying is not None:
+        height = firm[:, staying, 1]
+        out[:, staying, 1] = height + SHIFTS * np.tanh((out[:, staying, 1] - height) / SHIFTS)
     return out - legs, shift
 
 

@@ -40,6 +40,7 @@ from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
 TALLER = 0.12  # metres above how walks stand at a given posture from which it may be in the air, though most stand
+LEAPS = 0.18  # the same, from which it is, whatever walks do: of a short jump a corpus may have no posture
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 
 
@@ -240,7 +241,18 @@ def _reach_floor(
     off = carried.off + missing[..., None] * np.array([0.0, 1.0, 0.0]) * fades[:, None, None]
     room = carried.heights - floor[:, None] + SINKS
     eased, shift = ease_knees(
-        skeleton, posed, feet, off, carried.holds, fades * carried.bound, room, fine, moving, fastest, fps
+        skeleton,
+        posed,
+        feet,
+        off,
+        carried.holds,
+        fades * carried.bound,
+        room,
+        fine,
+        carried.staying,
+        moving,
+        fastest,
+        fps,
     )
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
@@ -263,7 +275,7 @@ def _hovering(stance: Stance, ends: Floats) -> Bools:
     """Return whether the first and the last posture are in the air [2], from their lowest points' heights [2], metres.
 
     They are where most walks are in the air; and where some are, and it is as high as these above the floor under the
-    other end: in the crouch of a jump much of a corpus stands.
+    other end: in the crouch of a jump much of a corpus stands. And they are where they are higher than any step.
     """
     aloft, leaps, clearance = stance.aloft[[0, -1]], stance.leaps[[0, -1]], stance.clearance[[0, -1]]
     surely = aloft > SURELY
@@ -271,7 +283,7 @@ def _hovering(stance: Stance, ends: Floats) -> Bools:
     floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
     taller = ends - floor - standing
     as_high = (taller > TALLER) & (taller > np.abs(ends - floor - leaps))
-    return np.asarray(surely | ((aloft > EVER) & as_high))
+    return np.asarray(surely | ((aloft > EVER) & as_high) | (taller > LEAPS))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:

@@ -16,6 +16,7 @@ no walk is lost.
 from __future__ import annotations
 
 import heapq
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -76,32 +77,65 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         path: those that walks are to follow [K, J, 4], or None.
         steps: of a walk.
     """
-    part, shown = trees.parts[number], carriage.orientations
-    near, _ = find_near(trees, number, shown, ends, ENDS)
-    middle = ends[:0] if path is None else path
-    by_path, _ = find_near(trees, number, shown, middle, BY_PATH, PATH_LEAVES)
-    nodes = _cut(
-        np.ascontiguousarray(middle[:, part]),
-        trees.bounds,
-        trees.centres_of(number),
-        trees.radii[number],
-        trees.weights[number],
-    )
-    chain = carriage.begins, carriage.ends, len(shown) - len(carriage.turn)
-    runs = [follow(by_path.ravel(), True, 2, *chain)]
-    for end, ahead in zip(near, (True, False), strict=True):
-        runs += [follow(end, ahead, ALONG, *chain), follow(end[:NEAREST], ahead, steps // 2 + 1, *chain)]
+    near, *runs = _near_ends(carriage, number, ends.tobytes())
+    by_path = near[:, :0]
+    if path is None:
+        nodes = _evenly(trees, number)
+    else:
+        by_path, _ = find_near(trees, number, carriage.orientations, path, BY_PATH, PATH_LEAVES)
+        nodes = _nodes(trees, number, path)
+    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
+    runs.append(follow(by_path.ravel(), True, 2, *chain))
+    runs += [follow(end[:NEAREST], on, steps // 2 + 1, *chain) for end, on in zip(near, (True, False), strict=True)]
     order, ranks, bounds = trees.order[number], trees.ranks[number], trees.bounds[nodes]
-    singles = np.unique(np.concatenate([near.ravel(), by_path.ravel()]))
-    moments = np.unique(np.concatenate([singles, *runs, order[bounds.sum(axis=1) // 2]]))
+    singles = _rising(np.concatenate([near.ravel(), by_path.ravel()]))
+    moments = _rising(np.concatenate([singles, *runs, order[bounds.sum(axis=1) // 2]]))
     starts = np.ascontiguousarray(bounds[:, 0])
     weights, stands = _shares(moments, singles, starts, trees.weights[number][nodes], ranks, carriage.weights)
     begins, leads, numbers = steps_at(moments, True, *chain)
     goals = _goals(moments, leads, starts, stands, ranks)
-    _, clusters = np.unique(carriage.clusters[moments, number], return_inverse=True)
-    first, last = (np.isin(moments, end) for end in near)
-    of_steps = np.asarray(carriage.shares[numbers])
-    return Chosen(moments, weights, begins, goals, of_steps, clusters.reshape(-1).astype(np.int32), (first, last))
+    clusters = _numbered(carriage.clusters[moments, number])
+    of_ends = np.zeros((2, len(moments)), dtype=np.bool_)
+    for one, end in zip(of_ends, near, strict=True):
+        one[np.searchsorted(moments, end)] = True
+    return Chosen(
+        moments, weights, begins, goals, np.asarray(carriage.shares[numbers]), clusters, (of_ends[0], of_ends[1])
+    )
+
+
+@lru_cache(maxsize=18)  # of all parts; the guide of a search and its motion ask for the same
+def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
+    """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
+    the last, some steps on; `ends` are the bytes of those of `choose`."""
+    assert carriage.trees is not None
+    postures = np.frombuffer(ends).reshape(2, -1, 4)
+    near, _ = find_near(carriage.trees, number, carriage.orientations, postures, ENDS)
+    chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
+    return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
+
+
+@lru_cache(maxsize=9)
+def _evenly(trees: Neighbours, number: int) -> Ints:
+    """Return the balls that a part's tree is cut into where there is no path to follow."""
+    return _nodes(trees, number, np.empty((0, max(int(part.max()) for part in trees.parts) + 1, 4)))
+
+
+def _nodes(trees: Neighbours, number: int, path: Floats) -> Ints:
+    own = np.ascontiguousarray(path[:, trees.parts[number]])
+    return _cut(own, trees.bounds, trees.centres_of(number), trees.radii[number], trees.weights[number])
+
+
+def _rising(numbers: Ints) -> Ints:
+    """Return numbers without repetition, rising: `np.unique` of so few takes twice as long."""
+    numbers = np.sort(numbers)
+    return np.asarray(numbers[np.append(True, numbers[1:] != numbers[:-1])])
+
+
+def _numbered(clusters: Int32s) -> Int32s:
+    """Return clusters by numbers that rise as theirs do, from 0 and without gaps."""
+    seen = np.zeros(int(clusters.max()) + 1, dtype=np.int32)
+    seen[clusters] = 1
+    return np.asarray(np.cumsum(seen, dtype=np.int32)[clusters] - 1, dtype=np.int32)
 
 
 @jit

@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
-from motionmind.realise.feet import LIFT
+from motionmind.realise.feet import LIFT, departure
 from motionmind.realise.flight import PUSHES, Flight, find_flights, flying_frames
 from motionmind.realise.footfalls import (
     BRIEF,
@@ -34,6 +34,7 @@ from motionmind.realise.footfalls import (
     find_stances,
     standing_costs,
 )
+from motionmind.realise.footfalls import Stance as StandingFoot
 from motionmind.realise.ground import Stance, set_on_floor
 from motionmind.realise.least_squares import difference_rows, position_rows, solve
 from motionmind.realise.legs import find_legs, reach
@@ -144,6 +145,19 @@ def test_quick_steps_leave_the_floor_before_they_go_far() -> None:
     assert skating(human23(), *grounded(q, root)) < 0.25
 
 
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_foot_that_is_given_in_the_air_steps_from_there(moving: bool) -> None:
+    """But for one that is given on its way: that goes on as it comes."""
+    frames, lands = 31, 14
+    track = np.stack([np.interp(np.arange(frames), [0.0, lands], [0.0, 0.8]), np.zeros(frames)], axis=1)
+    height = np.interp(np.arange(frames), [0.0, lands], [0.03, 0.0])
+    stance = StandingFoot(lands, frames - 1, track[-1], np.zeros(2))
+    off = departure(track, track, height, [stance], 0.85, 30.0, (moving, False))
+    high = (height + off[:, 1])[3 : lands - 3]
+    assert np.all(high > 0.05) != moving
+    np.testing.assert_array_equal(off[[0, -1]], 0.0)
+
+
 def test_a_leg_that_must_not_change_does_not() -> None:
     q, root = sway()
     fixed = TIGHT.copy()
@@ -168,6 +182,28 @@ def test_the_only_foot_that_stands_at_both_ends_stays_there(seed: int) -> None:
     heights = limb_heights(human23(), found, went)[:, 1]
     assert heights.max() < 0.02
     assert np.linalg.norm(ends - ends[0], axis=-1).min(axis=1).max() < 0.03
+
+
+@pytest.mark.parametrize("joint", ["right_ankle", "right_hip"])
+def test_fine_detail_takes_the_foot_that_stays_off_the_floor_by_millimetres(joint: str) -> None:
+    frames = 46
+    bends = {"right_hip": (-20.0, 0.0, 0.0), "right_knee": (37.0, 0.0, 0.0), "right_ankle": (-17.0, 0.0, 0.0)}
+    q = posed(bends | {"left_hip": (-80.0, 0.0, 0.0), "left_knee": (80.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    wavers = rot.mul(q, detail(frames, 0.2, [human23().index(joint)]))
+    assert limb_heights(human23(), *grounded(wavers, root, plain=q))[:, 1].max() < 0.01
+
+
+@pytest.mark.parametrize("turn", [-1.8, 0.9, 1.8])
+def test_a_foot_that_turns_on_the_spot_stays_there(turn: float) -> None:
+    """About its heel, its toes go a foot's length, which is no step."""
+    frames = 46
+    q = on_one_leg(frames)
+    turns = rot.about_vertical(np.linspace(0.0, turn, frames))
+    q[:, 0] = rot.mul(turns, q[:, 0])
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    root -= human23().positions(q, root)[:, [human23().index("right_ankle")]][:, 0] * np.array([1.0, 0.0, 1.0])
+    assert limb_heights(human23(), *grounded(q, root))[:, 1].max() < 0.01
 
 
 # --- steps ------------------------------------------------------------------------------------------------------------
@@ -377,6 +413,17 @@ def test_an_end_as_high_as_some_jump_is_in_the_air_though_most_stand_so(high: fl
     frames = 61
     q, root, aloft = into_the_air(frames, high)
     found, went = grounded(q, root, aloft=share * aloft, leap=0.3)
+    heights = lowest_height(human23(), found, went)
+    flying = np.flatnonzero(heights > 0.03)
+    assert heights[: frames // 2].max() < 0.01
+    np.testing.assert_allclose(fall(found, went, slice(flying[0] + 1, None)), -GRAVITY, rtol=0.15)
+
+
+def test_an_end_higher_than_any_step_is_in_the_air_though_no_walk_is() -> None:
+    """The postures of a corpus may lie on both sides of a short jump."""
+    frames = 61
+    q, root, aloft = into_the_air(frames, 0.25)
+    found, went = grounded(q, root, aloft=0.0 * aloft)
     heights = lowest_height(human23(), found, went)
     flying = np.flatnonzero(heights > 0.03)
     assert heights[: frames // 2].max() < 0.01
