@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
@@ -42,7 +42,9 @@ def main() -> None:
     if options.part:
         {"build": build, "ask": ask}[options.part](options)
         return
-    print("times postures | load ms  MB more | first ms  median    95th | guide+search  realise", flush=True)
+    print(
+        "times postures | load ms  MB more | first ms  median    95th | guide+search  realise | processor", flush=True
+    )
     with tempfile.TemporaryDirectory() as scratch:
         home = options.keep or Path(scratch)
         for times in options.times:
@@ -95,18 +97,19 @@ def ask(options: argparse.Namespace) -> None:
     engine = Engine.load(name_of(times), options.keep)
     loaded, more = perf_counter() - began, resident() - before
     drawn = np.random.default_rng(options.seed).integers(len(engine.corpus), size=(options.pairs + 1, 2))
-    seconds, parts = [], []
+    seconds, used, parts = [], [], []
     for a, b in drawn:
-        began = perf_counter()
+        began, before = perf_counter(), process_time()
         tween = engine.tween(posture(engine, a), posture(engine, b))
         seconds.append(perf_counter() - began)
+        used.append(process_time() - before)
         spent = tween.seconds
         parts.append((spent["problem"] + spent["bound"] + spent["search"], spent["realise"]))
     ms = 1e3 * np.array(seconds)
     searching, realising = 1e3 * np.median(parts[1:], axis=0)
     print(
         f"{times:5} {len(engine.corpus):8} | {1e3 * loaded:7.1f} {more:8.1f} | {ms[0]:8.0f} {np.median(ms[1:]):7.1f} "
-        f"{np.percentile(ms[1:], 95):7.1f} | {searching:12.1f} {realising:8.1f}",
+        f"{np.percentile(ms[1:], 95):7.1f} | {searching:12.1f} {realising:8.1f} | {1e3 * np.median(used[1:]):9.1f}",
         flush=True,
     )
 

@@ -29,7 +29,7 @@ import numpy as np
 from motionmind._typing import Floats
 from motionmind.arguments import check_path, check_type
 from motionmind.body.human import BODIES
-from motionmind.corpus.bundled import bundled
+from motionmind.bundled import bundled
 from motionmind.discretize.protocol import joints_meant, nameable
 from motionmind.discretize.turns import format_turns, parse_turns
 from motionmind.errors import FormatError, did_you_mean, suggestion

@@ -74,6 +74,7 @@ class MarksSchema(msgspec.Struct, omit_defaults=True):
 
     insertions: list[InsertionSchema] = []
     keyframed: bool = False
+    recorded: list[Credit] = []
     tips: dict[str, Vector] = {}
 
 

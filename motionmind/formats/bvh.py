@@ -31,6 +31,8 @@ from motionmind.geometry import rotations as rot
 _FRAMES = re.compile(r"\s*Frames\s*:?\s*(\S*)\s*", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"\s*Frame\s*Time\s*:?\s*(\S*)\s*", re.IGNORECASE)
 
+_MANY = 10_000  # numbers that compiled code reads, if all are plain
+
 _log = logging.getLogger(__name__)
 
 
@@ -147,6 +149,12 @@ def _read_frames(lines: list[str], first: int, channels: int, declared: int, pat
     rows = [(n, line) for n, line in enumerate(lines[first:], start=first + 1) if line.strip() and not is_comment(line)]
     if not rows:
         raise FormatError("no frames after the header", path=path, line=len(lines))
+    if len(rows) * channels >= _MANY:
+        from motionmind.formats._numbers import read_plain  # numba is slow to import
+
+        plain = read_plain([line for _, line in rows], channels)
+        if plain is not None and np.all(np.abs(plain) <= LARGEST):
+            return plain
     try:
         frames = np.loadtxt([line for _, line in rows], dtype=np.float64, comments=None, ndmin=2)
     except ValueError:  # a word that is not a number, or lines of different lengths

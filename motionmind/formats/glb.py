@@ -13,9 +13,9 @@ The layout makes programs recognise an armature:
 - A mesh on that skin (`_glb_body`): an unused skin is a fault, and an animation without a skin is not an armature.
 - One animation that rotates all joints and moves the root. A single frame has no animation; its nodes stand in the
   posture instead, where programs show it without playing anything. The skin still holds the rest pose.
-- What glTF has no place for (the stretches that the engine made, whether frames are keyframes, far ends of bones) is
-  text in the root joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and writes it
-  again if asked to.
+- What glTF has no place for (the stretches that the engine made, credits, whether frames are keyframes, far ends of
+  bones) is text in the root joint's `extras` (3.12): Blender keeps it there, as a custom property of the bone, and
+  writes it again if asked to.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _marks(motion: Motion) -> str:
     insertions = [insertion_schema(one, float(motion.times[0])) for one in motion.insertions]
     body = motion.skeleton
     tips = {name: rounded(tip).tolist() for name, tip in zip(body.names, body.tips, strict=True) if tip.any()}
-    return msgspec.json.encode(MarksSchema(insertions, motion.keyframed, tips)).decode()
+    return msgspec.json.encode(MarksSchema(insertions, motion.keyframed, list(motion.recorded), tips)).decode()
 
 
 class GlbBuffer:

@@ -152,6 +152,7 @@ def _read(gltf: Gltf, scale: float) -> Motion:
             one.renamed({name: name for name in body.names}) for one in map(_json.to_insertion, marks.insertions)
         ),
         keyframed=marks.keyframed,
+        recorded=tuple(marks.recorded),
     )
 
 

@@ -23,7 +23,8 @@ joints' moves that no corpus attests (bridges):
 
     "insertions": [{"times": [0.0, 0.4, 0.8], "bridged": [["left_hip", 1]]}],
 
-`"keyframed": true` says that each frame is a posture that someone chose, as in a score.
+`"keyframed": true` says that each frame is a posture that someone chose, as in a score. `recorded` holds the credits of
+what the engine did not insert, where they are known.
 
 A variation's file is its current movement with one more field, `variation`, which holds the rest
 (`motionmind.variation.variation_json`).
@@ -39,6 +40,7 @@ import numpy as np
 
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.credits.credit import Credit
 from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, read_bytes, write_atomically
 from motionmind.formats import _json
@@ -54,6 +56,7 @@ class FramesSchema(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     name: str = ""
     insertions: list[InsertionSchema] = []
     keyframed: bool = False
+    recorded: list[Credit] = []
 
 
 class MotionSchema(FramesSchema, forbid_unknown_fields=True, kw_only=True):
@@ -133,7 +136,8 @@ def motion_of(schema: FramesSchema, skeleton: Skeleton, path: FilePath, *, mend:
         rotations = _json.unit_rotations(rotations, skeleton.names, path)
     try:
         insertions = tuple(_json.to_insertion(one) for one in schema.insertions)
-        return Motion(skeleton, rotations, root, times, schema.name, insertions, schema.keyframed)
+        recorded = tuple(schema.recorded)
+        return Motion(skeleton, rotations, root, times, schema.name, insertions, schema.keyframed, recorded)
     except FormatError:
         raise
     except MotionMindError as error:
@@ -180,6 +184,8 @@ def write_motion_json(path: FilePath, motion: Motion, more: Mapping[str, bytes] 
     if motion.insertions:
         insertions = [_json.insertion_schema(one) for one in motion.insertions]
         fields.append(f'"insertions": {msgspec.json.encode(insertions).decode()}')
+    if motion.recorded:
+        fields.append(f'"recorded": {msgspec.json.encode(motion.recorded).decode()}')
     for what, array in (("root", motion.root), ("rotations", motion.rotations)):
         rows = ",\n".join(_compact(row.tolist()) for row in _json.rounded(array))  # all at once would fill the memory
         fields.append(f'"{what}": [\n{rows}\n]')

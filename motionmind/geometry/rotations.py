@@ -20,10 +20,14 @@ from motionmind._typing import Floats
 
 IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.setflags(write=False)
+_MANY = 2048  # items from which compiled code (`many`) does the same arithmetic; it takes as long to load as it saves
+_LEAST = 1e-12  # longer is what can be made a rotation
 
 
 def mul(a: Floats, b: Floats) -> Floats:
     """Return the product [..., 4]: the rotation `b` followed by the rotation `a`."""
+    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
+        return _product(a, b)
     ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     x = aw * bx + ax * bw + ay * bz - az * by
@@ -35,6 +39,31 @@ def mul(a: Floats, b: Floats) -> Floats:
     return out
 
 
+def _product(a: Floats, b: Floats, of_a: float = 1.0, of_b: float = 1.0) -> Floats:
+    """Return the product [..., 4] of many rotations whose vector parts are of these signs: -1 inverts."""
+    from motionmind.geometry import many  # numba is slow to import
+
+    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    out = np.empty((*shape, 4))
+    many.multiply(_rows(a, shape), _rows(b, shape), of_a, of_b, out.reshape(-1, 4))
+    return out
+
+
+def _rows(x: Floats, shape: tuple[int, ...] | None = None) -> Floats:
+    """Return the rows of `x` [..., n] as compiled code takes them, in an array [N, n] that may be written to.
+
+    Those of a result of this shape may repeat them.
+    """
+    if shape is not None:
+        own = x.shape[:-1]
+        while own and own[0] == 1:
+            own = own[1:]
+        if own != shape[len(shape) - len(own) :]:
+            x = np.broadcast_to(x, (*shape, x.shape[-1]))
+    x = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
+    return x if x.flags.writeable else x.copy()
+
+
 def inv(q: Floats) -> Floats:
     """Return the inverse rotation [..., 4] of a unit quaternion [..., 4]."""
     return np.asarray(q * np.array([-1.0, -1.0, -1.0, 1.0]))
@@ -42,16 +71,27 @@ def inv(q: Floats) -> Floats:
 
 def inv_mul(a: Floats, b: Floats) -> Floats:
     """Return `inv(a) * b` [..., 4]: the rotation from `a` to `b`, in the frame of `a`."""
+    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
+        return _product(a, b, of_a=-1.0)
     return mul(inv(a), b)
 
 
 def mul_inv(a: Floats, b: Floats) -> Floats:
     """Return `a * inv(b)` [..., 4]: the rotation from `b` to `a`, in the outer frame."""
+    if a.size >= 4 * _MANY or b.size >= 4 * _MANY:
+        return _product(a, b, of_b=-1.0)
     return mul(a, inv(b))
 
 
 def mul_vec(q: Floats, v: Floats) -> Floats:
     """Return the vectors `v` [..., 3] turned by `q` [..., 4]."""
+    if q.size >= 4 * _MANY or v.size >= 3 * _MANY:
+        from motionmind.geometry import many
+
+        shape = np.broadcast_shapes(q.shape[:-1], v.shape[:-1])
+        out = np.empty((*shape, 3))
+        many.turn(_rows(q, shape), _rows(v, shape), out.reshape(-1, 3))
+        return out
     # v + w t + u x t with t = 2 (u x v) and u the vector part: cheaper than two products of quaternions.
     u, w = q[..., :3], q[..., 3:]
     t = 2.0 * cross(u, v)
@@ -60,6 +100,12 @@ def mul_vec(q: Floats, v: Floats) -> Floats:
 
 def norm(v: Floats) -> Floats:
     """Return the lengths [...] of vectors [..., n]; np.linalg.norm takes several times as long on short vectors."""
+    if v.size >= v.shape[-1] * _MANY:
+        from motionmind.geometry import many
+
+        lengths = np.empty(v.shape[:-1])
+        many.measure(_rows(v), lengths.reshape(-1))
+        return lengths
     squares = v[..., 0] ** 2
     for i in range(1, v.shape[-1]):
         squares = squares + v[..., i] ** 2
@@ -85,10 +131,18 @@ def normalise(q: ArrayLike) -> Floats:
         ValueError: a quaternion is zero.
     """
     q = np.asarray(q, dtype=np.float64)
-    length = norm(q)[..., None]
-    if not np.all(length > 1e-12):
+    length = norm(q)
+    if q.size >= 4 * _MANY:
+        from motionmind.geometry import many
+
+        out = q.copy()
+        is_rotation = many.divide(out.reshape(-1, 4), length.reshape(-1), _LEAST)
+    else:
+        is_rotation = bool(np.all(length > _LEAST))
+        out = np.asarray(q / length[..., None] if is_rotation else q, dtype=np.float64)
+    if not is_rotation:
         raise ValueError("a quaternion of length zero is no rotation")
-    return np.asarray(q / length, dtype=np.float64)
+    return out
 
 
 def canonical(q: Floats) -> Floats:
@@ -106,24 +160,47 @@ def angle(a: Floats, b: Floats) -> Floats:
     0.3
     """
     # atan2 of the relative rotation's vector and scalar parts; acos of the dot product would lose half the digits.
-    r = inv_mul(a, b)
-    return np.asarray(2.0 * np.arctan2(norm(r[..., :3]), np.abs(r[..., 3])))
+    return np.asarray(2.0 * np.arctan2(*_sides(inv_mul(a, b))))
+
+
+def _sides(q: Floats) -> tuple[Floats, Floats]:
+    """Return the sine and the cosine [...] of half the angle of `q` [..., 4], both at least 0."""
+    if q.size < 4 * _MANY:
+        return norm(q[..., :3]), np.abs(q[..., 3])
+    from motionmind.geometry import many
+
+    sines, cosines = np.empty((2, *q.shape[:-1]))
+    many.sides(_rows(q), sines.reshape(-1), cosines.reshape(-1))
+    return sines, cosines
 
 
 def exp(v: Floats) -> Floats:
     """Return the quaternion [..., 4] of the rotation vector `v` [..., 3]: axis times angle, radians."""
-    theta = norm(v)[..., None]
+    theta = norm(v)
     # sin(theta/2)/theta, by numpy's sin(pi x)/(pi x) with x = theta / 2 pi: exact at 0.
-    return np.concatenate([v * 0.5 * np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)], axis=-1)
+    share, cosine = np.sinc(theta / (2.0 * np.pi)), np.cos(0.5 * theta)
+    if theta.size < _MANY:
+        return np.concatenate([v * 0.5 * share[..., None], cosine[..., None]], axis=-1)
+    from motionmind.geometry import many
+
+    out = np.empty((*theta.shape, 4))
+    many.quaternions(_rows(v), share.reshape(-1), cosine.reshape(-1), out.reshape(-1, 4))
+    return out
 
 
 def log(q: Floats) -> Floats:
     """Return the rotation vector [..., 3] of `q` [..., 4], radians, of length at most pi: the inverse of `exp`."""
-    s, w = norm(q[..., :3]), q[..., 3]
-    theta = 2.0 * np.arctan2(s, np.abs(w))
+    s, cosine = _sides(q)
+    theta = np.asarray(2.0 * np.arctan2(s, cosine))
+    if theta.size >= _MANY:
+        from motionmind.geometry import many
+
+        out = np.empty((*theta.shape, 3))
+        many.vectors(_rows(q), s.reshape(-1), theta.reshape(-1), out.reshape(-1, 3))
+        return out
     # theta / s tends to 2 as s does to 0: theta = 2 asin(s) = 2 s + s^3/3 + ...
     scale = np.where(s > 1e-8, theta / np.where(s > 1e-8, s, 1.0), 2.0)
-    return np.asarray(q[..., :3] * np.where(w < 0.0, -scale, scale)[..., None])
+    return np.asarray(q[..., :3] * np.where(q[..., 3] < 0.0, -scale, scale)[..., None])
 
 
 def from_axis_angle(axis: ArrayLike, theta: ArrayLike) -> Floats:
@@ -146,8 +223,14 @@ def from_euler(order: str, angles: Floats) -> Floats:
     >>> from_euler("ZY", np.array([0.0, np.pi])).round(6).tolist()
     [0.0, 1.0, 0.0, 0.0]
     """
-    axes = np.eye(3)
-    turns = [from_axis_angle(axes["xyz".index(letter)], angles[..., i]) for i, letter in enumerate(order.lower())]
+    axes = np.array([np.eye(3)["xyz".index(letter)] for letter in order.lower()])
+    if len(axes) and angles.size >= len(axes) * _MANY:
+        from motionmind.geometry import many
+
+        half, out = 0.5 * angles, np.empty((*angles.shape[:-1], 4))
+        many.turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
+        return out
+    turns = [from_axis_angle(axis, angles[..., i]) for i, axis in enumerate(axes)]
     return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
 
 
@@ -182,7 +265,13 @@ def to_euler(order: str, q: Floats) -> Floats:
 
 def to_matrix(q: Floats) -> Floats:
     """Return rotation matrices [..., 3, 3] of `q` [..., 4]; their columns are the images of x, y and z."""
-    return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
+    if q.size < 4 * _MANY:
+        return np.stack([mul_vec(q, np.broadcast_to(e, (*q.shape[:-1], 3))) for e in np.eye(3)], axis=-1)
+    from motionmind.geometry import many
+
+    out = np.empty((*q.shape[:-1], 3, 3))
+    many.matrices(_rows(q), out.reshape(-1, 3, 3))
+    return out
 
 
 def from_matrix(m: Floats) -> Floats:

@@ -15,6 +15,7 @@ from motionmind.geometry import rotations as rot
 
 _LONG = 64  # knots; a longer curve is computed in pieces, each with a margin of knots on either side
 _PIECE, _MARGIN = 32, 14  # a knot's influence falls to about a quarter with each further knot: 1e-8 of it is lost
+_MANY = 6144  # values from which compiled code does the same arithmetic
 
 
 def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
@@ -35,8 +36,8 @@ def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
         return np.broadcast_to(values[0], (len(at), *values.shape[1:])).copy()
     if len(times) > _LONG:
         return _by_pieces(natural_spline, times, values, at)
-    piece, bends = _pieces(times, at), _bends(times, values)
-    return _cubic(times, piece, at, values[piece], values[piece + 1], bends[piece], bends[piece + 1])
+    piece = _pieces(times, at)
+    return _cubic(times, piece, at, values, _bends(times, values), piece)
 
 
 def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
@@ -70,14 +71,13 @@ def rotation_spline(times: Floats, keys: Floats, at: Floats) -> Floats:
     vectors = vectors_around(np.array(keys, dtype=np.float64).reshape(len(keys), -1, 4), centres)
     # In each chart only the centre and its neighbours count: values and bends [C, 3, ..., 3].
     charts, near = np.arange(len(centres))[:, None], np.clip(centres[:, None] + [-1, 0, 1], 0, len(keys) - 1)
-    shape = (len(centres), 3, *keys.shape[1:-1], 3)
+    shape = (3 * len(centres), *keys.shape[1:-1], 3)
     values = vectors[charts, near].reshape(shape)
     bends = (_bends(times, np.eye(len(keys)))[near] @ vectors.reshape(len(centres), len(keys), -1)).reshape(shape)
 
     def around(key: Ints) -> Floats:
-        chart, left = np.searchsorted(centres, key), piece - key + 1
-        ends = values[chart, left], values[chart, left + 1], bends[chart, left], bends[chart, left + 1]
-        return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, *ends)))
+        first = 3 * np.searchsorted(centres, key) + piece - key + 1
+        return rot.mul(keys[key], rot.exp(_cubic(times, piece, at, values, bends, first)))
 
     s = ((at - times[piece]) / np.diff(times)[piece]).reshape(-1, *(1,) * (keys.ndim - 2))
     return rot.slerp(around(piece), around(piece + 1), s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
@@ -115,14 +115,28 @@ def _bends(times: Floats, values: Floats) -> Floats:
     return bends
 
 
-def _cubic(
-    times: Floats, piece: Ints, at: Floats, left: Floats, right: Floats, left_bend: Floats, right_bend: Floats
-) -> Floats:
-    """Return values [N, ...] on pieces whose end knots have these values and second derivatives [N, ...]."""
-    column = (-1, *(1,) * (left.ndim - 1))
-    after, before = (times[piece + 1] - at).reshape(column), (at - times[piece]).reshape(column)
+def _cubic(times: Floats, piece: Ints, at: Floats, values: Floats, bends: Floats, first: Ints) -> Floats:
+    """Return values [N, ...] of cubic pieces.
+
+    Args:
+        times: of the knots [K].
+        piece: the knot that begins each moment's piece [N].
+        at: the moments [N].
+        values: at the ends of pieces [R, ...].
+        bends: second derivatives there [R, ...].
+        first: the row of them that begins each moment's piece [N]; the next one ends it.
+    """
+    after, before = times[piece + 1] - at, at - times[piece]
     step = after + before
     # On each piece: the straight line, plus the contribution of both bends, which is 0 at its knots.
-    line = (left * after + right * before) / step
-    bent = left_bend * (after**3 / step - step * after) + right_bend * (before**3 / step - step * before)
-    return np.asarray(line + bent / 6.0)
+    weights = after, before, step, after**3 / step - step * after, before**3 / step - step * before
+    if values[:1].size * len(at) >= _MANY:
+        from motionmind.geometry import many  # numba is slow to import
+
+        out = np.empty((len(at), *values.shape[1:]))
+        ends, bent = (np.array(own, dtype=np.float64).reshape(len(own), -1) for own in (values, bends))
+        many.cubics(ends, bent, first, np.stack(weights, axis=-1), out.reshape(len(at), -1))
+        return out
+    a, b, c, d, e = (weight.reshape(-1, *(1,) * (values.ndim - 1)) for weight in weights)
+    line = (values[first] * a + values[first + 1] * b) / c
+    return np.asarray(line + (bends[first] * d + bends[first + 1] * e) / 6.0)

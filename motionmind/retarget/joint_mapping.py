@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 from motionmind.arguments import check_path
@@ -25,6 +26,7 @@ _ESSENTIAL = (
     ("lumbar", "thorax"),
     ("cervical", "atlantal"),
 )
+_TREES = 64  # that are known again
 
 
 def joint_mapping(skeleton: Skeleton, joints: Mapping[str, str] | None = None) -> dict[str, str] | None:
@@ -109,7 +111,14 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
         The first of `RIGS` of which the skeleton has all essential joints, and its mapping {file's joint: human23's
         joint} in the skeleton's order; None if there is none.
     """
-    plain = plain_names(skeleton.names)
+    known = _known_tree(skeleton.names, skeleton.parents)
+    return known and (known[0], dict(known[1]))
+
+
+@lru_cache(_TREES)
+def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, dict[str, str]] | None:
+    """Recognise a rig as `known_rig`, of joints with these parents; all files of a collection have the same."""
+    plain = plain_names(names)
     for rig in RIGS:
         spine = spine_shares([name for name in rig.spine if name in plain])
         table = dict(rig.joints) | spine
@@ -118,10 +127,10 @@ def known_rig(skeleton: Skeleton) -> tuple[Rig, dict[str, str]] | None:
         mapping: dict[int, str] = {}
         for _, i in found:  # in the table's order: of two joints not in a row the first counts
             target = table[plain[i]]
-            if all(in_a_row(skeleton, i, other) for other, taken in mapping.items() if taken == target):
+            if all(_descends(parents, i, other) for other, taken in mapping.items() if taken == target):
                 mapping[i] = target
         if rig.marks <= set(plain) and not _missing(mapping.values()):
-            return rig, {skeleton.names[i]: mapping[i] for i in sorted(mapping)}
+            return rig, {names[i]: mapping[i] for i in sorted(mapping)}
     return None
 
 
@@ -158,9 +167,13 @@ def _missing(targets: Iterable[str]) -> list[str]:
 
 def in_a_row(skeleton: Skeleton, a: int, b: int) -> bool:
     """Return whether one of the joints `a` and `b` (indices) is the other or descends from it."""
+    return _descends(skeleton.parents, a, b)
+
+
+def _descends(parents: Sequence[int], a: int, b: int) -> bool:
     low, high = max(a, b), min(a, b)
     while low > high:
-        low = skeleton.parents[low]
+        low = parents[low]
     return low == high
 
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionmind.body.human import human23
-from motionmind.corpus.bundled import bundled
+from motionmind.bundled import bundled
 from motionmind.discretize import (
     Codebook,
     Discretization,
@@ -548,8 +548,8 @@ class TestBundled:
 
     def test_a_wheel_carries_them_inside(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / "motionmind").mkdir()
-        there = tmp_path / "motionmind" / "corpus" / "bundled.py"
-        monkeypatch.setattr("motionmind.corpus.bundled.__file__", str(there))
+        there = tmp_path / "motionmind" / "bundled.py"
+        monkeypatch.setattr("motionmind.bundled.__file__", str(there))
         with pytest.raises(CorpusError, match="missing"):
             bundled("corpora")
         (tmp_path / "corpora").mkdir()
