@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -136,6 +137,7 @@ class Motion:
         insertions: the stretches that the engine made, in order of time; empty for movement that is all recorded.
         keyframed: whether each frame is a posture that someone chose, as in a score; False for frames of a recording,
             and for movement between keyframes.
+        recorded: credits of what the engine did not make, in shares that add up to 1; empty if only its name is known.
 
     >>> import numpy as np
     >>> from motionmind import Motion, Posture, human23
@@ -153,12 +155,15 @@ class Motion:
     name: str = ""
     insertions: tuple[Insertion, ...] = ()
     keyframed: bool = False
+    recorded: tuple[Credit, ...] = ()
 
     def __post_init__(self) -> None:
         check_type("skeleton", self.skeleton, Skeleton)
         check_text("name", self.name)
         check_items("insertions", self.insertions, "insertions", Insertion)
         check_flag("keyframed", self.keyframed)
+        check_items("recorded", self.recorded, "credits", Credit)
+        check_shares(self.recorded)
         times = as_floats("times", self.times)
         if times.ndim != 1 or len(times) == 0:
             raise MotionMindError(f"{self.name or 'motion'}: no frames")
@@ -232,25 +237,28 @@ class Motion:
 
     @property
     def credits(self) -> tuple[Credit, ...]:
-        """Shares of time by clip: insertions by their credits, and all else as given movement of this name.
+        """Shares of time by clip: insertions by their credits, and all else by `own_credits`.
 
         It is empty for a posture that the engine came back to without moving.
         """
         start, end = float(self.times[0]), float(self.times[-1])
         if start == end:
-            return () if self.insertions else (self._given(1.0),)
+            return () if self.insertions else self.own_credits
         shares, rest = [], end - start
         for one in self.insertions:
             seconds = float(min(one.times[-1], end) - max(one.times[0], start))
             if seconds > _MOMENT:
                 rest -= seconds
                 shares += [replace(credit, share=credit.share * seconds) for credit in one.credits or (Credit(1.0),)]
-        return add_up([*shares, self._given(rest if rest > _MOMENT else 0.0)])
-
-    def _given(self, share: float) -> Credit:
-        return Credit(share, self.name or "movement")
+        rest = rest if rest > _MOMENT else 0.0
+        return add_up([*shares, *(replace(credit, share=credit.share * rest) for credit in self.own_credits)])
 
     @property
+    def own_credits(self) -> tuple[Credit, ...]:
+        """Shares of what the engine did not make: `recorded`, or given movement of this name."""
+        return self.recorded or (Credit(1.0, self.name or "movement"),)
+
+    @cached_property
     def fps(self) -> float:
         """Frames per second, from the median step; 0 for a single frame."""
         return 0.0 if len(self) < 2 else float(1.0 / np.median(np.diff(self.times)))

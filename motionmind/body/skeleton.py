@@ -117,6 +117,8 @@ class Skeleton:
         Proportions do not count: orientations mean the same on a taller body.
         """
         check_type("other", other, Skeleton)
+        if (self.names, self.parents) == (other.names, other.parents):
+            return None
         mine, theirs = self._parent_names(), other._parent_names()
         missing = [name for name in mine if name not in theirs]
         extra = [name for name in theirs if name not in mine]

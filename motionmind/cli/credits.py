@@ -13,9 +13,7 @@ from motionmind.cli.options import HOME, JSON, command
 from motionmind.cli.sources import parse_movement, read_movement
 
 if TYPE_CHECKING:
-    from motionmind.credits.credit import Credit
     from motionmind.credits.ledger import Ledger
-    from motionmind.names.spelling import Source
 
 
 @command("motionmind credits tween.json")
@@ -25,8 +23,9 @@ if TYPE_CHECKING:
 def credits(source: str, as_json: bool, home: Path | None) -> None:  # noqa: A001 (the command's name)
     """Say whose movement a movement is made of: shares by performer, licence, corpus and clip.
 
-    SOURCE is a tween, a variation or any other movement that the engine had a part in, as .json or .glb, or the report
-    of one. Shares are of time, over all joints. What no clip attests is the engine's.
+    SOURCE is a tween, a variation or any other movement that the engine had a part in, or that was taken from a corpus,
+    as .json or .glb, or the report of one; or a clip of a corpus. Shares are of time, over all joints. What no clip
+    attests is the engine's.
     """
     import msgspec
 
@@ -47,15 +46,5 @@ def _ledger(source: str, home: Path | None) -> Ledger:
     named = parse_movement(source, home)
     if named.source.kind == "file" and (ledger := read_ledger(Path(named.source.place))) is not None:
         return ledger
-    if named.source.kind == "corpus" and named.source.name and (credit := _of_clip(named.source, home)) is not None:
-        return ledger_of([credit])
     reading = {"unit": None, "asf": None, "source_fps": None}
     return ledger_of(read_movement(named.source, None, home, raw=True, **reading).credits)
-
-
-def _of_clip(source: Source, home: Path | None) -> Credit | None:
-    """Return the credit of a clip of a corpus; None where it has no such clip."""
-    from motionmind.learned import persistence
-
-    corpus = persistence.load(source.place, home).corpus
-    return next((corpus.credit_of(clip) for clip in corpus.clips if clip.label == source.name), None)

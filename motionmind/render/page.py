@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import html
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from itertools import product
@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from motionmind._typing import Floats
 from motionmind.body.motion import Motion
-from motionmind.credits.credit import Credit
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.display import displayed
 from motionmind.files import FilePath, write_atomically
@@ -43,18 +42,14 @@ _BITS = 20  # of each of the three coefficients that are written of a quaternion
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 
-def page(motion: Motion, first: int = 0, credited: Sequence[Credit] | None = None) -> str:
+def page(motion: Motion, first: int = 0) -> str:
     """Build the HTML page that plays a motion.
 
     Args:
         motion: the motion, on any skeleton.
         first: number of the motion's first frame in the longer motion that it is a part of.
-        credited: whose movement it is made of, where more is known than the motion's own credits.
     """
-    data = player_data(motion, first)
-    if credited is not None:
-        data["credits"] = sections_of(ledger_of(credited))
-    return _filled(motion, data, "main")
+    return _filled(motion, player_data(motion, first), "main")
 
 
 def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
@@ -71,7 +66,8 @@ def page_beside(motion: Motion, folder: str, data: Mapping[str, Any]) -> str:
 
 def _filled(motion: Motion, data: Mapping[str, Any], start: str, style: str = "", beside: str = "") -> str:
     """Fill in the template of the page."""
-    data = {"credits": sections_of(ledger_of(motion.credits)) if motion.insertions else {}, **data}
+    is_known = bool(motion.insertions or motion.recorded)
+    data = {"credits": sections_of(ledger_of(motion.credits)) if is_known else {}, **data}
     return Template(_text("page.html")).substitute(
         title=html.escape(displayed(motion.name or motion.skeleton.name)),
         style=_text("player.css") + style,

@@ -16,7 +16,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
-from motionmind.credits.credit import Credit, add_up
+from motionmind.credits.credit import Credit
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.formats import write_motion
@@ -55,19 +55,8 @@ def composed(studio: Studio) -> Motion:
 
 
 def credits_of(studio: Studio) -> tuple[Credit, ...]:
-    """Return whose movement the piece is made of: corpora's clips by name, insertions by their own credits, by time.
-
-    Raises:
-        MotionMindError: a movement is missing.
-    """
-    project, shares = studio.project, list[Credit]()
-    for part in layout_of(project.state, project.finding, project.marks).parts:
-        motion = studio.movements.get(part.key).slice(part.first, part.last + 1)
-        known = studio.movements.credit(part.key)
-        for credit in motion.credits:
-            one = known if known and credit.is_given else credit
-            shares.append(replace(one, share=credit.share * part.seconds))
-    return add_up(shares)
+    """Return whose movement the piece is made of; MotionMindError if a movement is missing."""
+    return composed(studio).credits if studio.project.state.blocks else ()
 
 
 def file_name(title: str, suffix: str) -> str:
@@ -84,7 +73,7 @@ def file_name(title: str, suffix: str) -> str:
 def routes(studio: Studio) -> list[BaseRoute]:
     """Return the routes of this part."""
     makers: dict[str, Callable[[Motion], bytes]] = {
-        "html": lambda motion: page(motion, credited=credits_of(studio)).encode(),
+        "html": lambda motion: page(motion).encode(),
         "glb": lambda motion: _written(motion, ".glb"),
         "bvh": lambda motion: _written(motion, ".bvh"),
         "json": lambda motion: _written(motion, ".json"),

@@ -79,6 +79,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
     insertions: tuple[tuple[tuple[float, ...], tuple[tuple[str, int], ...]], ...] = ()
     keyframed: bool = False
     credits: tuple[tuple[Credit, ...], ...] = ()  # of each insertion, where they are known
+    recorded: tuple[Credit, ...] = ()
 
     @classmethod
     def of(cls, motion: Motion) -> MotionRecord:
@@ -96,6 +97,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
             tuple((tuple(one.times.tolist()), one.bridged) for one in motion.insertions),
             motion.keyframed,
             tuple(one.credits for one in motion.insertions),
+            motion.recorded,
         )
 
     def motion(self, name: str) -> Motion:
@@ -112,7 +114,7 @@ class MotionRecord(msgspec.Struct, frozen=True):
             Insertion(np.array(times), bridged, shares)
             for (times, bridged), shares in zip(self.insertions, credited, strict=False)
         )
-        return Motion(skeleton, rotations, root, times, name, insertions, self.keyframed)
+        return Motion(skeleton, rotations, root, times, name, insertions, self.keyframed, self.recorded)
 
 
 class MovementLine(msgspec.Struct, frozen=True):
@@ -169,14 +171,6 @@ class Movements:
             motion = corpus.motion(clip)
         self._hold(key, motion)
         return motion
-
-    def credit(self, key: str) -> Credit | None:
-        """Return the credit of a corpus's movement; None for what the project keeps."""
-        plain = key.lstrip(_MIRRORED)
-        if plain in self._kept or plain.startswith((f"{_OWN}/", _KEPT)):
-            return None
-        corpus, name = self._split(plain)
-        return corpus.credit(name)
 
     def title(self, key: str) -> str:
         """Return the words for a movement."""
@@ -269,17 +263,13 @@ class _Corpus:
         found: Facing = store.read_manifest(store.locate(self._name, self._home)).get("facing", "free")
         return found
 
-    def credit(self, name: str) -> Credit:
-        """Return the credit of a clip, else of a posture: that of the whole corpus."""
-        clip = next((clip for clip in self._corpus.clips if clip.label == name), None)
-        return self._corpus.credit_of(clip) if clip else credit_clip(self._corpus.own_origin, name)
-
     def motion(self, name: str) -> Motion:
-        """Return a clip as it was recorded, else a posture."""
+        """Return a clip as it was recorded, else a posture, whose credit is that of the whole corpus."""
         for clip in self._corpus.clips:
             if clip.label == name:
                 return replace(self._corpus.recording(clip), name=name)
-        return self.collection.find(name, as_clip=True)
+        found = self.collection.find(name, as_clip=True)
+        return replace(found, recorded=(credit_clip(self._corpus.own_origin, name),))
 
 
 def version_of(corpus: str, home: Path | None) -> str:

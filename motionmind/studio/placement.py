@@ -18,12 +18,14 @@ import numpy as np
 
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Facing
+from motionmind.credits.credit import add_up
 from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.studio.piece import Seam, State, key_of
 from motionmind.variation.piece import ALONE, Parts, Placement
 
 _STILL = 30.0  # frames a second of what is missing
+_LEAST = 1e-9  # seconds that a part counts for, so that a posture alone is somebody's
 
 Movements = Callable[[str], Motion]  # returns the movement of a key; MotionMindError if there is none
 
@@ -219,7 +221,7 @@ def _turned(x: float, z: float, angle: float) -> tuple[float, float]:
 
 
 def performance(parts: Sequence[Part], movement: Movements) -> Motion:
-    """Return a piece's parts as one movement, its insertions marked.
+    """Return a piece's parts as one movement, its insertions marked, and whose the rest is by how long parts last.
 
     Args:
         parts: the parts, in order, at least one.
@@ -233,7 +235,14 @@ def performance(parts: Sequence[Part], movement: Movements) -> Motion:
         raise MotionMindError("the piece is empty: put a posture or a stretch of movement into it first")
     joined = Parts()
     whole = movement(parts[0].key)
-    whole = replace(whole, keyframed=all(movement(part.key).keyframed for part in parts))
+    own = [
+        replace(credit, share=credit.share * max(part.seconds, _LEAST))
+        for part in parts
+        if not part.inserted
+        for credit in movement(part.key).own_credits
+    ]
+    keyframed = all(movement(part.key).keyframed for part in parts)
+    whole = replace(whole, keyframed=keyframed, recorded=add_up(own))
     for place, part in enumerate(parts):
         motion = movement(part.key)
         if part.last >= len(motion):

@@ -30,13 +30,18 @@ def credit_tween(
         The credits, the largest first; none where nothing moves.
     """
     seconds = np.diff(times)
-    shares = [_credit(corpus, source, float(s)) for row, s in zip(sources, seconds, strict=True) for source in row]
-    shares += [_credit(corpus, source, float(seconds.sum()) / len(detail)) for source in detail]
-    return add_up(shares)
+    shares: list[tuple[Source | None, float]]
+    shares = [(source, float(lasts)) for row, lasts in zip(sources, seconds, strict=True) for source in row]
+    shares += [(source, float(seconds.sum()) / len(detail)) for source in detail]
+    spent: dict[tuple[str, str] | None, float] = {}  # by corpus and clip; None for the engine
+    for source, share in shares:
+        clip = None if source is None else (source.corpus, source.clip)
+        spent[clip] = spent.get(clip, 0.0) + share
+    return add_up(_credit(corpus, clip, share) for clip, share in spent.items())
 
 
-def _credit(corpus: Corpus, source: Source | None, share: float) -> Credit:
-    """Return so large a share for the clip of a source; for the engine where there is none."""
-    if source is None:
+def _credit(corpus: Corpus, clip: tuple[str, str] | None, share: float) -> Credit:
+    """Return so large a share for a clip, by its corpus and its name; for the engine where there is none."""
+    if clip is None:
         return Credit(share)
-    return replace(corpus.credit_of(corpus.clips_by_name[source.corpus, source.clip]), share=share)
+    return replace(corpus.credit_of(corpus.clips_by_name[clip]), share=share)

@@ -177,6 +177,7 @@ def _frames(motion: Motion) -> FramesSchema:
             InsertionSchema(mark.times.tolist(), list(mark.bridged), list(mark.credits)) for mark in motion.insertions
         ],
         keyframed=motion.keyframed,
+        recorded=list(motion.recorded),
     )
 
 

@@ -20,8 +20,8 @@ from bundled_clips import ballet_clip
 from command_line import Run
 
 from motionmind.body.motion import Motion
+from motionmind.bundled import bundled
 from motionmind.cli.printing import print_tween
-from motionmind.corpus.bundled import bundled
 from motionmind.formats import read_motion, read_posture, write_motion
 from motionmind.geometry import rotations as rot
 from motionmind.tween.engine import Engine

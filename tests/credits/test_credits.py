@@ -7,6 +7,7 @@ import math
 import re
 import warnings
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
@@ -20,6 +21,8 @@ from hypothesis import strategies as st
 
 from motionmind.body.mirror import mirrored
 from motionmind.body.motion import Insertion, Motion
+from motionmind.body.plausibility import at_rate
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.gather import gather
 from motionmind.credits.credit import Credit, Origin, add_up
 from motionmind.credits.ledger import ENGINE, GIVEN, UNSTATED, Ledger, ledger_of, lines_of
@@ -28,6 +31,7 @@ from motionmind.discretize.spec import make_discretization
 from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.formats import read_motion, write_motion
 from motionmind.render.page import page
+from motionmind.retarget.retarget import to_human23
 from motionmind.tween.certificate import Source
 from motionmind.tween.crediting import credit_tween
 from motionmind.tween.engine import Engine
@@ -203,8 +207,65 @@ def test_movement_without_credits_is_read_as_the_engines(tmp_path: Path) -> None
 
 
 def test_given_movement_credits_itself() -> None:
-    assert clip().credits == (Credit(1.0, "plies"),)
-    assert ledger_of(clip().credits).corpora == {GIVEN: 1.0}
+    given = replace(clip(), recorded=())
+    assert given.credits == (Credit(1.0, "plies"),)
+    assert ledger_of(given.credits).corpora == {GIVEN: 1.0}
+
+
+# --- clips of corpora -------------------------------------------------------------------------------------------------
+
+
+@cache
+def mixed() -> Corpus:
+    """Clips of two performers, of two corpora, with fine detail."""
+    hers, other = (replace(at_rate(clip(name)), recorded=()) for name in ("plies", "tendus"))
+    ada = gather("ada", [hers], rate=5.0, performer="Ada", title="Bends", licence="CC-BY-4.0", source="her studio")
+    return gather("both", [other], rate=5.0, performer="Eve", author="Grace", mix=[(ada, 1.0)], mirror=True)
+
+
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("suffix", [".json", ".glb"])
+def test_the_credit_of_a_clip_is_the_same_when_written_and_read_again(suffix: str, number: int, tmp_path: Path) -> None:
+    one = mixed().clips[number]
+    path = tmp_path / f"clip{suffix}"
+    write_motion(path, mixed().recording(one) if number % 2 else mixed().motion(one))
+    assert read_motion(path).credits == (mixed().credit_of(one),)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda motion: motion.resample(12.0),
+        mirrored,
+        lambda motion: motion.slice(3, 9),
+        lambda motion: motion.slice(3, 4),
+        lambda motion: replace(motion, name="another"),
+        lambda motion: to_human23(motion, up="z"),
+        at_rate,
+    ],
+)
+def test_a_changed_clip_is_still_its_performers(change: Callable[[Motion], Motion]) -> None:
+    one = mixed().clips[0]
+    assert change(mixed().motion(one)).credits == (mixed().credit_of(one),)
+
+
+def test_shares_of_what_was_recorded_add_up_to_one() -> None:
+    with pytest.raises(MotionMindError, match="add up to 1, not to"):
+        replace(clip(), recorded=(Credit(0.5, "a"),))
+
+
+def test_a_variation_of_a_corpuss_clip_names_its_performer_corpus_and_licence(tmp_path: Path) -> None:
+    one = next(one for one in mixed().clips if one.corpus)
+    variation = vary(mixed().motion(one), nudge=2.0)
+    write_variation(tmp_path / "variation.json", variation)
+    again = read_variation(tmp_path / "variation.json")
+    assert again.piece.motion.credits == (mixed().credit_of(one),)
+    for name in ("variation.json", "movement.json", "movement.glb"):
+        path = tmp_path / name
+        if not path.exists():
+            write_motion(path, again.motion())
+        ledger = ledger_of(read_motion(path).credits)
+        assert (ledger.performers, ledger.corpora, ledger.licences) == ({"Ada": 1.0}, {"ada": 1.0}, {"CC-BY-4.0": 1.0})
 
 
 # --- variations -------------------------------------------------------------------------------------------------------
@@ -219,7 +280,7 @@ def test_a_variation_credits_the_piece_and_each_insertion_by_time(tmp_path: Path
         for name, share in shares(one.credits).items():
             spent[name] += share * float(one.times[-1] - one.times[0])
     lasts = float(motion.times[-1] - motion.times[0])
-    spent[": adagio"] += lasts - sum(spent.values())
+    spent["ballet: adagio"] += lasts - sum(spent.values())
     assert shares(motion.credits) == pytest.approx({name: share / lasts for name, share in spent.items() if share})
     report = variation.report()
     assert report["credits"]["corpora"] == pytest.approx(ledger_of(motion.credits).corpora)
@@ -345,8 +406,13 @@ def test_the_command_says_the_same_of_movement_and_of_its_report(run: Run, tmp_p
     assert run("credits", tmp_path / "report.json", "--json").json["corpora"]["ballet"] > 0.5
 
 
-def test_a_clip_of_a_corpus_is_the_corpus_s(run: Run) -> None:
-    assert "100%  ballet: adagio, The MotionMind authors" in run("credits", "ballet/adagio").out
+def test_a_clip_of_a_corpus_is_the_corpus_s_in_any_file(run: Run, tmp_path: Path) -> None:
+    said = run("credits", "ballet/adagio").out
+    assert "100%  ballet: adagio, The MotionMind authors" in said
+    assert "CC0-1.0" in said
+    for name in ("adagio.json", "adagio.glb"):
+        assert run("convert", "ballet/adagio", tmp_path / name).code == 0
+        assert run("credits", tmp_path / name).out == said
 
 
 def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:
@@ -392,7 +458,8 @@ def test_the_page_shows_the_credits() -> None:
     data = json.loads(re.search(r'id="data">(.*?)</script>', html, re.DOTALL)[1])  # type: ignore[index]
     assert list(data["credits"]) == ["performers", "licences", "corpora", "clips"]
     assert any("ballet: plies" in line for line in data["credits"]["clips"])
-    assert '"credits":{}' in page(clip())
+    assert '"credits":{}' in page(replace(clip(), recorded=()))
+    assert "ballet: plies, The MotionMind authors" in page(clip())
 
 
 def test_a_damaged_ledger_is_a_format_error(tmp_path: Path) -> None:
