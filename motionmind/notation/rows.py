@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from math import cos, radians, sin
 
 from motionmind.display import displayed
 from motionmind.errors import quoted
 from motionmind.notation.posture_line import Row, is_hold, read_row
 from motionmind.notation.score import Clip, Line, Phrase, Score, Where, tempo
-from motionmind.notation.work import LONG, Work
+from motionmind.notation.work import BEGINNING, LONG, Work
 
 MAX_DEPTH = 100  # of phrases, and ways of doing them, within one another; deeper ones call themselves
 MAX_POSTURES = 100_000  # of a clip
@@ -61,6 +62,7 @@ def _player(phrase: Phrase, words: dict[str, str], counts: float, depth: int, wo
     def run(before: Row | None) -> list[Row]:
         if depth > MAX_DEPTH:
             raise phrase.where.error(f"{phrase.name} calls itself")
+        work.add(BEGINNING, phrase.where)
         pace, rows = counts, list[Row]()
         for written in phrase.lines:
             line = _fill(written, words, work)
@@ -128,7 +130,7 @@ def _difference(before: Row, after: Row) -> str:
 
 
 def _is_tempo(text: str) -> bool:
-    return text.split(maxsplit=1)[0] == "tempo"
+    return text.startswith("tempo") and text.split(maxsplit=1)[0] == "tempo"
 
 
 # --- a line that calls another phrase ---------------------------------------------------------------------------------
@@ -158,7 +160,8 @@ def _call(phrase: Phrase, line: Line, counts: float, depth: int, work: Work) -> 
     return run
 
 
-def _split_outside_brackets(text: str) -> list[str]:
+@lru_cache(maxsize=256)  # a phrase that is played again and again is split once
+def _split_outside_brackets(text: str) -> tuple[str, ...]:
     """Split a line at its commas, except those within brackets."""
     parts: list[list[str]] = []
     opened = 0
@@ -168,7 +171,7 @@ def _split_outside_brackets(text: str) -> list[str]:
         else:
             parts.append([piece])
         opened += piece.count("(") - piece.count(")")
-    return [",".join(part).strip() for part in parts]
+    return tuple(",".join(part).strip() for part in parts)
 
 
 def _counted(run: _Player, where: Where, work: Work) -> _Player:
@@ -278,7 +281,8 @@ def _with_layers(rows: list[Row], others: list[Row], layers: Sequence[int]) -> l
         else:
             source = moves[min(move, len(moves) - 1)] if moves else start[0]  # one posture, held
             move += 1
-        limbs = tuple(source.limbs[i] if i in layers else limb for i, limb in enumerate(row.limbs))
-        words = tuple(source.words[i] if i in layers else word for i, word in enumerate(row.words))
-        out.append(row._replace(limbs=limbs, words=words))
+        limbs, words = list(row.limbs), list(row.words)
+        for layer in layers:
+            limbs[layer], words[layer] = source.limbs[layer], source.words[layer]
+        out.append(row._replace(limbs=tuple(limbs), words=tuple(words)))
     return out

@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 from motionmind.notation.score import Where
 
-MAX_WORK = 600_000  # lines read and postures made while the clips of a score are played; a long score takes 2 a posture
+MAX_WORK = 600_000  # lines read and postures made while the clips of a score are played; a long score takes 4 a posture
+BEGINNING = 2  # what a phrase's beginning counts as: deep calls take several times as long as lines do
 LONG = 64  # characters of a line that count as one piece of work
 
 _T = TypeVar("_T")
@@ -17,7 +18,7 @@ class Work:
     """The work that goes into playing phrases, and what is remembered of it.
 
     Attributes:
-        done: lines read and postures made.
+        done: lines read and postures made, and what beginning phrases counts as.
     """
 
     def __init__(self) -> None:
