@@ -76,8 +76,16 @@ def work(data: str | None, times: int, workers: int) -> list[Row]:
         return [alone.submit(measure, data, times, workers).result()]
 
 
-def measure(data: str | None, times: int, workers: int, room: str | None = None) -> Row:
-    """Read, retarget and learn so many times what was recorded, in a folder for large arrays and the corpus."""
+def measure(data: str | None, times: int, workers: int, room: str | None = None, kept: Path | None = None) -> Row:
+    """Read, retarget and learn so many times what was recorded, in a folder for large arrays and the corpus.
+
+    Args:
+        data: the folder of recorded movement; None for bundled movement.
+        times: as much as was recorded.
+        workers: processes.
+        room: the folder for what is removed again.
+        kept: the folder that the corpus is kept in; None to remove it.
+    """
     kind = make_discretization("codebook", TOLERANCE)
     first = Engine.learn(gather("first", [own_skeleton(_recorded(data)[0])], rate=RATE), kind)
     build_neighbours(first.corpus.skeleton, first.carriage.orientations, first.carriage.weights)  # loads what is needed
@@ -90,9 +98,10 @@ def measure(data: str | None, times: int, workers: int, room: str | None = None)
         taken, here = perf_counter(), process_time()
         engine = Engine.learn(corpus, kind, workshop)
         learned, by_processor = perf_counter(), process_time() - here
-        engine.save(Path(scratch) / "scale")
+        place = kept or Path(scratch) / "scale"
+        engine.save(place)
         saved = perf_counter()
-        disk = sum(path.stat().st_size for path in (Path(scratch) / "scale").rglob("*") if path.is_file())
+        disk = sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
     total = Spent(*np.sum(spent, axis=0).tolist())
     return {
         "times": times,
