@@ -12,7 +12,8 @@ from experiments.charts import Panel, svg
 from experiments.harness import Row, Setting, markdown
 from experiments.material import engine, families, movement, pairs, posture, recorded, without
 from motionmind import Engine, NoPathError, Posture
-from motionmind.learned.pace import FPS, LONGEST, SHORTEST, find_still, way_between, way_of
+from motionmind.learned.pace import LONGEST, SHORTEST, find_still, way_between, way_of
+from motionmind.learned.sampled import FPS
 
 RECORDINGS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai")
 BUDGET = 20_000

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6)}  # that can be read; the last is written
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change

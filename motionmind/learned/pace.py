@@ -22,9 +22,9 @@ knows the lull: it is that of the corpus's postures most like it.
 
 The fastest speeds are 99th percentiles of the corpus's frames at 30 a second, joint by joint. What hardly moves in the
 corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, and neither the body's
-turning nor its travel as slower than everyday movement. A movement of many seconds that is nowhere faster than that may
-still show more than any of the corpus that is as long, for quick clips are short: so the *peaks* are what the greatest
-speeds of all windows of 1 to 6 s, but a hundredth, keep to; none is less than the fastest speeds, or everyday movement.
+turning nor its travel as slower than everyday movement. The *peaks* (`motionmind.learned.peaks`) are what the greatest
+of windows of 1 to 6 s keep to, accelerations of the root among them; none is less than the fastest speeds, or everyday
+movement.
 """
 
 from __future__ import annotations
@@ -42,8 +42,9 @@ from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.executors.here import this_process
 from motionmind.executors.team import Team
 from motionmind.geometry import rotations as rot
+from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile
-from motionmind.learned.sampled import BLOCK, Sampled
+from motionmind.learned.sampled import BLOCK, FPS, Sampled
 
 SHORTEST, LONGEST = 0.3, 5.0  # seconds between the still moments of a window
 SMOOTHED = 0.5  # seconds over which speeds are averaged to find still moments
@@ -55,15 +56,10 @@ SLOPES = 0.15, 0.5  # the least and the greatest slope: a longer way takes longe
 PULLS = -0.5, 0.0  # of the pull, in the same way: who is in quick movement takes no longer
 ALIKE = 5  # of the corpus's postures, whose lulls say that of a posture
 AS_MANY = 20.0  # windows that the prior is worth
-RARE = 99.0  # percentile of the frames' speeds that counts as fastest
-FPS = 30.0
 SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
 OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
 EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turning, rad/s, and of travel, heights/s
-LENGTHS = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0  # seconds of the windows whose peaks are known
-STRIDE = 6  # frames from window to window
-FEW = 10  # windows; where there are fewer, peaks are those of shorter ones
-_SIZES = [round(seconds * FPS / STRIDE) for seconds in LENGTHS]  # of the windows, in strides
+STARTS = 3.0  # heights/s^2: the root's acceleration as a step begins or ends, than which no peak is less
 
 
 class Way(NamedTuple):
@@ -117,8 +113,8 @@ class Pace:
         fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel [J + 2].
         greatest: greatest speeds of the same in any frame [J + 2].
         slowest: the speed of the mean joint over a second, rad/s, that only a hundredth of all seconds is below [1].
-        peaks: greatest speeds of the same, and of the root's rise or fall, heights/s, in all windows of each of LENGTHS
-            but a hundredth [6, J + 3].
+        peaks: greatest speeds of the same, and of the root's rise or fall, heights/s, and the root's greatest
+            acceleration, heights/s^2, in all windows of each of LENGTHS but a hundredth [6, J + 4].
         lulls: of the corpus's N postures, usual speeds of the mean joint [N].
         law: level, slope, pull and spread of the logarithm of durations [4].
     """
@@ -141,9 +137,11 @@ class Pace:
         level, slope, pull, _ = self.law
         return np.asarray(np.exp(level + slope * _effort(way, self.usual) + pull * _quickness(*lulls)))
 
-    def peaks_in(self, seconds: float) -> Floats:
-        """Return the peaks of windows so long [J + 3]."""
-        return np.array([np.interp(seconds, LENGTHS, part) for part in self.peaks.T])
+    def peaks_in(self, seconds: float, pace: float = 1.0) -> Floats:
+        """Return the peaks of windows so long [J + 4], of movement at so many times the corpus's pace."""
+        peaks = pace * np.array([np.interp(pace * seconds, LENGTHS, part) for part in self.peaks.T])
+        peaks[-1] *= pace  # accelerations grow by the square
+        return peaks
 
     def lulls_of(self, postures: Floats, shown: Floats) -> Floats:
         """Return the lulls of postures [n]: means of those of the corpus's postures that are most like each.
@@ -176,6 +174,7 @@ class _Shown(NamedTuple):
 
     Attributes:
         steps: as of `steps_of` [T - 1, J + 3].
+        moved: displacements of the root in them [T - 1, 3], heights.
         stretches: those of which nothing was reconstructed, from and to a step [n, 2].
         times: of the still moments [S], seconds in the recording.
         speeds: of the mean joint in them [S], rad/s.
@@ -184,6 +183,7 @@ class _Shown(NamedTuple):
     """
 
     steps: Floats
+    moved: Floats
     stretches: Ints
     times: Floats
     speeds: Floats
@@ -193,10 +193,11 @@ class _Shown(NamedTuple):
 def _show(corpus: Corpus, clip: Clip) -> _Shown:
     """Return what a clip of two frames or more shows of its pace."""
     recording = Sampled(corpus, clip, FPS)
-    steps = np.concatenate([steps_of(block) for block in recording.blocks(BLOCK, overlap=1)])
+    blocks = [(steps_of(block), moved_in(block)) for block in recording.blocks(BLOCK, overlap=1)]
+    steps, moved = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     still, speeds = _lulls(steps[:, : len(corpus.skeleton)].mean(axis=1))
     windows = _windows(recording, still, speeds)
-    return _Shown(steps, _danced(recording), recording.times[still], speeds, windows)
+    return _Shown(steps, moved, _danced(recording), recording.times[still], speeds, windows)
 
 
 class _Gauge:
@@ -211,15 +212,13 @@ class _Gauge:
         found = [(one.clip, len(one) - 1, _danced(one)) for one in recordings if len(one) > 1]
         counts = np.array([count for _, count, _ in found], dtype=np.int64)
         lengths = np.array([stop - start for _, _, stretches in found for start, stop in stretches], dtype=np.int64)
-        parts = -(-lengths // STRIDE)
-        many = [int(np.maximum(parts - size + 1, 0).sum()) for size in _SIZES]
         self.clips = [clip for clip, _, _ in found]
         self._corpus, self._joints, self._count = corpus, len(corpus.skeleton), int(counts.sum())
         self._rare = Percentile(RARE, self._count)
         self._seconds = Percentile(100.0 - RARE, int((counts - np.minimum(counts, round(FPS)) + 1).sum()))
-        self._peaks = [Percentile(RARE, count) if count >= FEW else None for count in many]
+        self._peaks = Peaks(lengths)
         self._usual = np.zeros((0, 3))
-        self._most = np.zeros(self._joints + 3)
+        self._most = np.zeros(self._joints + 4)
         self._stills: list[tuple[Floats, Floats]] = []
         self._windows = [np.zeros((0, 6))]
 
@@ -228,41 +227,35 @@ class _Gauge:
         speeds = FPS * shown.steps
         # Row after row, so that it does not matter how many clips there are.
         self._usual = np.concatenate([self._usual, _usual_parts(speeds, self._joints)]).sum(axis=0, keepdims=True)
-        self._most = np.maximum(self._most, speeds.max(axis=0))
+        changed = accelerations(shown.moved, FPS).max(initial=0.0)
+        self._most = np.maximum(self._most, np.append(speeds.max(axis=0), changed))
         self._rare.add(speeds[:, :-1])
         self._seconds.add(over_seconds(FPS * shown.steps[:, : self._joints].mean(axis=1), FPS)[:, None])
         self._stills.append((shown.times, shown.speeds))
         self._windows.append(shown.windows)
         for start, stop in shown.stretches:
-            # Each STRIDE frames are one, for the greatest is the same.
-            part = np.maximum.reduceat(speeds[start:stop], np.arange(0, stop - start, STRIDE))
-            for size, peaks in zip(_SIZES, self._peaks, strict=True):
-                if peaks is not None and len(part) >= size:
-                    peaks.add(np.lib.stride_tricks.sliding_window_view(part, size, axis=0).max(axis=-1))
+            self._peaks.add(speeds[start:stop], shown.moved[start:stop])
 
     def pace(self) -> Pace:
         """Return the pace of all clips."""
         joints = self._joints
         usual, fastest = np.array(SLOWEST_USUAL), np.concatenate([np.full(joints, EVERYDAY[0]), EVERYDAY[1:]])
-        greatest, slowest = np.append(fastest, EVERYDAY[2]), np.zeros(1)
+        greatest, slowest = np.append(fastest, [EVERYDAY[2], STARTS]), np.zeros(1)
         if self.clips:
             usual = np.maximum(self._usual[0] / self._count, usual)
             rare = self._rare.value()
             median = float(np.median(rare[:joints]))
             least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
             fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
-            greatest = np.maximum(self._most, np.append(fastest, EVERYDAY[2]))
+            greatest = np.maximum(self._most, np.append(fastest, [EVERYDAY[2], STARTS]))
             slowest = self._seconds.value()
         lulls = np.ones(len(self._corpus))
         for clip, (times, speeds) in zip(self.clips, self._stills, strict=True):
             here = slice(clip.start, clip.stop)
             lulls[here] = np.interp(self._corpus.times[here], times, speeds / usual[0])
-        peaks, most, least_peaks = [], greatest, np.append(fastest, EVERYDAY[2])
-        for found in self._peaks:
-            most = most if found is None else np.maximum(found.value(), least_peaks)
-            peaks.append(most)
+        peaks = self._peaks.values(greatest, np.append(fastest, [EVERYDAY[2], STARTS]))
         law = _fit_windows(np.concatenate(self._windows), usual)
-        return Pace(usual, fastest, greatest[:-1], slowest, np.stack(peaks), lulls, law)
+        return Pace(usual, fastest, greatest[:-2], slowest, peaks, lulls, law)
 
 
 def _usual_parts(speeds: Floats, joints: int) -> Floats:
@@ -274,6 +267,12 @@ def steps_of(motion: Motion) -> Floats:
     """Return all parts of the ways from each frame to the next, and how far the root rises or falls [T - 1, J + 3]."""
     height = motion.skeleton.height if motion.skeleton.height > 0.0 else 1.0
     return np.column_stack([way_of(motion).parts, np.abs(np.diff(motion.root[:, 1])) / height])
+
+
+def moved_in(motion: Motion) -> Floats:
+    """Return the displacements of the root from each frame to the next [T - 1, 3], heights."""
+    height = motion.skeleton.height if motion.skeleton.height > 0.0 else 1.0
+    return np.diff(motion.root, axis=0) / height
 
 
 def _danced(clip: Sampled) -> Ints:

@@ -12,6 +12,7 @@ from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
 
+FPS = 30.0  # at which movement is looked at where no other rate is said
 BLOCK = 3840  # frames that are made at a time
 
 

@@ -22,7 +22,7 @@ from motionmind.corpus.corpus import Corpus, Facing
 from motionmind.discretize import StateSpace
 from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
-from motionmind.learned.pace import LENGTHS
+from motionmind.learned.peaks import LENGTHS
 from motionmind.learned.plausibility import MEASURES
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
@@ -84,7 +84,7 @@ FORMS = {
     "pace.fastest": _Form("f8", "J+2", _SMALL),
     "pace.greatest": _Form("f8", "J+2", _SMALL),
     "pace.slowest": _Form("f8", "1", 0.0),
-    "pace.peaks": _Form("f8", f"{len(LENGTHS)} J+3", 0.0),
+    "pace.peaks": _Form("f8", f"{len(LENGTHS)} J+4", 0.0),
     "pace.lulls": _Form("f8", "N", 0.0),
     "pace.law": _Form("f8", "4", -100.0, 100.0),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),

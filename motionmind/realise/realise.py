@@ -73,7 +73,7 @@ def realise(
     without: Collection[Correction] = (),
     pace: float = 1.0,
     fastest: Floats | None = None,
-    peaks: Callable[[float], Floats] | None = None,
+    peaks: Callable[[float, float], Floats] | None = None,
 ) -> Realised:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -109,7 +109,8 @@ def realise(
         pace: how many times as fast as the corpus to move, where there is no `length`.
         fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
             `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
-        peaks: what the greatest speeds in so many seconds keep to, and that of the root's rise [J + 3]; as `fastest`.
+        peaks: returns what the greatest of movement of so many seconds keep to at a pace [J + 4], as
+            `motionmind.learned.pace.Pace.peaks_in` does; None where there is a `length`.
     """
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
@@ -152,8 +153,8 @@ def realise(
     leaps = size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9)
     most = None
     if peaks is not None:
-        most = pace * peaks(pace * LONGER * float(clock.frames[-1]))
-        flies[np.sqrt(2.0 * GRAVITY * leaps) > JUMPS_AT * most[-1] * a.skeleton.height] = 0.0
+        most = peaks(LONGER * float(clock.frames[-1]), pace)
+        flies[np.sqrt(2.0 * GRAVITY * leaps) > JUMPS_AT * most[-2] * a.skeleton.height] = 0.0
     flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
     stance = Stance(
         walk.half_steps,

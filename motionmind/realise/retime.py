@@ -23,7 +23,8 @@ from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
-from motionmind.learned.pace import steps_of, way_of
+from motionmind.learned.pace import moved_in, steps_of, way_of
+from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
 from motionmind.realise.timeline import Timeline, stretch
 
@@ -84,7 +85,8 @@ def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool,
     Args:
         motion: the movement, at the clock's frames.
         clock: its clock.
-        most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s [J + 3].
+        most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s, and the root's
+            acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
     """
     for number in range(ROUNDS):
@@ -101,7 +103,10 @@ def _slower(motion: Motion, most: Floats, moving: tuple[bool, bool]) -> Floats:
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
     free = _away(middles, [*ends, *times[1:-1][_falls(motion, fps)]], fps)
-    slower = np.maximum((fps * steps_of(motion) / most).max(axis=1), 1.0)
+    slower = np.maximum((fps * steps_of(motion) / most[:-1]).max(axis=1), 1.0)
+    # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
+    changes = np.sqrt(accelerations(moved_in(motion), fps) / most[-1])
+    slower[1:], slower[:-1] = np.maximum(slower[1:], changes), np.maximum(slower[:-1], changes)
     slower[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)

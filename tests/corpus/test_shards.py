@@ -106,6 +106,20 @@ def test_the_same_corpus_on_a_cluster(files: dict[Path, str], tmp_path: Path) ->
         assert_same(on_cluster, Client(tmp_path / "2", this_process()).gather(files))
 
 
+def test_a_cluster_builds_the_same_files(run: Run, files: dict[Path, str], tmp_path: Path) -> None:
+    """By the command itself; those that it reads, and all that is learned."""
+    distributed = pytest.importorskip("distributed")
+    homes = [tmp_path / "cluster", tmp_path / "here"]
+    with distributed.LocalCluster(
+        2, threads_per_worker=1, dashboard_address=":0", processes=False, protocol="tcp"
+    ) as c:
+        for home, ways in zip(homes, (["--scheduler", c.scheduler_address], []), strict=True):
+            done = run("corpus", "build", "mine", *files, *ways, "--home", home)
+            assert done.code == 0, done
+    one, other = ({f.relative_to(home): f.read_bytes() for f in home.rglob("*") if f.is_file()} for home in homes)
+    assert one == other
+
+
 def test_shards_are_gone_when_the_corpus_is_there(files: dict[Path, str], tmp_path: Path) -> None:
     client = Client(tmp_path, this_process())
     client.gather(files)

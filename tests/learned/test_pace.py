@@ -18,12 +18,12 @@ from motionmind.corpus.gather import gather
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import (
     EVERYDAY,
-    FPS,
     LEVEL,
     PULL,
     PULLS,
     SLOPE,
     SLOPES,
+    STARTS,
     Pace,
     Way,
     _fit,
@@ -32,6 +32,7 @@ from motionmind.learned.pace import (
     way_between,
     way_of,
 )
+from motionmind.learned.sampled import FPS
 
 ARM = 7
 
@@ -216,11 +217,14 @@ def test_long_movement_shows_no_more_than_the_clips_that_are_as_long() -> None:
     assert quick.times[-1] < 3.0
     assert calm.times[-1] > 6.0
     tops = [FPS * way_of(clip).parts[:, -1].max() for clip in (quick, calm)]
-    assert pace.peaks_in(1.0)[-2] == pytest.approx(tops[0], rel=0.05)
-    assert pace.peaks_in(9.0)[-2] == pytest.approx(max(tops[1], pace.fastest[-1]), rel=0.05)
-    assert np.all(np.diff([pace.peaks_in(seconds)[-2] for seconds in np.linspace(0.5, 7.0, 9)]) <= 0.0)
-    assert np.all(pace.peaks[:, :-1] >= pace.fastest)
-    assert np.all(pace.peaks[:, -1] > 0.0)  # also where nothing ever rises
+    assert pace.peaks_in(1.0)[-3] == pytest.approx(tops[0], rel=0.05)
+    assert pace.peaks_in(9.0)[-3] == pytest.approx(max(tops[1], pace.fastest[-1]), rel=0.05)
+    assert np.all(np.diff([pace.peaks_in(seconds)[-3] for seconds in np.linspace(0.5, 7.0, 9)]) <= 0.0)
+    assert np.all(pace.peaks[:, :-2] >= pace.fastest)
+    assert np.all(pace.peaks[:, -2:] > 0.0)  # also where nothing ever rises
+    starts = [FPS**2 * np.abs(np.diff(clip.root, 2, axis=0)).max() / human23().height for clip in (quick, calm)]
+    assert pace.peaks_in(1.0)[-1] == pytest.approx(starts[0], rel=0.05)
+    assert pace.peaks_in(9.0)[-1] == pytest.approx(max(starts[1], STARTS), rel=0.05)
 
 
 def test_what_was_reconstructed_is_no_peak() -> None:

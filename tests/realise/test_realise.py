@@ -457,9 +457,9 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
     assert heights[[*range(6), *range(-6, 0)]].max() < 0.03
     # Nobody jumps higher on the way than dancers do in movement of that length.
     for rise, jumps in ((3.0, True), (0.8, False)):  # heights a second
-        peaks = np.append(np.full(25, 50.0), rise)
+        peaks = np.append(np.full(25, 50.0), [rise, 500.0])
         ends = grounded.posture(5), grounded.posture(17)
-        found = realised(known, rows, *ends, 30.0, 1e-6, peaks=lambda seconds, peaks=peaks: peaks)
+        found = realised(known, rows, *ends, 30.0, 1e-6, peaks=lambda *_, peaks=peaks: peaks)
         heights = lowest_height(human23(), found.rotations, found.root)
         assert (heights.max() > 0.12) == jumps
 
@@ -478,7 +478,7 @@ def test_limbs_that_meet_as_the_clock_slows_come_apart(walking: Learned, monkeyp
     monkeypatch.setattr("motionmind.realise.realise.slow_down", slowed)
     known = replace(walking, carriage=replace(walking.carriage, touches=np.zeros_like(walking.carriage.touches)))
     rows, ends = list(range(5, 12)), (walk().posture(5), walk().posture(11))
-    found = realised(known, rows, *ends, 30.0, peaks=lambda seconds: np.full(26, 50.0))
+    found = realised(known, rows, *ends, 30.0, peaks=lambda *_: np.full(27, 500.0))
     assert legs_depth(human23(), found.rotations).max() < 0.015
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.geometry import rotations as rot
-from motionmind.learned.pace import steps_of
+from motionmind.learned.pace import moved_in, steps_of
+from motionmind.learned.peaks import accelerations
 from motionmind.realise.retime import AROUND, SETTLES, slow_down
 from motionmind.realise.timeline import Timeline
 
@@ -34,8 +37,8 @@ def quick(top: float, count: int = 91) -> Floats:
     return np.concatenate([[0.0], np.cumsum(speeds) / FPS])
 
 
-def most(joints: float) -> Floats:
-    return np.concatenate([np.full(len(BODY), joints), [9.0, 9.0, 9.0]])
+def most(joints: float, acceleration: float = 900.0) -> Floats:
+    return np.concatenate([np.full(len(BODY), joints), [9.0, 9.0, 9.0, acceleration]])
 
 
 def speeds(motion: Motion) -> Floats:
@@ -83,6 +86,21 @@ def test_a_body_that_bobs_on_the_floor_is_slowed_as_others_are() -> None:
     assert np.diff(heights, 2).min() * FPS**2 < -9.81
     slower, _ = slow_down(motion, clock, most(2.0), STILL)
     assert speeds(slower).max() < 2.0 * 1.03
+
+
+def test_a_start_that_is_too_quick_is_slowed() -> None:
+    at = np.arange(91) / FPS
+    motion, clock = bent(0.01 * at)
+    way = np.cumsum(np.cumsum(6.0 * np.exp(-(((at - 1.0) / 0.1) ** 2)) - 6.0 * np.exp(-(((at - 2.0) / 0.1) ** 2))))
+    motion = replace(motion, root=motion.root + way[:, None] / FPS**2 * [1.0, 0.0, 0.0])
+
+    def quickest(motion: Motion) -> float:
+        return float(accelerations(moved_in(motion), 1.0 / (motion.times[1] - motion.times[0])).max())
+
+    wanted = 0.6 * quickest(motion)
+    slower, _ = slow_down(motion, clock, most(9.0, wanted), STILL)
+    assert 0.8 * wanted < quickest(slower) < 1.06 * wanted
+    assert slower.times[-1] < 1.5 * motion.times[-1]
 
 
 def test_what_shows_more_between_frames_is_slowed_again() -> None:
