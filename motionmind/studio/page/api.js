@@ -15,10 +15,25 @@ export class Api extends EventTarget {
     this.taken = () => {};
     /** @type {Promise<any>} over with the last change that was asked for: the next waits, for requests overtake others */
     this.changed = Promise.resolve();
+    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
+    this.ahead = new Map();
+    /** @type {Promise<any>} over when this browser is let in */
+    this.entered = Promise.resolve();
+  }
+
+  /** Be let in, and ask for what the page will need first. @param {string[]} paths */
+  begin(...paths) {
+    this.entered = this.#enter();
+    this.entered.catch(() => {}); // who waits for it hears why
+    for (const path of paths) {
+      const answer = this.entered.then(() => this.#ask(path, { method: "GET" }));
+      answer.catch(() => {});
+      this.ahead.set(path, answer);
+    }
   }
 
   /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
-  async enter() {
+  async #enter() {
     const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? location.hash.slice(1);
     if (!token) return;
     history.replaceState(null, "", location.pathname + location.search);
@@ -27,7 +42,9 @@ export class Api extends EventTarget {
 
   /** @param {string} path @returns {Promise<any>} */
   get(path) {
-    return this.#ask(path, { method: "GET" });
+    const answer = this.ahead.get(path);
+    this.ahead.delete(path);
+    return answer ?? this.#ask(path, { method: "GET" });
   }
 
   /** @param {string} path @param {object} body @returns {Promise<any>} */

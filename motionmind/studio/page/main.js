@@ -1,7 +1,7 @@
 /** The page put together: what every panel gets as `studio`, and where each panel stands. */
 
 import { html, render } from "./vendor/htm-preact-standalone.js";
-import { Api } from "./api.js";
+import { api } from "./begin.js";
 import * as between from "./between/panel.js";
 import * as take from "./export/panel.js";
 import * as movement from "./imports/panel.js";
@@ -92,7 +92,6 @@ async function start() {
   const open = new Open();
   const toasts = new Toasts();
   const keys = new Keys();
-  const api = new Api();
   const store = new Store(api);
   const viewer = new Viewer();
   const studio = {

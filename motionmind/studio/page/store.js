@@ -25,9 +25,9 @@ export class Store extends EventTarget {
     api.taken = (state) => this.take(state);
   }
 
-  /** Let this browser in, fetch the project, and listen. */
+  /** Fetch the project once this browser is let in, and listen. */
   async start() {
-    await this.api.enter();
+    await this.api.entered;
     this.#listen();
     await this.load();
   }
