@@ -63,17 +63,22 @@ def read_page() -> Page:
                 if prefix == "/player" and path.suffix == ".js" and not relative.startswith("vendor/"):
                     names[f"motionmind/{relative.removesuffix('.js')}"] = f"/player/{relative}"
     modules = msgspec.json.encode({"imports": names}).decode().replace("<", "\\u003c")
-    preloads = "\n".join(f'<link rel="modulepreload" href="{path}">' for path in _loaded(files, names))
+    first = _loaded(files, names, "/page/begin.js")
+    later = [path for path in _loaded(files, names, "/page/main.js") if path not in first]
+    # A browser asks for six files at a time: what `begin.js` asks for would wait for all others.
+    links = [f'<link rel="modulepreload" href="{path}">' for path in first]
+    links += [f'<link rel="modulepreload" fetchpriority="low" href="{path}">' for path in later]
+    preloads = "\n".join(links)
     index = Template((_PAGE / "index.html").read_text("utf-8")).substitute(modules=modules, preloads=preloads)
     files["/"] = _file(index.encode(), "text/html; charset=utf-8")
     digest = b64encode(hashlib.sha256(modules.encode()).digest()).decode("ascii")
     return Page(files, f"sha256-{digest}")
 
 
-def _loaded(files: Mapping[str, File], names: Mapping[str, str]) -> list[str]:
-    """Return the paths of the modules that the page starts with, so that it loads them all at once, not in turn."""
+def _loaded(files: Mapping[str, File], names: Mapping[str, str], start: str) -> list[str]:
+    """Return the paths of a module and of all that it needs, so that the page loads them at once, not in turn."""
     text = {path: file.data.decode() for path, file in files.items() if path.endswith(".js")}
-    found, new = set[str](), {"/page/main.js"}
+    found, new = set[str](), {start}
     while new:
         found |= new
         new = {

@@ -15,21 +15,11 @@ export class Api extends EventTarget {
     this.taken = () => {};
     /** @type {Promise<any>} over with the last change that was asked for: the next waits, for requests overtake others */
     this.changed = Promise.resolve();
-    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
-    this.ahead = new Map();
     /** @type {Promise<any>} over when this browser is let in */
-    this.entered = Promise.resolve();
-  }
-
-  /** Be let in, and ask for what the page will need first. @param {string[]} paths */
-  begin(...paths) {
     this.entered = this.#enter();
     this.entered.catch(() => {}); // who waits for it hears why
-    for (const path of paths) {
-      const answer = this.entered.then(() => this.#ask(path, { method: "GET" }));
-      answer.catch(() => {});
-      this.ahead.set(path, answer);
-    }
+    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
+    this.expected = new Map();
   }
 
   /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
@@ -40,10 +30,18 @@ export class Api extends EventTarget {
     await this.post("/api/enter", { token });
   }
 
+  /** Ask now for what will be needed soon, once. @param {string} path @returns {Promise<any>} */
+  expect(path) {
+    const answer = this.entered.then(() => this.#ask(path, { method: "GET" }));
+    answer.catch(() => {});
+    this.expected.set(path, answer);
+    return answer;
+  }
+
   /** @param {string} path @returns {Promise<any>} */
   get(path) {
-    const answer = this.ahead.get(path);
-    this.ahead.delete(path);
+    const answer = this.expected.get(path);
+    this.expected.delete(path);
     return answer ?? this.#ask(path, { method: "GET" });
   }
 

@@ -2,6 +2,7 @@
 
 import { Body } from "motionmind/body";
 import { Motion } from "motionmind/motion";
+import { movementAt } from "./places.js";
 
 const MOST = 48; // movements that are kept, the latest used
 /** @type {Map<string, Promise<any>>} */
@@ -18,7 +19,7 @@ const bodies = new Map(); // bodies are many movements', and what draws them tak
 export function movement(api, key) {
   const known = kept.get(key);
   kept.delete(key);
-  const found = known ?? api.get(`/api/movements/${path(key)}`).then((/** @type {object} */ data) => playable(data, key));
+  const found = known ?? api.get(movementAt(key)).then((/** @type {object} */ data) => playable(data, key));
   if (!known) found.catch(() => kept.delete(key));
   kept.set(key, found);
   if (kept.size > MOST) kept.delete(kept.keys().next().value ?? "");
@@ -39,14 +40,4 @@ export function playable(data, key = "") {
   const about = JSON.stringify([data.skeleton, data.body]);
   if (!bodies.has(about)) bodies.set(about, { body: new Body(data.skeleton, data.body), colours: data.colours });
   return Object.assign(new Motion(data), { key }, bodies.get(about));
-}
-
-/** Where a picture of a frame is, so many pixels high; it stands on any paper. */
-export function thumbnail(/** @type {string} */ key, /** @type {number} */ frame, height = 96) {
-  return `/api/thumbnails/${path(key)}/${frame}.png?height=${height}`;
-}
-
-/** @param {string} key */
-function path(key) {
-  return key.split("/").map(encodeURIComponent).join("/");
 }

@@ -3,7 +3,8 @@
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { useChange } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
-import { movement, thumbnail } from "../movements.js";
+import { movement } from "../movements.js";
+import { thumbnail } from "../places.js";
 import { deskOf, DRAGGED, same } from "./desk.js";
 
 const FEW = 24; // clips that are listed before somebody asks for all

@@ -3,7 +3,7 @@
 import { html } from "../vendor/htm-preact-standalone.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
-import { thumbnail } from "../movements.js";
+import { thumbnail } from "../places.js";
 import { deskOf, dropped } from "./desk.js";
 import { Gallery, insert } from "./gallery.js";
 

@@ -1,7 +1,8 @@
 /** The corpora that there are: looked through as sheets, used for the piece, deleted. */
 
 import { html, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
-import { movement, thumbnail } from "../movements.js";
+import { movement } from "../movements.js";
+import { thumbnail } from "../places.js";
 import { useChange } from "../shell/hooks.js";
 
 /** @param {{studio: any, imports: import("./imports.js").Imports}} props */

@@ -1,7 +1,8 @@
 /** The line of time below the viewer: the piece's stretches, what lies at its seams, and what is wished there. */
 
 import { html, useEffect, useMemo, useReducer, useState } from "../vendor/htm-preact-standalone.js";
-import { movement, thumbnail } from "../movements.js";
+import { movement } from "../movements.js";
+import { thumbnail } from "../places.js";
 import { useStore } from "../store.js";
 import { Actions } from "./actions.js";
 import { Composed, Movements } from "./composed.js";

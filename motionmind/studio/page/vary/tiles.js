@@ -1,7 +1,7 @@
 /** The new order as a strip of pictures; each stretch can be looked at, and kept. */
 
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.js";
-import { thumbnail } from "../movements.js";
+import { thumbnail } from "../places.js";
 
 const MOST = 400; // stretches with pictures
 const QUIET = 120; // milliseconds after which an order is taken to stay: before that no pictures are asked for
