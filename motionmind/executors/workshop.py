@@ -23,6 +23,7 @@ from motionmind.executors.team import Team
 
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
+_A, _B = TypeVar("_A"), TypeVar("_B")
 
 LARGE = 1 << 26  # bytes of an array that is mapped from a file
 
@@ -52,6 +53,13 @@ class Workshop:
         """Do all jobs, in any order."""
         for _ in self.team.map(function, jobs):
             pass
+
+    def both(self, one: Callable[[], _A], other: Callable[[], _B]) -> tuple[_A, _B]:
+        """Return the results of two jobs, side by side if there is more than one worker."""
+        kept: dict[int, Any] = {}
+        jobs: list[tuple[int, Callable[[], Any]]] = [(0, one), (1, other)]
+        self.do(lambda job: kept.update({job[0]: job[1]()}), jobs)
+        return kept[0], kept[1]
 
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
         """Return an array that is not filled yet.

@@ -143,9 +143,9 @@ def learn_from_states(corpus: Corpus, space: StateSpace, states: States, worksho
         posture_weights=corpus.weights,
         team=workshop.team,
     )
-    pace = learn_pace(corpus, workshop.team)
-    plausibility = learn_plausibility(corpus, pace.fastest)
-    return Learned(corpus, space, states, grammar, learn_carriage(corpus, workshop), pace, plausibility)
+    # One calls NumPy for little at a time, and the other compiled loops for long, which leave the interpreter free.
+    pace, carriage = workshop.both(partial(learn_pace, corpus), partial(learn_carriage, corpus, workshop))
+    return Learned(corpus, space, states, grammar, carriage, pace, learn_plausibility(corpus, pace.fastest))
 
 
 def _keep_visited(space: StateSpace, orientations: Floats) -> tuple[StateSpace, States]:
