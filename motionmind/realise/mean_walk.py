@@ -311,25 +311,31 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
-    out, some = about.copy(), np.empty(weights.shape[1], np.int64)
-    for t in range(len(weights)):
-        count = 0
-        for i in range(weights.shape[1]):
-            if weights[t, i] >= 1e-6:
-                some[count] = i
-                count += 1
-        for j in range(len(joints)):
-            ax, ay, az, aw = about[t, j]
-            x, y, z, w = 0.0, 0.0, 0.0, 0.0
-            for i in some[:count]:
-                weight, shown = weights[t, i], orientations[i, joints[j]]
-                bx, by, bz, bw = shown[0], shown[1], shown[2], shown[3]
-                if ax * bx + ay * by + az * bz + aw * bw < 0.0:
-                    weight = -weight
-                x += weight * bx
-                y += weight * by
-                z += weight * bz
-                w += weight * bw
+    out, count = about.copy(), len(about)
+    # Side by side for all means, which are then added to at once. A weight of 0 changes no sum.
+    counted = np.empty((weights.shape[1], count))
+    for i in range(len(counted)):
+        for t in range(count):
+            counted[i, t] = weights[t, i] if weights[t, i] >= 1e-6 else 0.0
+    near, sums, signed = np.empty((4, count)), np.empty((4, count)), np.empty(count)
+    for j in range(len(joints)):
+        near[:] = about[:, j].T
+        sums[:] = 0.0
+        for i in range(len(counted)):
+            x, y, z, w = orientations[i, joints[j]]
+            for t in range(count):
+                cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
+                signed[t] = -counted[i, t] if cosine < 0.0 else counted[i, t]
+            for t in range(count):
+                sums[0, t] += signed[t] * x
+            for t in range(count):
+                sums[1, t] += signed[t] * y
+            for t in range(count):
+                sums[2, t] += signed[t] * z
+            for t in range(count):
+                sums[3, t] += signed[t] * w
+        for t in range(count):
+            x, y, z, w = sums[:, t]
             length = np.sqrt(x * x + y * y + z * z + w * w)
             if length > 1e-6:
                 out[t, j, 0], out[t, j, 1], out[t, j, 2], out[t, j, 3] = x / length, y / length, z / length, w / length

@@ -30,7 +30,7 @@ from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
 from motionmind.realise.root import root_trajectory, stand
 from motionmind.realise.timeline import Timeline, durations
-from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON
+from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, squared_distances
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -171,6 +171,15 @@ def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[
     assert np.all(np.sum(mean * about, axis=-1) > 0.0)  # in its hemisphere
     none = mean_rotations(np.zeros((2, 2)), q, np.array([0]), about)
     np.testing.assert_array_equal(none, about)
+
+
+def test_parts_are_as_far_from_postures_as_their_joints_are_in_the_mean() -> None:
+    rng = np.random.default_rng(5)
+    shown, postures = rot.normalise(rng.normal(size=(7, 3, 4))), rot.normalise(rng.normal(size=(2, 3, 4)))
+    far = squared_distances(shown, np.array([[0, 1], [0, 1], [0, 2]]), 3, postures)
+    turns = 4.0 * np.sin(0.5 * rot.angle(shown, postures[:, None])) ** 2
+    expected = [turns.mean(axis=-1), turns[..., :2].mean(axis=-1), turns[..., 2]]
+    np.testing.assert_allclose(far, expected, atol=1e-12)
 
 
 # --- detail -----------------------------------------------------------------------------------------------------------
