@@ -12,6 +12,7 @@ second; of `cmu-135`, on which nothing was chosen, 0.5 %). Thighs begin below th
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -83,15 +84,20 @@ class Capsules(NamedTuple):
 
         They are a leg and the other; an arm and the other; forearms and hands with trunk, head and legs.
         """
-        legs, arms = (
-            [[number for number, name in enumerate(self.names) if name in _sided(side, parts)] for side in SIDES]
-            for parts in (LEG, ARM)
-        )
-        lower = [number for number, name in enumerate(self.names) if name.endswith(("forearm", "hand"))]
-        rest = [number for number, name in enumerate(self.names) if name in _MIDDLE or name.endswith(LEG)]
-        chosen = [(one, other) for limbs in (legs, arms) for one in limbs[0] for other in limbs[1]]
-        chosen += [(one, other) for one in lower for other in rest]
-        return np.array(chosen, dtype=np.int64).reshape(-1, 2)
+        return np.array(_pairs(self.names), dtype=np.int64).reshape(-1, 2)
+
+
+@lru_cache(maxsize=4)
+def _pairs(names: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Return the pairs of `Capsules.pairs`, by the capsules' names."""
+    legs, arms = (
+        [[number for number, name in enumerate(names) if name in _sided(side, parts)] for side in SIDES]
+        for parts in (LEG, ARM)
+    )
+    lower = [number for number, name in enumerate(names) if name.endswith(("forearm", "hand"))]
+    rest = [number for number, name in enumerate(names) if name in _MIDDLE or name.endswith(LEG)]
+    chosen = [(one, other) for limbs in (legs, arms) for one in limbs[0] for other in limbs[1]]
+    return chosen + [(one, other) for one in lower for other in rest]
 
 
 def capsules_of(skeleton: Skeleton) -> Capsules:

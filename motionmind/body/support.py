@@ -61,15 +61,31 @@ def find_support(
         floor: height of the floor, or in each frame [T], metres.
     """
     places, joints = contact_points(skeleton, rotations, root)
-    limb, size = limb_of_points(skeleton)[joints], size_of(skeleton)
+    limb = limb_of_points(skeleton)[joints]
+    bears, airborne, touches = find_bearers(places, limb, size_of(skeleton), fps, floor)
+    mass = centre_of_mass(skeleton, rotations, root)
+    over = None if mass is None else overhang(places[..., [0, 2]], touches, mass[:, [0, 2]])
+    return Support(bears, airborne, mass, over)
+
+
+def find_bearers(
+    places: Floats, limb: Ints, size: float, fps: float, floor: float | Floats = 0.0
+) -> tuple[Bools, Bools, Bools]:
+    """Find which limbs bear a body [T, limbs + 1], when it is in the air [T], and which points are its support [T, P].
+
+    Args:
+        places: of the points that can touch the floor [T, P, 3], metres.
+        limb: the limb, or trunk, that each belongs to [P].
+        size: of the body (`size_of`).
+        fps: frames a second.
+        floor: height of the floor, or in each frame [T], metres.
+    """
     lowest = places[..., 1].min(axis=-1)
     airborne = lowest > floor + AIRBORNE * size
     low = (places[..., 1] <= lowest[:, None] + NEAR * size) & ~airborne[:, None]
     firm = low & (_speeds(places, fps) < STILL * size)
     bears = np.stack([firm[:, limb == number].any(axis=1) for number in range(limb.max() + 1)], axis=1)
-    mass = centre_of_mass(skeleton, rotations, root)
-    over = None if mass is None else overhang(places[..., [0, 2]], low & bears[:, limb], mass[:, [0, 2]])
-    return Support(bears, airborne, mass, over)
+    return bears, airborne, low & bears[:, limb]
 
 
 def size_of(skeleton: Skeleton) -> float:

@@ -55,26 +55,51 @@ def balance_rows(
     pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
     since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)
     fades = 1.0 - since * since * (3.0 - 2.0 * since)
-    rows = []
+    rows, frames = [], np.arange(len(lever))
     for point, share, room in ((pressure, lever, ROOM), (centre, 0.0 * lever, overhang)):
         nearest = nearest_in_support(points, touches, point)
-        beyond = point - nearest
-        far = np.linalg.norm(beyond, axis=1)
-        # Ends may be beyond the support; the body comes back from there, and goes there, within a while.
-        allowed = np.maximum(np.maximum(far[0] * fades, far[-1] * fades[::-1]), room)
-        over = np.maximum(far - allowed, 0.0)
-        weights = np.where(over > 0.0, OVER**-2.0 / np.sqrt(1.0 + (over / GIVES) ** 2), 0.0)
-        along = beyond / np.maximum(far, 1e-9)[:, None]
-        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        for direction, further, weight in ((along, np.minimum(far, allowed), weights), (across, 0.0, ACROSS * weights)):
-            coefficients, target = np.zeros((len(far) - 2, 9)), np.sum(direction * nearest, axis=1) + further
-            missing = target[1:-1]
-            for k, axis in enumerate((0, 2)):
-                part = direction[1:-1, k]
-                coefficients[:, axis::3] = part[:, None] * np.stack([-share, 1.0 + 2.0 * share, -share], axis=1)
-                missing = missing - part * (own[1:-1, k] - share * np.diff(own[:, k], 2))
-            rows.append(Rows(np.arange(len(missing)), coefficients, missing, weight[1:-1]))
+        rows += [Rows(frames, *row) for row in _rows_towards(nearest, point, own, share, fades, room)]
     return rows
+
+
+@jit
+def _rows_towards(
+    nearest: Floats, point: Floats, own: Floats, share: Floats, fades: Floats, room: float
+) -> list[tuple[Floats, Floats, Floats]]:
+    """Return rows that bring a point towards the nearest of the support, and rows that keep it from going round that.
+
+    Args:
+        nearest: level places of the support [N, 2], metres.
+        point: those of the point that is to be near them: c - s c'' of the centre of mass c [N, 2].
+        own: of the centre of mass relative to the root [N, 2].
+        share: s of all frames but the first and the last [N - 2], in frames^2.
+        fades: how far the body is yet from having left the first frame [N], from 1 to 0.
+        room: how far beyond the support the point may be, metres.
+
+    Returns:
+        Coefficients [N - 2, 9], targets and weights [N - 2] of both.
+    """
+    count = len(point)
+    far = np.sqrt((point[:, 0] - nearest[:, 0]) ** 2 + (point[:, 1] - nearest[:, 1]) ** 2)
+    coefficients, targets, weights = np.zeros((2, count - 2, 9)), np.empty((2, count - 2)), np.empty((2, count - 2))
+    for t in range(1, count - 1):
+        # Ends may be beyond the support; the body comes back from there, and goes there, within a while.
+        allowed = max(far[0] * fades[t], far[-1] * fades[count - 1 - t], room)
+        over, s = max(far[t] - allowed, 0.0), share[t - 1]
+        pull = OVER**-2.0 / np.sqrt(1.0 + (over / GIVES) ** 2) if over > 0.0 else 0.0
+        x, y = (point[t] - nearest[t]) / max(far[t], 1e-9)
+        for row, direction, further, weight in (
+            (0, (x, y), min(far[t], allowed), pull),
+            (1, (-y, x), 0.0, ACROSS * pull),
+        ):
+            target = direction[0] * nearest[t, 0] + direction[1] * nearest[t, 1] + further
+            for k in range(2):
+                bends = (own[t + 1, k] - own[t, k]) - (own[t, k] - own[t - 1, k])
+                target -= direction[k] * (own[t, k] - s * bends)
+                for frame, factor in enumerate((-s, 1.0 + 2.0 * s, -s)):
+                    coefficients[row, t - 1, 3 * frame + 2 * k] = direction[k] * factor
+            targets[row, t - 1], weights[row, t - 1] = target, weight
+    return [(coefficients[row], targets[row], weights[row]) for row in range(2)]
 
 
 def walks(root: Floats, fps: float) -> bool:

@@ -185,7 +185,7 @@ def find_bearing(
     borne = [np.zeros(0, dtype=np.bool_) for _ in feet]
     for _ in range(2):  # each foot steps where others stand, as they did the last time
         for k in range(len(feet)):
-            bears = np.delete(stands, k, axis=1).any(axis=1) | rests
+            bears = stands[:, [other for other in range(len(feet)) if other != k]].any(axis=1) | rests
             if np.array_equal(bears, borne[k]):
                 continue  # as the last time
             borne[k] = bears

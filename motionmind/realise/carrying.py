@@ -109,17 +109,22 @@ def carry(
     """
     count = len(rotations)
     shape = shape_of(skeleton, plain, feet)
-    mass = _mass(skeleton, plain)
+    mass = own_mass = _mass(skeleton, plain)
     standing = floor - shape.lowest
     above = root[[0, -1], 1] - standing[[0, -1]]
     staying = find_staying(shape, root[:, [0, 2]]) if above.max() < TIPTOE else None
     hovering = [staying is None and known.aloft[end] > SURELY and above[end] > HOVERS for end in (0, -1)]
     flights = []
     if "flight" not in without and staying is None:
-        masses = root[[0, -1], 1] + mass[[0, -1], 1]
-        up = standing + mass[:, 1]
         flights = find_flights(
-            known.aloft, known.leaps, up, masses, (hovering[0], hovering[1]), known.rates, gravity, fps
+            known.aloft,
+            known.leaps,
+            standing + mass[:, 1],
+            root[[0, -1], 1] + mass[[0, -1], 1],
+            (hovering[0], hovering[1]),
+            known.rates,
+            gravity,
+            fps,
         )
     flying, freedom = flying_frames(flights, (hovering[0], hovering[1]), count), leg_freedom(flights, count, fps)
     planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
@@ -131,14 +136,16 @@ def carry(
     fixed[[1, -2]] |= known.moving
     own = pose(skeleton, plain)
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
+    touches = bearing.touching(shape)
     balances = "balance" not in without and bool(mass.any())
     stands = balances and staying is None and "steps" not in without and not walks(root, fps)
     for number_of_round in range(ROUNDS[0]):
         if number_of_round and stands:
-            falls = _falls(shape, bearing, start, mass, overhang)
+            falls = _falls(shape, bearing, touches, start, mass, overhang)
             if falls is not None:
                 bearing = find_bearing(*planned, falls)
-        mass = _mass(skeleton, posed)
+                touches = bearing.touching(shape)
+        mass = own_mass if posed is plain else _mass(skeleton, posed)
         steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += prior_rows(root, bearing, fps)
         steady += standing_rows(shape, bearing, floor, freedom)
@@ -149,14 +156,16 @@ def carry(
             rows += reach_rows(skeleton, legs, bearing, start, feet, fps)
             rows += knee_rows(skeleton, legs, bearing, start, feet, freedom)
             if balances:
-                points, touches = _points_on_floor(shape, bearing, start), bearing.touching(shape)
-                centre, level, height = start + mass, [0, 2], (start + mass)[:, 1] - floor
-                rows += balance_rows(points, touches, centre[:, level], mass[:, level], height, overhang, gravity, fps)
+                points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
+                weight = centre[:, level], mass[:, level], centre[:, 1] - floor
+                rows += balance_rows(points, touches, *weight, overhang, gravity, fps)
             start = solve(rows, start, fixed)
         off = _departures(skeleton, shape, bearing, floor, start, feet, known.moving, fps)
-        posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
-    detailed = shape if np.array_equal(plain, rotations) else shape_of(skeleton, rotations, feet)
-    falls = _mass(skeleton, plain) - _mass(skeleton, rotations)
+        if number_of_round < ROUNDS[0] - 1:
+            posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
+    detailed, falls = shape, np.zeros((count, 3))
+    if not np.array_equal(plain, rotations):
+        detailed, falls = shape_of(skeleton, rotations, feet), own_mass - _mass(skeleton, rotations)
     start, off, heights = _with_detail(shape, detailed, bearing, falls, flying, start, off, floor, fps)
     return Carried(start, off, bearing.holds(fps), heights, 1.0 - freedom, staying)
 
@@ -244,18 +253,21 @@ def _mass(skeleton: Skeleton, rotations: Floats) -> Floats:
     return still if mass is None else mass
 
 
-def _falls(shape: Shape, bearing: Bearing, root: Floats, mass: Floats, overhang: float) -> Floats | None:
+def _falls(
+    shape: Shape, bearing: Bearing, touches: Bools, root: Floats, mass: Floats, overhang: float
+) -> Floats | None:
     """Return how far a body would fall without each foot [N, feet], from 0 to 1; None where it is in balance.
 
     Args:
         shape: the body.
         bearing: what bears it.
+        touches: which of its points bear it on the floor [N, P].
         root: positions of the root [N, 3], metres.
         mass: centre of mass relative to it [N, 3], metres.
         overhang: how far beyond its support that may be, metres.
     """
     points, centre = _points_on_floor(shape, bearing, root), (root + mass)[:, [0, 2]]
-    if not is_beyond(points, bearing.touching(shape), centre, overhang)[1:-1].any():
+    if not is_beyond(points, touches, centre, overhang)[1:-1].any():
         return None
     return falls_without(points, bearing.all_standing().touching(shape), shape.feet, centre, overhang)
 

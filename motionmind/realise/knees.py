@@ -97,7 +97,8 @@ def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
     width = min(max(round(seconds * fps), 1), len(values) - 1)
     weights = np.hanning(2 * width + 3)[1:-1]
     # Mirrored through its ends, so that these stay.
-    around = np.pad(values, width, mode="reflect", reflect_type="odd")
+    before, after = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
+    around = np.concatenate([before, values, after])
     return np.asarray(np.convolve(around, weights / weights.sum(), "valid"))
 
 

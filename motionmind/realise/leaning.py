@@ -15,7 +15,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.limits import within_limits
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.support import NEAR, find_support, size_of
+from motionmind.body.support import centre_of_mass, find_bearers, size_of
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, balance_rows, is_beyond, walks
 from motionmind.realise.feet import QUICK, bend_legs, find_free_feet, pose
@@ -60,31 +60,30 @@ def shift_weight(
     size, feet = size_of(skeleton), find_free_feet(skeleton, fixed)
     if len(root) < 3 or not feet or len(feet) < len(find_legs(skeleton)[0]) or walks(root / size, fps):
         return rotations, root
-    support = find_support(skeleton, rotations, root, fps)
-    if support.mass is None:
+    centre = centre_of_mass(skeleton, rotations, root)
+    if centre is None:
         return rotations, root
     places, joints = contact_points(skeleton, rotations, root)
-    low = places[..., 1] <= places[..., 1].min(axis=1, keepdims=True) + NEAR * size
-    touches = low & support.bears[:, limb_of_points(skeleton)[joints]]
-    points, mass, allowed = places[..., [0, 2]] / size, support.mass[:, [0, 2]] / size, overhang / size
-    calm = support.bears.sum(axis=1) == 1
+    bears, _, touches = find_bearers(places, limb_of_points(skeleton)[joints], size, fps)
+    points, mass, allowed = places[..., [0, 2]] / size, centre[:, [0, 2]] / size, overhang / size
+    calm = bears.sum(axis=1) == 1
     calm[1:-1] &= np.linalg.norm(np.diff(mass, 2, axis=0), axis=1) * fps**2 < STILL
     if not (is_beyond(points, touches, mass, allowed) & calm & ~given).any():
         return rotations, root
-    height = (support.mass[:, 1] - places[..., 1].min(axis=1)) / size
-    shift = np.zeros_like(root)
+    height = (centre[:, 1] - places[..., 1].min(axis=1)) / size
+    shift, none = np.zeros_like(root), np.zeros(len(root))
+    small = []  # what keeps the shift small, and smooth
+    for axis in range(3):
+        small.append(position_rows(np.arange(len(root)), np.eye(3)[axis], none, none + SHIFTS**-2.0))
+        bends = (fps**2, -2.0 * fps**2, fps**2)
+        small.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
     for _ in range(ROUNDS):
         now = mass + shift[:, [0, 2]]
         rows = [
             row._replace(weights=row.weights * calm[1:-1])
             for row in balance_rows(points, touches, now, mass, height, allowed, GRAVITY / size, fps)
         ]
-        for axis in range(3):
-            along, none = np.tile(np.eye(3)[axis], (len(root), 1)), np.zeros(len(root))
-            rows.append(position_rows(np.arange(len(root)), along, none, none + SHIFTS**-2.0))
-            bends = (fps**2, -2.0 * fps**2, fps**2)
-            rows.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
-        shift = solve(rows, shift, given)
+        shift = solve(rows + small, shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
     most = None if fastest is None else np.maximum(QUICK * fastest, HURRIES * _fastest_turns(rotations, fps))[legs]

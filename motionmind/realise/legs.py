@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from motionmind._typing import Floats
@@ -25,12 +27,15 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
         joint between its two longest neighbouring bones.
     """
     numbers, out, above = [], [], stem_of(skeleton)[-1]
+    lengths, tips = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
     for number, limb in enumerate(limbs_of(skeleton)):
-        bones = np.linalg.norm([*skeleton.offsets[limb[1:]], skeleton.tips[limb[-1]]], axis=-1)
-        pairs = np.minimum(bones[:-1], bones[1:])
-        if skeleton.parents[limb[0]] == above and len(limb) > 1 and pairs.max() > 0.0:
+        if skeleton.parents[limb[0]] != above or len(limb) < 2:
+            continue
+        bones = [*lengths[limb[1:]].tolist(), float(tips[limb[-1]])]
+        pairs = [min(pair) for pair in pairwise(bones)]
+        if max(pairs) > 0.0:
             numbers.append(number)
-            out.append((limb, int(np.argmax(pairs)) + 1))
+            out.append((limb, pairs.index(max(pairs)) + 1))
     return numbers, out
 
 

@@ -23,7 +23,7 @@ from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
-from motionmind.learned.pace import moved_in, steps_of, way_of
+from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
 from motionmind.realise.timeline import Timeline, stretch
@@ -61,7 +61,8 @@ def keep_pace(
     root = np.concatenate([np.zeros((1, 3)), np.cumsum(travel, axis=0)])
     at = np.stack([np.interp(frames, times, axis) for axis in root.T], axis=1)
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, frames)))
-    speeds = way_of(Motion(corpus.skeleton, rotations, at, frames)).parts / np.diff(frames)[:, None]
+    way = ways(corpus.skeleton, (rotations[:-1], rotations[1:]), (at[:-1], at[1:]))
+    speeds = way.parts / np.diff(frames)[:, None]
     slower = np.ones(len(travel))
     step = np.searchsorted(times, 0.5 * (frames[1:] + frames[:-1])) - 1
     np.maximum.at(slower, step.clip(0, len(slower) - 1), (speeds / (HEADROOM * fastest)).max(axis=1))
