@@ -108,11 +108,12 @@ def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> F
     normal = rot.cross(thigh, shank)
     if usual is None:
         usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
-    # Straight in all frames: the body axis most nearly at right angles to the thigh, made exactly so.
-    bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
-    across = np.eye(3)[np.argmin(np.abs(bone), axis=-1)]
-    across -= bone * (np.sum(across * bone, axis=-1) / np.sum(bone * bone, axis=-1))[..., None]
-    usual = np.where(rot.norm(usual)[..., None] < 1e-9, across, usual)
+    straight = rot.norm(usual)[..., None] < 1e-9
+    if straight.any():  # in all frames: the body axis most nearly at right angles to the thigh, made exactly so
+        bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
+        across = np.eye(3)[np.argmin(np.abs(bone), axis=-1)]
+        across -= bone * (np.sum(across * bone, axis=-1) / np.sum(bone * bone, axis=-1))[..., None]
+        usual = np.where(straight, across, usual)
     size = rot.norm(thigh) * rot.norm(shank)
     normal += (HINGE * size)[..., None] * rot.mul_vec(hip, usual / rot.norm(usual)[..., None])
     return np.asarray(normal / rot.norm(normal)[..., None])

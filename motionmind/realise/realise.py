@@ -123,8 +123,8 @@ def realise(
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
     walk = _walk_near(states, clock, stops, corpus, carriage, length is None and not through)
-    within = _bounds(walk, path, clock, corpus, grammar, tolerances, wished)
-    walk = _bend_to_states(walk, states, clock, stops, corpus, within)
+    within = _bounds(chains := walk.chains(corpus, clock.moves), path, grammar, tolerances, wished)
+    walk = _bend_to_states(walk, chains, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
     if length is None:
@@ -225,23 +225,14 @@ def _walk_near(
     return expect(corpus, carriage, stops, half_steps, path, near)
 
 
-def _bounds(
-    walk: Expectation,
-    path: Int32s,
-    clock: Timeline,
-    corpus: Corpus,
-    grammar: Grammar,
-    tolerances: Floats,
-    wished: Bools,
-) -> Floats:
-    """Return how far each chain may be off its state at each move [T + 1, L], radians.
+def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:
+    """Return how far each chain may be off its state at each move [T + 1, L], radians; the walk has them at `chains`.
 
     It is FIRMLY the chain's tolerance where something is asked of it. Elsewhere it is FREELY as much, and what the walk
     is beyond the tolerance of every state: of a vocabulary that has nothing near, no state is to be forced on a
     movement.
     """
-    chains, starts = walk.chains(corpus, clock.moves), grammar.transitions.starts
-    beyond = np.empty(path.shape)
+    starts, beyond = grammar.transitions.starts, np.empty(path.shape)
     for chain, tolerance in enumerate(tolerances):
         centres = grammar.centres[starts[chain] : starts[chain + 1]]
         nearest = 2.0 * np.arccos(np.minimum(np.abs(chains[:, chain] @ centres.T).max(axis=1), 1.0))
@@ -251,6 +242,7 @@ def _bounds(
 
 def _bend_to_states(
     walk: Expectation,
+    chains: Floats,
     states: Floats,
     clock: Timeline,
     stops: Mapping[int, Stop],
@@ -259,12 +251,13 @@ def _bend_to_states(
 ) -> Expectation:
     """Return a walk bent so that each chain is `within` radians [T + 1, L] of its state [T + 1, L, 4] at each move.
 
+    Before, it has the chains at the moves as given [T + 1, L, 4].
+
     The bend of each move is 0 at the stops and where the chain is near already; between moves it is a spline.
     """
     joints, inner = walk.poses.shape[1], np.ones(len(states), dtype=np.bool_)
     inner[list(stops)] = False
-    poses = rotation_spline(walk.half_steps, walk.poses, clock.moves)
-    missing = rot.log(rot.inv_mul(poses, states[:, :joints]))
+    missing = rot.log(rot.inv_mul(chains[:, :joints], states[:, :joints]))
     far = rot.norm(missing)[..., None]
     bends = missing * np.maximum(1.0 - within[:, :joints, None] / np.maximum(far, 1e-9), 0.0) * inner[:, None, None]
     poses = rot.mul(walk.poses, rot.exp(natural_spline(clock.moves, bends, walk.half_steps)))

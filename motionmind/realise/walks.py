@@ -92,5 +92,5 @@ def likelihood(*terms: Floats) -> Floats:
     Args:
         terms: squared distances in units of a variance [..., N] each.
     """
-    exponent = 0.5 * np.sum(terms, axis=0)
+    exponent = 0.5 * sum(terms[1:], start=terms[0])
     return np.asarray(np.exp(exponent.min(axis=-1, keepdims=True) - exponent))
