@@ -20,7 +20,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
-from numba.core import ccallback, compiler, serialize, sigutils
+from numba.core import ccallback, codegen, compiler, serialize, sigutils
 from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
@@ -33,7 +33,8 @@ _MONTH = 30 * 86400.0  # seconds
 # Of numba's core, which is not typed.
 _normalise: Any = sigutils.normalize_signature
 _CFunc: Any = ccallback.CFunc
-_Result: Any = compiler.CompileResult
+_result: Any = compiler.compile_result
+_parse: Any = codegen.ll.parse_bitcode
 _dumps: Any = serialize.dumps
 
 
@@ -145,7 +146,7 @@ class _Kept:
         try:
             if hashlib.sha256(data[_HASH:]).digest() != data[:_HASH]:
                 raise ValueError("not what was written")
-            return _Result._rebuild(context, *pickle.loads(data[_HASH:]))
+            return _link(context, *pickle.loads(data[_HASH:]))
         except Exception:  # whatever unpickling and linking raise
             _say(f"compiled code in {file.parents[1]} was damaged; it is compiled again")
             with suppress(OSError):
@@ -157,7 +158,7 @@ class _Kept:
         file = self._file(signature, compiled.codegen)
         if file is None or compiled.lifted or compiled.library.has_dynamic_globals:
             return
-        data = _dumps(compiled._reduce())
+        data = _dumps((_symbols(compiled.library), *compiled._reduce()))
         try:
             replace_file(file, hashlib.sha256(data).digest() + data)
         except OSError as error:
@@ -171,6 +172,55 @@ class _Kept:
         key = (numba.__version__, sys.version_info, str(signature), codegen.magic_tuple(), values)
         name = re.sub(r"[^\w.]", "", f"{Path(code.co_filename).stem}.{code.co_qualname}")
         return folder / f"{name}-{code.co_firstlineno}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
+
+
+def _symbols(library: Any) -> frozenset[str]:
+    """Return the names of what compiled code defines."""
+    module = library._get_module_for_linking()
+    defined = (one for kind in (module.functions, module.global_variables) for one in kind if not one.is_declaration)
+    return frozenset(one.name for one in defined)
+
+
+def _link(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> Any:
+    """Return the result of a compilation that was kept, as numba's `_rebuild` does, in a quarter of the time.
+
+    numba reads the intermediate code too, which only serves to compile another function that calls this one: here it is
+    read then.
+
+    Args:
+        context: the target that it was compiled for.
+        symbols: what it defines.
+        state: the library that `CompileResult._reduce` returned: its name, and machine and intermediate code.
+        reduced: the rest of what it returned.
+    """
+    description, environment, signature, objectmode, lifted, annotation, reload_init, environments = reduced
+    for function in reload_init:
+        function()
+    name, _, (machine, intermediate) = state
+    target = context.codegen()
+    library = target.create_library(name)
+    library.enable_object_caching()
+    library._set_compiled_object(machine)
+    library._get_module_for_linking = cache(lambda: _parse(intermediate))
+    library._finalize_final_module()
+    target._engine._defined_symbols |= symbols
+    entry = context.get_executable(library, description, environment)
+    for one in environments:
+        target.set_env(one.env_name, one)
+    return _result(
+        target_context=context,
+        typing_context=context.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=entry,
+        fndesc=description,
+        type_annotation=annotation,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        reload_init=reload_init,
+        referenced_envs=environments,
+    )
 
 
 def _folders() -> list[Path]:

@@ -99,6 +99,18 @@ def test_what_was_not_used_for_a_month_is_removed_when_something_else_is_compile
     assert (mine / "code.nbc").exists()
 
 
+@pytest.mark.usefixtures("place")
+def test_what_was_kept_is_called_from_what_is_compiled_later() -> None:
+    def doubled(x: float) -> float:
+        return 2.0 * x
+
+    assert door.jit(doubled)(4.0) == 8.0
+    kept = door.jit(doubled)
+    assert kept(4.0) == 8.0
+    assert sum(kept._cache_hits.values()) == 1  # type: ignore[attr-defined]
+    assert door.jit(lambda x: kept(x) + 1.0)(4.0) == 9.0
+
+
 @door.jit
 def applied(function: object, times: int) -> float:
     value = 1.0
