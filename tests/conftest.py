@@ -35,6 +35,13 @@ settings.load_profile("motionmind")
 
 # Drawing in software takes most of the time of a page's tests: only canvases are drawn by WebGL, not the page around.
 _FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
+# Each window would load two pages for what drops from the address bar, and start a process for a page to come: half of
+# what it costs to open a page. The others are those that Playwright switches off, whose list this one replaces.
+_FEATURES = ["WebUIOmniboxPopup", "WebUIOmniboxAimPopup", "SpareRendererForSitePerProcess"]
+_FEATURES += ["AvoidUnnecessaryBeforeUnloadCheckSync", "DestroyProfileOnBrowserClose", "HttpsUpgrades", "LensOverlay"]
+_FEATURES += ["MediaRouter", "PaintHolding", "ThirdPartyStoragePartitioning", "OptimizationHints", "AimEnabled"]
+_FEATURES += ["HttpsFirstBalancedModeAutoEnable", "AvoidCorsURLLoaderRestartOnRedirect", "NetworkTimeServiceQuerying"]
+_FLAGS.append(f"--disable-features={','.join([*_FEATURES, 'PreconnectToSearch'])}")
 TESTS = Path(__file__).parent
 SHARED_DATA = TESTS.parents[1] / "shared" / "data"
 
