@@ -34,7 +34,7 @@ _MONTH = 30 * 86400.0  # seconds
 _normalise: Any = sigutils.normalize_signature
 _CFunc: Any = ccallback.CFunc
 _result: Any = compiler.compile_result
-_parse: Any = codegen.ll.parse_bitcode
+_codegen: Any = codegen
 _dumps: Any = serialize.dumps
 
 
@@ -201,7 +201,7 @@ def _link(context: Any, symbols: frozenset[str], state: Any, *reduced: Any) -> A
     library = target.create_library(name)
     library.enable_object_caching()
     library._set_compiled_object(machine)
-    library._get_module_for_linking = cache(lambda: _parse(intermediate))
+    library._get_module_for_linking = cache(lambda: _codegen.ll.parse_bitcode(intermediate))
     library._finalize_final_module()
     target._engine._defined_symbols |= symbols
     entry = context.get_executable(library, description, environment)

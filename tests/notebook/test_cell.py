@@ -39,13 +39,18 @@ def motion_of(thing: Any) -> Motion:
 
 
 @pytest.fixture
-def opened(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
-    """Open cells in one page, as a notebook shows them, and wait until each plays; what was asked for is `asked`."""
-    tab = browser.new_page(viewport={"width": 800, "height": 600})
+def opened(request: pytest.FixtureRequest, browser: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
+    """Open cells in one page, as a notebook shows them, and wait until each is there; what was asked for is `asked`.
+
+    They play by themselves only where that is asked for, and are drawn with few pixels: drawing in software is most of
+    a test's time.
+    """
+    tab = browser.new_page(viewport={"width": 800, "height": 600}, device_scale_factor=0.5)
     asked: list[str] = []
     tab.on("request", lambda request: asked.append(request.url))
 
-    def call(*cells: str) -> Any:
+    def call(*cells: str, plays: bool = False) -> Any:
+        tab.emulate_media(reduced_motion="no-preference" if plays else "reduce")
         (tmp_path / "notebook.html").write_text("<!doctype html><meta charset=utf-8>" + "".join(cells), "utf-8")
         tab.goto((tmp_path / "notebook.html").as_uri())
         for frame in tab.query_selector_all("iframe"):
@@ -66,7 +71,7 @@ def opened(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Any]]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cell_plays_the_movement_and_asks_nothing_of_the_network(kind: str, opened: Callable[..., Any]) -> None:
     thing = KINDS[kind]()
-    tab = opened(thing._repr_html_())
+    tab = opened(thing._repr_html_(), plays=True)
     (frame,) = tab.frames[1:]
     shown = frame.evaluate("({ frames: motionmind.motion.length, joints: motionmind.motion.joints })")
     motion = motion_of(thing)
