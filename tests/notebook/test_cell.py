@@ -93,7 +93,7 @@ def test_the_frame_knows_nothing_of_the_notebook(opened: Callable[..., Any]) -> 
 
 
 def test_a_film_is_saved_from_the_frame(opened: Callable[..., Any]) -> None:
-    tab = opened(html_of(ADAGIO.slice(0, 3)))
+    tab = opened(html_of(ADAGIO.resample(25.0).slice(0, 6)))
     with tab.expect_download(timeout=60_000) as download:
         tab.frames[1].click("#film")
     assert download.value.suggested_filename.endswith(".webm")
