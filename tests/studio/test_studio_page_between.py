@@ -92,7 +92,6 @@ def test_only_one_renderer_draws_all_alternatives(studio_page: Any) -> None:
 
 def test_pointing_at_a_joint_says_where_it_was_seen(studio_page: Any) -> None:
     from_a_to_b(studio_page)
-    studio_page.get_by_test_id("play-alternatives").click()
     box = studio_page.get_by_test_id("alternative-1").bounding_box()
     words = studio_page.get_by_test_id("alternative-1").locator(".seen")
     said = set()
