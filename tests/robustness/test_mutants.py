@@ -94,6 +94,9 @@ def test_outcomes(test: str, outcome: str, tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(mutants, "COPIED", ["motionmind", "tests"])
     monkeypatch.setattr(mutants, "LONGEST_START", 1.0 if outcome == mutants.HANGS else 60.0)
     monkeypatch.setattr(mutants, "PATIENCE", 1.0)
+    # These tests need no plugin but that for `-n`; others take most of a start.
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("PYTEST_PLUGINS", "xdist.plugin")
     for name, text in (
         ("motionmind/__init__.py", ""),
         ("motionmind/plain.py", "y = 1\n"),
