@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import logging
 import os
 import random
@@ -12,6 +13,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 import pytest
 
@@ -32,14 +35,63 @@ print(sum(sum(one._cache_misses.values()) for one in (squared_distance, radius_a
 """
 
 
-def run(home: Path, program: str = PROGRAM, **environment: str) -> subprocess.CompletedProcess[str]:
+# Runs programs, each in a process of its own that begins with what this one has imported and with a compiler that has
+# compiled something, which is most of what a program takes. No function of the package is compiled or looked for yet.
+_STARTER = """
+import json, os, sys, tempfile
+import numba
+import motionmind.body.capsules, motionmind.geometry.distances
+
+numba.njit(lambda x: x + 1.0)(1.0)
+for line in sys.stdin:
+    if (child := os.fork()) == 0:
+        program, environment, out, error = json.loads(line)
+        os.environ.clear()
+        os.environ.update(environment)
+        tempfile.tempdir = None
+        for stream, path in ((1, out), (2, error)):
+            os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), stream)
+        exec(program, {})
+        sys.exit()
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+class Told(NamedTuple):
+    """What a program printed."""
+
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture(scope="module", autouse=True)
+def starter() -> Iterator[None]:
+    """The process that programs begin in."""
+    global _starter
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
+    words = [sys.executable, "-c", _STARTER]
+    with subprocess.Popen(words, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as _starter:
+        yield
+
+
+_starter: subprocess.Popen[str]
+
+
+def run(home: Path, program: str = PROGRAM, **environment: str) -> Told:
     """Run a program whose caches and temporary files are in a folder."""
     places = {"XDG_CACHE_HOME": str(home / "cache"), "TMPDIR": str(home / "tmp"), "PYTHONPATH": str(PACKAGE.parent)}
     (home / "tmp").mkdir(exist_ok=True)
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    return subprocess.run(
-        [sys.executable, "-c", program], env=kept | places | environment, capture_output=True, text=True, check=True
-    )
+    assert _starter.stdin is not None
+    assert _starter.stdout is not None
+    with TemporaryDirectory() as place:
+        told = [Path(place) / name for name in ("out", "error")]
+        _starter.stdin.write(json.dumps([program, kept | places | environment, *map(str, told)]) + "\n")
+        _starter.stdin.flush()
+        code = int(_starter.stdout.readline())
+        found = Told(*(path.read_text("utf-8") for path in told))
+    assert code == 0, found.stderr
+    return found
 
 
 def kept(home: Path) -> list[Path]:
@@ -200,30 +252,22 @@ def failing(error: OSError) -> Callable[..., object]:
 def test_many_processes_that_compile_at_once_all_succeed(tmp_path: Path) -> None:
     # Each compiles for types of its own first, then for those of all.
     program = """
-import sys
+import os, sys
 import numpy as np
 from motionmind.geometry.distances import squared_distance
 kinds = [np.float32, np.float64, np.int64]
-first = int(sys.argv[1])
-for kind in kinds[first:] + kinds[:first]:
-    print(squared_distance(np.ones((2, 4), kind), np.zeros((2, 4), kind)))
-print(sum(squared_distance._cache_misses.values()))
+for first in range(3):
+    if os.fork() == 0:
+        order = kinds[first:] + kinds[:first]
+        found = [squared_distance(np.ones((2, 4), kind), np.zeros((2, 4), kind)) for kind in order]
+        print(*found, sum(squared_distance._cache_misses.values()))
+        sys.exit()
+for _ in range(3):
+    assert os.wait()[1] == 0
 """
-    places = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": str(PACKAGE.parent)}
-    kept_environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-
-    def start(first: int) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-c", program, str(first)],
-            env=kept_environment | places,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
     for is_kept in (False, True):
-        outputs = [process.communicate() for process in [start(first) for first in range(3)]]
-        assert {error for _, error in outputs} == {""}
-        assert {tuple(sorted(out.splitlines()[:3])) for out, _ in outputs} == {("8.0",) * 3}
-        if is_kept:
-            assert {out.splitlines()[-1] for out, _ in outputs} == {"0"}
+        told = run(tmp_path, program)
+        assert told.stderr == ""
+        lines = [line.split() for line in told.stdout.splitlines()]
+        assert [line[:3] for line in lines] == [["8.0"] * 3] * 3
+        assert all(line[3] == "0" for line in lines) or not is_kept
