@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motionmind import files
 from motionmind.corpus import store
 
 MANIFEST = {"name": "arms", "clips": []}
@@ -77,5 +81,42 @@ def main(words: Mapping[str, str]) -> None:
             store.delete(folder.name, home)
 
 
+def changed(**words: object) -> int:
+    """Run `main` in a process that begins with what another one has imported; its exit code, or minus a signal."""
+    starter = _starter()
+    assert starter.stdin is not None
+    assert starter.stdout is not None
+    starter.stdin.write(json.dumps({name: str(value) for name, value in words.items()}) + "\n")
+    starter.stdin.flush()
+    return int(starter.stdout.readline())
+
+
+@cache
+def _starter() -> subprocess.Popen[str]:
+    """The process that the others are forked from; it ends with this one."""
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(Path(files.__file__).parents[1])}
+    words = [sys.executable, __file__]
+    starter = subprocess.Popen(words, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    atexit.register(_end, starter)
+    return starter
+
+
+def _end(starter: subprocess.Popen[str]) -> None:
+    with starter:
+        pass
+
+
+def start() -> None:
+    """Fork a process that runs `main` for each line that comes, and tell how it ended."""
+    for line in sys.stdin:
+        if (child := os.fork()) == 0:
+            main(json.loads(line))
+            sys.exit()
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
 if __name__ == "__main__":
-    main(dict(word.split("=", 1) for word in sys.argv[1:]))
+    if sys.argv[1:]:
+        main(dict(word.split("=", 1) for word in sys.argv[1:]))
+    else:
+        start()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -16,7 +14,6 @@ import saved_corpora
 from faults import failing_at
 from saved_corpora import MANIFEST, arrays, as_in_0_1, names, seed_of
 
-from motionmind import files
 from motionmind.corpus import store, versions
 from motionmind.errors import CorpusError
 
@@ -49,13 +46,9 @@ def own(mine: Path) -> dict[str, Path]:
 
 def run(folder: Path, do: str, change: int) -> bool:
     """Rename or delete, killed before the n-th change; whether it came to its end."""
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(Path(files.__file__).parents[1])}
-    words = [f"folder={folder}", f"do={do}", f"change={change}"]
-    done = subprocess.run(
-        [sys.executable, saved_corpora.__file__, *words], env=environment, capture_output=True, check=False
-    )
-    assert done.returncode in (0, -9), done.stderr.decode()
-    return done.returncode == 0
+    code = saved_corpora.changed(folder=folder, do=do, change=change)
+    assert code in (0, -9)
+    return code == 0
 
 
 @each_form
