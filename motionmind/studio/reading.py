@@ -7,6 +7,8 @@ answer.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import re
 import sys
@@ -338,4 +340,5 @@ def _has_level_arms(motion: Motion) -> bool:
 
 
 if __name__ == "__main__":
+    atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported
     main()
