@@ -248,17 +248,18 @@ def test_a_worker_of_another_version_is_told(files: dict[Path, str], tmp_path: P
         shards.take_file(job)
 
 
-def test_a_build_that_was_killed_goes_on(files: dict[Path, str], tmp_path: Path) -> None:
-    """By the command itself, with workers; the corpus is that of a build that nobody disturbed."""
-    command = [sys.executable, "-m", "motionmind", "corpus", "build", "mine", *map(str, files), "--workers", "2"]
+def test_a_build_that_was_killed_goes_on(files: dict[Path, str], tmp_path: Path, run: Run) -> None:
+    """By the command itself, with workers; the corpus is that of a build that nobody disturbed, in this process."""
+    build = ["corpus", "build", "mine", *map(str, files)]
     homes = [tmp_path / "killed", tmp_path / "calm"]
-    killed = subprocess.Popen([*command, "--home", str(homes[0])], stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-m", "motionmind", *build, "--workers", "2", "--home", str(homes[0])]
+    killed = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60.0
     while not list(homes[0].rglob("*.npz")) and killed.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
-    for home in homes:
-        subprocess.run([*command, "--home", str(home)], check=True, capture_output=True)
+    subprocess.run(command, check=True, capture_output=True)
+    assert run(*build, "--workers", 1, "--home", homes[1]).code == 0
     one, other = ({f.relative_to(home): f.read_bytes() for f in home.rglob("*") if f.is_file()} for home in homes)
     assert one == other
