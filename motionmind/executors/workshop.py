@@ -23,7 +23,8 @@ from motionmind.executors.team import Team
 
 _Job = TypeVar("_Job")
 _Result = TypeVar("_Result")
-_A, _B = TypeVar("_A"), TypeVar("_B")
+_One = TypeVar("_One")
+_Other = TypeVar("_Other")
 
 LARGE = 1 << 26  # bytes of an array that is mapped from a file
 
@@ -54,7 +55,7 @@ class Workshop:
         for _ in self.team.map(function, jobs):
             pass
 
-    def both(self, one: Callable[[], _A], other: Callable[[], _B]) -> tuple[_A, _B]:
+    def both(self, one: Callable[[], _One], other: Callable[[], _Other]) -> tuple[_One, _Other]:
         """Return the results of two jobs, side by side if there is more than one worker."""
         kept: dict[int, Any] = {}
         jobs: list[tuple[int, Callable[[], Any]]] = [(0, one), (1, other)]
