@@ -20,7 +20,7 @@ from pages import SCREENS, reachable_controls, readable_words
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.chaos.flows import FLOWS, Flow
 from motionmind.errors import MotionMindError
 from motionmind.notation.compose import motions
@@ -429,16 +429,22 @@ def test_the_page_follows_the_variation_on_its_attractor(show: Callable[..., Any
         assert (np.abs(shot - ink).max(axis=-1) < 40).sum() > 50
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("screen", SCREENS)
-def test_the_page_fits_every_screen_and_can_be_read(
-    show: Callable[..., Any], danced: Variation, screen: str, scheme: str
-) -> None:
-    tab = show(color_scheme=scheme, **SCREENS[screen])
+def test_the_page_fits_every_screen_and_can_be_read(show: Callable[..., Any], danced: Variation, screen: str) -> None:
+    jump = max(portrait_of(danced).jumps)
+    tab = show(color_scheme="dark", **SCREENS[screen])
+    check_page(tab, screen, jump)
+    dark = paper_of(tab)
+    tab.emulate_media(color_scheme="light", reduced_motion="reduce")
+    check_page(tab, screen, jump)
+    assert luminance(paper_of(tab)) > luminance(dark) + 0.5
+
+
+def check_page(tab: Any, screen: str, jump: int) -> None:
+    """Check that a page fits its screen and can be read, before and after the variation jumps to a posture."""
     controls = reachable_controls(tab, 44 if SCREENS[screen].get("has_touch") else 32)
     assert {"space", "canvas", "timeline", "play", "front", "dark", "help"} <= controls
     # Numbers as long as they become, and an attractor that has to be as large at all times.
-    jump = max(portrait_of(danced).jumps)
     tab.evaluate("motionmind.player.seek(motionmind.attractor.times[0])")
     room = tab.locator("#space").bounding_box()
     tab.evaluate(f"motionmind.player.seek(motionmind.attractor.times[{jump}])")
@@ -448,12 +454,17 @@ def test_the_page_fits_every_screen_and_can_be_read(
     assert tab.evaluate("(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth)(reading)")
     assert {"flow", "reading", "piece", "other", "cell", "site", "h1"} <= readable_words(tab)
     # Lines and dots need a contrast of 3: WCAG 2.2, 1.4.11.
-    paper = np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB"))[2, 2]
+    paper = paper_of(tab)
     for name in ("piece", "other"):
         line = f"document.querySelector('#attractor .{name}')"
         ink = tab.evaluate(f"getComputedStyle({line}, '::before').backgroundColor")
         light, dark = sorted([luminance(paper), luminance([int(v) for v in re.findall(r"\d+", ink)])], reverse=True)
         assert (light + 0.05) / (dark + 0.05) > 3.0
+
+
+def paper_of(tab: Any) -> Ints:
+    """The colour of the paper that the attractor is drawn on [3]."""
+    return np.array(Image.open(BytesIO(tab.locator("#space").screenshot())).convert("RGB"))[2, 2].astype(np.int64)
 
 
 def luminance(colour: ArrayLike) -> float:
