@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import compileall
+import gc
 import os
 import random
 import shutil
@@ -69,6 +70,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         environment = os.environ | {"PYTHONDONTWRITEBYTECODE": ""}
         with subprocess.Popen(collect, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
             subprocess.run([sys.executable, "-m", "motionmind", "warm"], capture_output=True, check=False)
+
+
+def pytest_collection_finish() -> None:
+    """Keep eight thousand tests and what they import out of each search for garbage, a twentieth of all tests' time."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
