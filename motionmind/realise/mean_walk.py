@@ -35,6 +35,7 @@ from motionmind.realise.walks import (
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
+HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
@@ -253,8 +254,27 @@ def _part_marginals(
             mass = chosen.weights @ near[-k]
             near[-k] *= chosen.near[k]
             left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
-    marginals = posterior_marginals(chosen.begins, chosen.ends, chosen.shares, chosen.clusters, chosen.weights, near)
+    marginals = posterior_marginals(*_steps_on(chosen, near[0]), chosen.clusters, chosen.weights, near)
     return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
+
+
+def _steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return the steps of walks, as `posterior_marginals` takes them, of which some lead on from where walks begin.
+
+    Of many performances of a dance, all moments near its last posture end clips. Then walks stay where a clip ends for
+    a step, after which they may go over to another.
+
+    Args:
+        chosen: the moments, and the corpus's steps between them.
+        near: how likely walks begin in each moment [n].
+    """
+    leads = np.zeros(len(near), dtype=np.bool_)
+    leads[chosen.begins] = True
+    if near[leads].max(initial=0.0) > HARDLY:
+        return chosen.begins, chosen.ends, chosen.shares
+    ends = np.flatnonzero(~leads)
+    begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
+    return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:

@@ -96,6 +96,20 @@ def test_what_is_chosen_stands_for_the_whole_corpus(engine: Engine, carriage: Ca
         assert all(len(np.unique(same[chosen.clusters == k])) == 1 for k in range(chosen.clusters.max() + 1))
 
 
+def test_walks_lead_on_from_where_all_performances_of_a_dance_end(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sparse, "ENDS", 12)
+    motion = engine.corpus.motion(engine.corpus.clips[0]).slice(0, 2 * MOVES + 1)
+    corpus = gather("many", [replace(motion, name=f"{number}") for number in range(40)])
+    carriage = grown(corpus.skeleton, learn_carriage(corpus))
+    stops = {0: stop_at(corpus, motion.posture(-1)), MOVES: stop_at(corpus, motion.posture(MOVES))}
+    found = expect(corpus, carriage, stops, np.linspace(0.0, 1.8, 2 * MOVES + 1))
+    np.testing.assert_allclose(found.moments.sum(axis=1), 1.0)
+    assert np.isfinite(found.poses).all()
+    assert np.isfinite(found.headings).all()
+
+
 def test_threads_change_no_byte(engine: Engine, carriage: Carriage, monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
     for threads in (1, 3):
