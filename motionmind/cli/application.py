@@ -37,7 +37,7 @@ from motionmind.files import pipes_kept
 BAD_INPUT = 2  # exit code for everything that the user can put right
 NO_PATH = 3  # exit code when nothing joins A and B
 
-atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported: a sixth of a second
+atexit.register(gc.freeze)  # at the end Python would look for garbage among all that was imported: a fifth of a second
 
 
 @group(
