@@ -7,7 +7,6 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import percentile_filter, uniform_filter1d
 
 from experiments.material import FPS, RECORDED, corpus, movement
 from motionmind import Motion, Posture
@@ -24,7 +23,6 @@ BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
 CALMS = CALM, 0.5  # metres a second squared: level accelerations up to which weight is looked at; the second: rest
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
-DRIFTS = 4.0  # seconds, in which a recording's floor may drift, and none is spent in the air
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
 
 
@@ -100,14 +98,14 @@ class Dancers:
     Attributes:
         body: the skeleton.
         clips: the unbroken pieces.
-        floors: height of the floor under each frame of each [T], metres.
+        floors: height of the floor under each, metres.
         seen: how a viewer sees each.
         ends: postures that pairs are drawn from, each with the height of its floor.
     """
 
     body: Skeleton
     clips: list[Motion]
-    floors: list[Floats]
+    floors: list[float]
     seen: list[Seen]
     ends: list[tuple[Posture, float]]
     _limits: dict[int, Limits] = field(default_factory=dict)
@@ -194,36 +192,21 @@ class Dancers:
 @lru_cache(maxsize=2)
 def dancers(data: str | None, name: str) -> Dancers:
     """The dancers of a corpus, bundled or recorded."""
-    clips, floors = [], list[Floats]()
+    clips, floors = [], []
     for pieces in movement(data, name, 1).values():
         low = np.concatenate([lowest_height(piece.skeleton, piece.rotations, piece.root) for piece in pieces])
-        floor = _drifting_floor(low) if name in RECORDED else np.full(len(low), floor_height(low))
-        parts = np.split(floor, np.cumsum([len(piece) for piece in pieces])[:-1])
-        long = [(piece, part) for piece, part in zip(pieces, parts, strict=True) if len(piece) > 3]
-        clips += [piece for piece, _ in long]
-        floors += [part for _, part in long]
+        long = [piece for piece in pieces if len(piece) > 3]
+        clips += long
+        floors += [floor_height(low)] * len(long)
     seen = [see(clip, floor) for clip, floor in zip(clips, floors, strict=True)]
     if name in RECORDED:
-        ends = [
-            (clip.posture(k), float(floor[k]))
-            for clip, floor in zip(clips, floors, strict=True)
-            for k in range(len(clip))
-        ]
+        ends = [(clip.posture(k), floor) for clip, floor in zip(clips, floors, strict=True) for k in range(len(clip))]
     else:  # keyframes are what an author writes, and asks for
         whole = corpus(data, name)
         keyed = [whole.motion(clip) for clip in whole.clips]
         heights = [floor_height(lowest_height(one.skeleton, one.rotations, one.root)) for one in keyed]
         ends = [(one.posture(k), floor) for one, floor in zip(keyed, heights, strict=True) for k in range(len(one))]
     return Dancers(clips[0].skeleton, clips, floors, seen, ends)
-
-
-def _drifting_floor(low: Floats) -> Floats:
-    """Height of the floor under each frame of a recording [T], metres, from that of the body's lowest point [T].
-
-    That of some takes rises and sinks by more than a decimetre: so it is `floor_height` of the seconds about a frame.
-    """
-    size = round(DRIFTS * FPS)
-    return np.asarray(uniform_filter1d(percentile_filter(low, 5.0, size), size))
 
 
 def nearer(a: Posture, b: Posture, metres: float) -> Posture:
