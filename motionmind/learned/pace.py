@@ -30,7 +30,6 @@ movement.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +38,6 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Clip, Corpus
-from motionmind.executors.here import this_process
-from motionmind.executors.team import Team
 from motionmind.geometry import rotations as rot
 from motionmind.learned.peaks import LENGTHS, RARE, Peaks, accelerations
 from motionmind.learned.percentiles import Percentile
@@ -161,11 +158,11 @@ class Pace:
         return float(np.exp(np.log(STILL + self.lulls[numbers]).mean()) - STILL)
 
 
-def learn_pace(corpus: Corpus, team: Team | None = None) -> Pace:
-    """Learn the pace of a corpus; each clip is a job for the team's threads."""
+def learn_pace(corpus: Corpus) -> Pace:
+    """Learn the pace of a corpus."""
     gauge = _Gauge(corpus)
-    for shown in (team or this_process()).map(partial(_show, corpus), gauge.clips):
-        gauge.add(shown)
+    for clip in gauge.clips:
+        gauge.add(_show(corpus, clip))
     return gauge.pace()
 
 
