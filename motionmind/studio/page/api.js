@@ -15,11 +15,11 @@ export class Api extends EventTarget {
     this.taken = () => {};
     /** @type {Promise<any>} over with the last change that was asked for: the next waits, for requests overtake others */
     this.changed = Promise.resolve();
+    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
+    this.expected = new Map();
     /** @type {Promise<any>} over when this browser is let in */
     this.entered = this.#enter();
     this.entered.catch(() => {}); // who waits for it hears why
-    /** @type {Map<string, Promise<any>>} answers that were asked for before anybody needs them, by their path */
-    this.expected = new Map();
   }
 
   /** Exchange the token in the address, if there is one, for the cookie that lets this browser in. */
@@ -87,6 +87,7 @@ export class Api extends EventTarget {
 
   /** @param {string} path @param {RequestInit} request */
   async #ask(path, request) {
+    if (request.method !== "GET") this.expected.clear(); // what was answered before may be so no more
     const headers = { "X-MotionMind": "studio", ...request.headers };
     const answer = await fetch(path, { ...request, headers, credentials: "same-origin" }).catch(() => {
       throw new AwayError(AWAY);
