@@ -56,7 +56,7 @@ AS_MANY = 20.0  # windows that the prior is worth
 SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
 OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
 EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turning, rad/s, and of travel, heights/s
-STARTS = 3.0  # heights/s^2: the root's acceleration as a step begins or ends, than which no peak is less
+STARTS = 3.0  # heights/s^2 of the root, than which no peak is less: in three of four seconds recorded dancers show more
 
 
 class Way(NamedTuple):
