@@ -78,7 +78,7 @@ def keep_pace(
 
 
 def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:
-    """Return a movement and its clock, slower where a part of the body is faster than the most, or the root sets off so.
+    """Return a movement and its clock, slower where a part of the body is faster than the most, or the root starts so.
 
     Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that. Where they show
     what the corpus does not, it is done again.
