@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7)}  # that can be read; the last is written
+_COMPLETE = 6  # the first that keeps all that is learned, and the last whose manifest lists clips and faults
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
@@ -278,6 +279,11 @@ class Stored(NamedTuple):
     identity: str
 
     @property
+    def version(self) -> int:
+        """The version of its format."""
+        return int(self.manifest["version"])
+
+    @property
     def files(self) -> list[Path]:
         """The files of the arrays."""
         return [_array_file(self.place, name) for name in self.arrays]
@@ -285,7 +291,12 @@ class Stored(NamedTuple):
     @property
     def is_current(self) -> bool:
         """Whether it is a built corpus that keeps all that this version learns."""
-        return (self.manifest["format"], self.manifest["version"]) == (BUILT, VERSIONS[BUILT][-1])
+        return self.manifest["format"] == BUILT and self.version >= _COMPLETE
+
+    @property
+    def lists_clips(self) -> bool:
+        """Whether its manifest lists clips and faults, which later versions keep in arrays."""
+        return self.version <= _COMPLETE
 
     @property
     def is_checked(self) -> bool:
