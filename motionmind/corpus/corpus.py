@@ -16,6 +16,7 @@ from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.entries import Columns, StoredClips, key_of
+from motionmind.corpus.moves import Moves
 from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.display import displayed
 from motionmind.errors import CorpusError
@@ -27,6 +28,7 @@ Repair = Literal["put back", "reconstructed", "none"]
 
 FACING = "facing"  # the joint chain of the body's turn about the vertical
 FLIP_DEGREES = 45.0  # that a joint turns in one frame where its recording is at fault, unless another angle is given
+MIRRORED = " (mirrored)"  # after the name of a clip
 MAX_PRICE = 100.0  # nats per move backwards; no search will use a count of exp(-100)
 
 
@@ -83,7 +85,7 @@ class Clip:
     @property
     def label(self) -> str:
         """The name with its corpus and whether it is mirrored: "ballet: jump (mirrored)"."""
-        return f"{self.corpus}: " * bool(self.corpus) + self.name + " (mirrored)" * self.mirrored
+        return f"{self.corpus}: " * bool(self.corpus) + self.name + MIRRORED * self.mirrored
 
     @property
     def reverse_weight(self) -> float:
@@ -96,23 +98,6 @@ class Clip:
             repair.joint == joint and not repair.exact and repair.seconds[0] <= stop and start <= repair.seconds[1]
             for repair in self.repairs
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Moves:
-    """M moves between postures of a corpus.
-
-    Attributes:
-        begins: index of the posture that each leads from [M].
-        ends: index of the posture that it leads to [M]: the next one, or the one before for a move backwards.
-        seconds: durations [M].
-        weights: counts [M].
-    """
-
-    begins: Ints
-    ends: Ints
-    seconds: Floats
-    weights: Floats
 
 
 @dataclass(frozen=True)
@@ -228,15 +213,7 @@ class Corpus:
     @cached_property
     def moves(self) -> Moves:
         """All moves from a posture to the next in its clip; then, for clips learned backwards, to the one before."""
-        starts, weights, _ = self.columns
-        counts = np.repeat(weights, np.diff(starts), axis=0)
-        goes_on = np.ones(len(self), dtype=np.bool_)
-        goes_on[starts[1:] - 1] = False
-        forward = np.flatnonzero(goes_on)
-        backward = np.flatnonzero(goes_on & (counts[:, 1] > 0.0))
-        begins, ends = np.concatenate([forward, backward + 1]), np.concatenate([forward + 1, backward])
-        weights = np.concatenate([counts[forward, 0], counts[backward, 1]])
-        return Moves(begins, ends, np.abs(self.times[ends] - self.times[begins]), weights)
+        return Moves(self.columns, self.times)
 
     @cached_property
     def columns(self) -> Columns:
@@ -301,15 +278,28 @@ class Corpus:
         """Return the clip that a posture is in."""
         return self.clips[bisect_right(self.columns.starts, range(len(self))[posture]) - 1]
 
-    def clips_of(self, corpus: str, name: str) -> list[Clip]:
+    def clips_named(self, corpus: str, name: str) -> list[Clip]:
         """Return the clips with a name, taken from the corpus of a name; a mirror image has both in common."""
+        own = ("", corpus) if corpus == self.name else (corpus,)
+        return [clip for key in own for clip in self._clips_at(key, name)]
+
+    def clip_labelled(self, label: str) -> Clip:
+        """Return the clip with a label (`Clip.label`); KeyError if there is none."""
+        for text in (label, label.removesuffix(MIRRORED)):
+            words = text.split(": ")
+            for count in range(len(words)):
+                found = self._clips_at(": ".join(words[:count]), ": ".join(words[count:]))
+                if clips := [clip for clip in found if clip.label == label]:
+                    return clips[-1]
+        raise KeyError(label)
+
+    def _clips_at(self, corpus: str, name: str) -> list[Clip]:
+        """Return the clips whose entries have these, as few others as possible being read."""
         order, found = self.columns.order, []
-        for own in ("", corpus) if corpus == self.name else (corpus,):
-            first, last = (
-                search(order, (own, name), key=lambda number: key_of(self.clips[number]))
-                for search in (bisect_left, bisect_right)
-            )
-            found += [self.clips[number] for number in order[first:last]]
+        at = bisect_left(order, (corpus, name), key=lambda number: key_of(self.clips[number]))
+        while at < len(order) and key_of(clip := self.clips[order[at]]) == (corpus, name):
+            found.append(clip)
+            at += 1
         return found
 
     @cached_property
