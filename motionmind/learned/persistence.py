@@ -22,6 +22,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus, JointFlip
 from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
+from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.gather import gather
 from motionmind.corpus.manifest import BuiltManifest, ListingManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Discretization, StateSpace, from_spec
@@ -157,7 +158,7 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
 
 def _kept(folder: Path, files: Iterable[Path], learn_it: Callable[[], Learned]) -> Learned:
     """Return what is learned from a corpus of these files: from the cache, or else learned and kept there."""
-    built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
+    built = store.cache() / f"{folder.name}-{fingerprint(files)}"
     try:
         return _open(built, store.load(built))
     except MotionMindError:  # it is not there yet, or is damaged
