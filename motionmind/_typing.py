@@ -13,5 +13,6 @@ Int32s = NDArray[np.int32]
 Int16s = NDArray[np.int16]
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.uint8]  # RGB [H, W, 3], or what else is told by bytes
+Bytes = NDArray[np.uint8]  # text, UTF-8 [B]
 
 States = Int32s  # of joint chains: indices into a joint's states

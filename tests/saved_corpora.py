@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from motionmind import files
 from motionmind.corpus import store
+from motionmind.corpus.entries import Packed
 
 MANIFEST = {"name": "arms", "clips": []}
 # What changes the disk, as Python reports it before it asks the system.
@@ -38,9 +39,27 @@ def seed_of(folder: Path) -> int:
     return seed
 
 
+def entries(folder: Path, name: str = "clips") -> list[dict[str, Any]]:
+    """The entries of a saved corpus's clips, or faults."""
+    text: bytes = store.load(folder).arrays[f"{name}.text"].tobytes()
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def put_entries(folder: Path, found: list[dict[str, Any]]) -> None:
+    """Replace the entries of a saved corpus's clips, and leave their columns as they are."""
+    packed, stored = Packed.of(found), store.load(folder)
+    manifest = stored.manifest
+    for key, array in packed._asdict().items():
+        np.save(stored.place / f"clips.{key}.npy", array)
+        manifest["arrays"][f"clips.{key}"] = [array.dtype.str, *array.shape]
+    (folder / store.MANIFEST).write_text(json.dumps(manifest), "utf-8")
+
+
 def as_in_0_1(folder: Path) -> None:
-    """Lay a saved corpus out as 0.1 did: the arrays beside the manifest."""
+    """Lay a saved corpus out as 0.1 did: the arrays beside the manifest, and clips and faults in it."""
     manifest = json.loads((folder / store.MANIFEST).read_text("utf-8"))
+    if "clips.text" in manifest["arrays"]:
+        manifest |= {name: entries(folder, name) for name in ("clips", "faults")}
     version = folder / str(manifest.pop("folder"))
     for file in version.glob("*.npy"):
         file.rename(folder / file.name)

@@ -122,14 +122,16 @@ def _names(context: click.Context, corpus: str) -> _Names:
     folder = _folders(context).get(corpus)
     if folder is None:
         return _Names([], [], [])
-    manifest = learned = _manifest(folder)
+    built, manifest = folder, _manifest(folder)
+    learned = manifest
     if "skeleton" not in manifest:  # a corpus that people wrote: its joints are in what was learned from it last
         kept = sorted(store.cache().glob(f"{folder.name}-*/{store.MANIFEST}"), key=lambda path: path.stat().st_mtime)
-        learned = _manifest(kept[-1].parent) if kept else {}
-    with suppress(TypeError, KeyError, AttributeError):
+        built = kept[-1].parent if kept else folder
+        learned = _manifest(built) if kept else {}
+    with suppress(TypeError, KeyError, AttributeError, OSError, ValueError):
         named = list(_scanned(folder, manifest.get("scores", [])))
         clips = [
-            str(clip["name"]) for clip in learned.get("clips", []) if not (clip.get("mirrored") or clip.get("corpus"))
+            str(clip["name"]) for clip in _entries(built, learned) if not (clip.get("mirrored") or clip.get("corpus"))
         ]
         return _Names(
             list(dict.fromkeys(name for kind, name in named if kind == "posture")),
@@ -137,6 +139,16 @@ def _names(context: click.Context, corpus: str) -> _Names:
             [str(name) for name in learned.get("skeleton", {}).get("names", [])],
         )
     return _Names([], [], [])
+
+
+def _entries(folder: Path, manifest: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the entries of a built corpus's clips: from its manifest, of an earlier version, or line by line."""
+    entries: list[dict[str, Any]] = manifest.get("clips", [])
+    if not entries and "arrays" in manifest:
+        data = (folder / str(manifest["folder"]) / "clips.text.npy").read_bytes()
+        header = 10 + int.from_bytes(data[8:10], "little")  # of NumPy's format, version 1.0
+        entries = [json.loads(line) for line in data[header:].splitlines()]
+    return entries
 
 
 def _manifest(folder: Path) -> dict[str, Any]:

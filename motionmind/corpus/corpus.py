@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,9 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from motionmind._typing import Floats, Int32s, Ints
+from motionmind._typing import Floats, Ints
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.corpus.entries import Columns, StoredClips, key_of
+from motionmind.corpus.moves import Moves
 from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.display import displayed
 from motionmind.errors import CorpusError
@@ -25,6 +28,7 @@ Repair = Literal["put back", "reconstructed", "none"]
 
 FACING = "facing"  # the joint chain of the body's turn about the vertical
 FLIP_DEGREES = 45.0  # that a joint turns in one frame where its recording is at fault, unless another angle is given
+MIRRORED = " (mirrored)"  # after the name of a clip
 MAX_PRICE = 100.0  # nats per move backwards; no search will use a count of exp(-100)
 
 
@@ -81,7 +85,7 @@ class Clip:
     @property
     def label(self) -> str:
         """The name with its corpus and whether it is mirrored: "ballet: jump (mirrored)"."""
-        return f"{self.corpus}: " * bool(self.corpus) + self.name + " (mirrored)" * self.mirrored
+        return f"{self.corpus}: " * bool(self.corpus) + self.name + MIRRORED * self.mirrored
 
     @property
     def reverse_weight(self) -> float:
@@ -94,23 +98,6 @@ class Clip:
             repair.joint == joint and not repair.exact and repair.seconds[0] <= stop and start <= repair.seconds[1]
             for repair in self.repairs
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Moves:
-    """M moves between postures of a corpus.
-
-    Attributes:
-        begins: index of the posture that each leads from [M].
-        ends: index of the posture that it leads to [M]: the next one, or the one before for a move backwards.
-        seconds: durations [M].
-        weights: counts [M].
-    """
-
-    begins: Ints
-    ends: Ints
-    seconds: Floats
-    weights: Floats
 
 
 @dataclass(frozen=True)
@@ -140,7 +127,7 @@ class Corpus:
     Attributes:
         name: the corpus's name.
         skeleton: the body; with the first performer's proportions if there are several.
-        clips: the clips, in order and without gaps.
+        clips: the clips, in order and without gaps; of a corpus that was loaded, each is made when it is asked for.
         rotations: local rotations of all postures [N, J, 4].
         root: positions of the root joint [N, 3], metres.
         times: seconds in the clip's own recording [N], increasing within a clip.
@@ -153,7 +140,7 @@ class Corpus:
         author: who made it.
         source: where it comes from.
         licence: the licence for its use.
-        faults: joint flips in the corpus's own recordings.
+        faults: joint flips in the corpus's own recordings, read like the clips.
         skip: frames that were dropped at each recording's start, such as an added T-pose.
         origins: the corpora that its other clips were taken from.
         citation: how to cite it; "" if nobody asks for that.
@@ -162,7 +149,7 @@ class Corpus:
 
     name: str
     skeleton: Skeleton
-    clips: tuple[Clip, ...]
+    clips: Sequence[Clip]
     rotations: Floats
     root: Floats
     times: Floats
@@ -173,7 +160,7 @@ class Corpus:
     author: str = ""
     source: str = ""
     licence: str = ""
-    faults: tuple[JointFlip, ...] = ()
+    faults: Sequence[JointFlip] = ()
     skip: int = 0
     origins: tuple[Origin, ...] = ()
     citation: str = ""
@@ -191,19 +178,30 @@ class Corpus:
             raise CorpusError(f"corpus {self.name!r}: rotations, root and times are not those of {count} postures")
         if self.detail.shape != (count, self.detail.shape[1], len(self.skeleton), 3):
             raise CorpusError(f"corpus {self.name!r}: its detail is not that of {count} postures")
-        bounds = [(clip.start, clip.stop) for clip in self.clips]
-        if [0, *(stop for _, stop in bounds)] != [*(start for start, _ in bounds), count]:
-            raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {count}")
+        if not isinstance(self.clips, StoredClips):
+            self.check_clips()
+        if self.facing not in ("free", "stage"):
+            raise CorpusError(f"corpus {self.name!r}: facing must be 'free' or 'stage', not {self.facing!r}")
+        if FACING in self.skeleton.names:
+            raise CorpusError(f"corpus {self.name!r}: a joint cannot be called {FACING!r}; that is the body's turn")
+
+    def check_clips(self) -> None:
+        """Check where each clip starts and what it counts; of a corpus on disk, once, when its arrays are checked.
+
+        Raises:
+            CorpusError: they do not follow one another, or one counts nothing or too much.
+        """
+        starts, stops = [], []
         for clip in self.clips:
+            starts.append(clip.start)
+            stops.append(clip.stop)
             if not (0.0 < clip.weight < math.inf and (clip.reverse is None or 0.0 <= clip.reverse <= MAX_PRICE)):
                 raise CorpusError(
                     f"corpus {self.name!r}: {clip.label} weighs {clip.weight} and costs {clip.reverse} nats a move "
                     f"backwards; a weight must be above 0, a price from 0 to {MAX_PRICE:g}"
                 )
-        if self.facing not in ("free", "stage"):
-            raise CorpusError(f"corpus {self.name!r}: facing must be 'free' or 'stage', not {self.facing!r}")
-        if FACING in self.skeleton.names:
-            raise CorpusError(f"corpus {self.name!r}: a joint cannot be called {FACING!r}; that is the body's turn")
+        if [0, *stops] != [*starts, len(self)]:
+            raise CorpusError(f"corpus {self.name!r}: the clips do not follow one another from 0 to {len(self)}")
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -215,12 +213,12 @@ class Corpus:
     @cached_property
     def moves(self) -> Moves:
         """All moves from a posture to the next in its clip; then, for clips learned backwards, to the one before."""
-        forward = _ranges((clip.start, clip.stop - 1) for clip in self.clips)
-        backward = _ranges((clip.start, clip.stop - 1) for clip in self.clips if clip.reverse is not None)
-        begins, ends = np.concatenate([forward, backward + 1]), np.concatenate([forward + 1, backward])
-        counts = np.array([(clip.weight, clip.reverse_weight) for clip in self.clips])[self._clip_of]
-        weights = np.concatenate([counts[forward, 0], counts[backward, 1]])
-        return Moves(begins, ends, np.abs(self.times[ends] - self.times[begins]), weights)
+        return Moves(self.columns, self.times)
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Where its clips start, what they count and how they are ordered by name."""
+        return self.clips.columns if isinstance(self.clips, StoredClips) else Columns.of(self.clips)
 
     @property
     def begins(self) -> Ints:
@@ -235,7 +233,7 @@ class Corpus:
     @cached_property
     def weights(self) -> Floats:
         """Counts of the postures [N]. A clip learned backwards shows the same postures, so they count once."""
-        return np.array([clip.weight for clip in self.clips])[self._clip_of]
+        return np.repeat(self.columns.weights[:, 0], np.diff(self.columns.starts))
 
     @cached_property
     def chains(self) -> tuple[str, ...]:
@@ -271,10 +269,6 @@ class Corpus:
         pelvis = rot.mul(chains[..., -1, :], chains[..., 0, :])
         return np.concatenate([pelvis[..., None, :], chains[..., 1:-1, :]], axis=-2)
 
-    @cached_property
-    def _clip_of(self) -> Int32s:
-        return np.repeat(np.arange(len(self.clips), dtype=np.int32), [clip.stop - clip.start for clip in self.clips])
-
     def where(self, posture: int) -> tuple[str, int]:
         """Return the name of a posture's clip, and the posture's number there, from 0."""
         clip = self.clip_of(posture)
@@ -282,7 +276,31 @@ class Corpus:
 
     def clip_of(self, posture: int) -> Clip:
         """Return the clip that a posture is in."""
-        return self.clips[int(self._clip_of[posture])]
+        return self.clips[bisect_right(self.columns.starts, range(len(self))[posture]) - 1]
+
+    def clips_named(self, corpus: str, name: str) -> list[Clip]:
+        """Return the clips with a name, taken from the corpus of a name; a mirror image has both in common."""
+        own = ("", corpus) if corpus == self.name else (corpus,)
+        return [clip for key in own for clip in self._clips_at(key, name)]
+
+    def clip_labelled(self, label: str) -> Clip:
+        """Return the clip with a label (`Clip.label`); KeyError if there is none."""
+        for text in (label, label.removesuffix(MIRRORED)):
+            words = text.split(": ")
+            for count in range(len(words)):
+                found = self._clips_at(": ".join(words[:count]), ": ".join(words[count:]))
+                if clips := [clip for clip in found if clip.label == label]:
+                    return clips[-1]
+        raise KeyError(label)
+
+    def _clips_at(self, corpus: str, name: str) -> list[Clip]:
+        """Return the clips whose entries have these, as few others as possible being read."""
+        order, found = self.columns.order, []
+        at = bisect_left(order, (corpus, name), key=lambda number: key_of(self.clips[number]))
+        while at < len(order) and key_of(clip := self.clips[order[at]]) == (corpus, name):
+            found.append(clip)
+            at += 1
+        return found
 
     @cached_property
     def own_origin(self) -> Origin:
@@ -291,22 +309,17 @@ class Corpus:
 
     @cached_property
     def clip_origins(self) -> dict[str, Origin]:
-        """Where its clips come from, by the name of the corpus that each was taken from, its own among them.
+        """Where its clips come from, by the name of the corpus that each was taken from, its own among them."""
+        return {clip.corpus or self.name: self._origin_of(clip) for clip in self.clips}
 
-        Corpora that were mixed before origins were kept are known by their names alone.
-        """
-        known = {origin.name: origin for origin in (*self.origins, self.own_origin)}
-        names = dict.fromkeys(clip.corpus or self.name for clip in self.clips)
-        return {name: known.get(name, Origin(name)) for name in names}
+    def _origin_of(self, clip: Clip) -> Origin:
+        """Return where a clip comes from; corpora that were mixed before origins were kept are known by their names."""
+        name = clip.corpus or self.name
+        return next((one for one in (self.own_origin, *reversed(self.origins)) if one.name == name), Origin(name))
 
     def credit_of(self, clip: Clip) -> Credit:
         """Return the credit of a movement that is all made of a clip."""
-        return credit_clip(self.clip_origins[clip.corpus or self.name], clip.name, clip.performer)
-
-    @cached_property
-    def clips_by_name(self) -> dict[tuple[str, str], Clip]:
-        """A clip by the name of the corpus that it was taken from and its own; a mirror image has these in common."""
-        return {(clip.corpus or self.name, clip.name): clip for clip in self.clips}
+        return credit_clip(self._origin_of(clip), clip.name, clip.performer)
 
     def motion(self, clip: Clip) -> Motion:
         """Return a clip's N postures as a motion."""
@@ -355,8 +368,3 @@ def subdivide_times(times: Floats, between: int) -> Floats:
     """Insert `between` evenly spaced times between each of `times` [N] and the next: [(N - 1) (between + 1) + 1]."""
     share = np.arange(between + 1) / (between + 1)
     return np.append((times[:-1, None] + share * np.diff(times)[:, None]).ravel(), times[-1])
-
-
-def _ranges(bounds: Iterable[tuple[int, int]]) -> Ints:
-    """Concatenate the ranges from each start up to its stop."""
-    return np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in bounds)]).astype(np.int64)

@@ -71,14 +71,19 @@ class SpaceEntry(msgspec.Struct, frozen=True):
 
 
 class BuiltManifest(Provenance, frozen=True, kw_only=True):
-    """A built corpus without its arrays; attributes as in Corpus."""
+    """A built corpus without its arrays, in which its clips and faults are, too; attributes as in Corpus."""
 
     skeleton: BodyEntry
-    clips: tuple[Clip, ...]
-    faults: tuple[JointFlip, ...]
     space: SpaceEntry
     origins: tuple[Origin, ...] = ()
     flip_degrees: float = FLIP_DEGREES
+
+
+class ListingManifest(BuiltManifest, frozen=True, kw_only=True):
+    """A corpus that an earlier version built, whose manifest lists its clips and faults."""
+
+    clips: tuple[Clip, ...]
+    faults: tuple[JointFlip, ...]
 
 
 def parse_manifest(manifest: dict[str, Any], schema: type[_Schema], path: Path) -> _Schema:

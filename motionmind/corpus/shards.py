@@ -30,6 +30,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store, versions
 from motionmind.corpus.corpus import Clip, JointFlip
+from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.manifest import BodyEntry
 from motionmind.corpus.recordings import Piece, Recording, Taking, take
 from motionmind.errors import CorpusError, MotionMindError, MotionMindWarning
@@ -179,7 +180,7 @@ def take_files(
         CorpusError: no file can be read, the disk lacks space, or workers do not share it.
         UnfinishedError: workers die of a file again and again, or are out of reach.
     """
-    code = store.fingerprint([])
+    code = fingerprint([])
     jobs = [Job(file, name, reading, folder, code) for file, name in names.items()]
     done: dict[Path, Taken] = {}
 
@@ -240,7 +241,7 @@ def _recordings(job: Job, taken: Taken) -> Iterator[Recording]:
 
 @cache
 def _code() -> str:
-    return store.fingerprint([])
+    return fingerprint([])
 
 
 def take_file(job: Job) -> Taken:

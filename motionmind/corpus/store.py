@@ -19,23 +19,18 @@ from motionmind.arguments import check_path
 from motionmind.bundled import bundled
 from motionmind.corpus import versions
 from motionmind.errors import CorpusError, FormatError, suggestion
-from motionmind.files import make_folder, read_bytes, replace_file, sync_folder
+from motionmind.files import make_folder, replace_file, sync_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7)}  # that can be read; the last is written
+_COMPLETE = 6  # the first that keeps all that is learned, and the last whose manifest lists clips and faults
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
 _COARSEST_CLOCK = 2.0  # seconds to which file systems round the time of a change
 _ARRAY_NAME = re.compile(r"\w+(\.\w+)*")  # of a file in the folder: no name from a manifest leads out of it
-# The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
-LEARNED_BY = (
-    *("_cells.py", "_typing.py", "arguments.py", "bundled.py", "display.py", "errors.py", "files.py", "jit.py"),
-    *("plugins.py", "executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
-    *("discretize", "grammar", "learned"),
-)
 
 
 def home(folder: str | os.PathLike[str] | None = None) -> Path:
@@ -278,6 +273,11 @@ class Stored(NamedTuple):
     identity: str
 
     @property
+    def version(self) -> int:
+        """The version of its format."""
+        return int(self.manifest["version"])
+
+    @property
     def files(self) -> list[Path]:
         """The files of the arrays."""
         return [_array_file(self.place, name) for name in self.arrays]
@@ -285,7 +285,12 @@ class Stored(NamedTuple):
     @property
     def is_current(self) -> bool:
         """Whether it is a built corpus that keeps all that this version learns."""
-        return (self.manifest["format"], self.manifest["version"]) == (BUILT, VERSIONS[BUILT][-1])
+        return self.manifest["format"] == BUILT and self.version >= _COMPLETE
+
+    @property
+    def lists_clips(self) -> bool:
+        """Whether its manifest lists clips and faults, which later versions keep in arrays."""
+        return self.version <= _COMPLETE
 
     @property
     def is_checked(self) -> bool:
@@ -372,28 +377,6 @@ def _identity(manifest: bytes, files: Iterable[Path]) -> str:
         newest = max(newest, found.st_mtime, found.st_ctime)
         digest.update(repr((found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns)).encode())
     return digest.hexdigest() if time.time() - newest > _COARSEST_CLOCK else ""
-
-
-def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:
-    """Return a name [16 hexadecimal digits] for what is learned from these files, that changes whenever that may.
-
-    It is a hash of the files, and of the code and the bodies' descriptions that learning uses (`LEARNED_BY`): a change
-    to the search or to pictures leaves a corpus that was learned before valid.
-
-    Args:
-        files: all files that a corpus is learned from.
-        package: folder of the package's sources.
-
-    Raises:
-        FormatError: a file cannot be read.
-    """
-    digest = hashlib.sha256()
-    rooms = [package / name for name in LEARNED_BY]
-    code = [path for room in rooms for path in ([room] if room.suffix else sorted(room.rglob("*.py")))]
-    for path in [*code, *sorted(package.glob("body/bodies/*.toml")), *files]:
-        data = read_bytes(path)
-        digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
-    return digest.hexdigest()[:16]
 
 
 def cache() -> Path:

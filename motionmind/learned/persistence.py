@@ -20,9 +20,11 @@ from motionmind._typing import States
 from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
-from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus
+from motionmind.corpus.corpus import FLIP_DEGREES, Clip, Corpus, JointFlip
+from motionmind.corpus.entries import Columns, Entries, Packed, StoredClips
+from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.gather import gather
-from motionmind.corpus.manifest import BuiltManifest, SourceManifest, parse_manifest
+from motionmind.corpus.manifest import BuiltManifest, ListingManifest, SourceManifest, parse_manifest
 from motionmind.discretize import Discretization, StateSpace, from_spec
 from motionmind.discretize.library import library_path
 from motionmind.errors import FormatError, MotionMindError
@@ -36,7 +38,7 @@ from motionmind.learned.learning import Learned, learn, learn_from_states
 from motionmind.learned.neighbours import Neighbours
 from motionmind.learned.pace import Pace
 from motionmind.learned.plausibility import Plausibility
-from motionmind.learned.validity import FORMS, MOVEMENT, TREES, check_forms, check_values
+from motionmind.learned.validity import ENTRIES, FORMS, MOVEMENT, TREES, check_entries, check_forms, check_values
 from motionmind.notation.sources import sources
 from motionmind.retarget.retarget import own_skeleton
 
@@ -92,6 +94,8 @@ def load_movement(folder: str | os.PathLike[str]) -> Learned:
 def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
     """Return the arrays from which all that was learned can be learned again, by name."""
     corpus = learned.corpus
+    clips, faults = Packed.of(map(_clip_entry, corpus.clips)), Packed.of(corpus.faults)
+    entries = {"clips": {**clips._asdict(), **corpus.columns._asdict()}, "faults": faults._asdict()}
     return {
         "rotations": corpus.rotations,
         "root": corpus.root,
@@ -99,6 +103,7 @@ def _movement(learned: Learned) -> dict[str, NDArray[Any]]:
         "detail": corpus.detail,
         "states": learned.states,
         "centres": learned.space.centres,
+        **{f"{name}.{key}": array for name, arrays in entries.items() for key, array in arrays.items()},
     }
 
 
@@ -114,8 +119,6 @@ def _manifest(learned: Learned) -> dict[str, Any]:
             "offsets": skeleton.offsets.tolist(),
             "tips": skeleton.tips.tolist(),
         },
-        "clips": [_clip_entry(clip) for clip in corpus.clips],
-        "faults": [asdict(fault) for fault in corpus.faults],
         "space": {
             "kind": space.kind,
             "starts": space.starts.tolist(),
@@ -155,7 +158,7 @@ def load(name: str, home: str | os.PathLike[str] | None = None) -> Learned:
 
 def _kept(folder: Path, files: Iterable[Path], learn_it: Callable[[], Learned]) -> Learned:
     """Return what is learned from a corpus of these files: from the cache, or else learned and kept there."""
-    built = store.cache() / f"{folder.name}-{store.fingerprint(files)}"
+    built = store.cache() / f"{folder.name}-{fingerprint(files)}"
     try:
         return _open(built, store.load(built))
     except MotionMindError:  # it is not there yet, or is damaged
@@ -183,11 +186,11 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
 
 def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpace, States]:
     """Return the movement of a corpus that an earlier version built, and its states; FormatError as `_open`."""
-    arrays = {name: stored.arrays[name] for name in MOVEMENT if name in stored.arrays}
+    arrays = {name: stored.arrays[name] for name in (*MOVEMENT, *ENTRIES) if name in stored.arrays}
     if "rotations" in arrays:  # the first corpora kept nothing of the movement between postures
         postures, joints = (*arrays["rotations"].shape, 0, 0)[:2]
         arrays.setdefault("detail", np.zeros((postures, 0, joints, 3), np.float16))
-    return _read_arrays(folder, stored, arrays, MOVEMENT)
+    return _read_arrays(folder, stored, arrays, (*MOVEMENT, *ENTRIES))
 
 
 def _read_arrays(
@@ -199,31 +202,35 @@ def _read_arrays(
         folder: the corpus's folder.
         stored: its content.
         arrays: the arrays to take, by name.
-        needed: names of those that may not lack.
+        needed: names of those that may not lack, but for `ENTRIES` where the manifest lists these.
 
     Raises:
         FormatError: something lacks or is not valid.
     """
     path = folder / store.MANIFEST
     try:
-        manifest = parse_manifest(stored.manifest, BuiltManifest, path)
+        listed = parse_manifest(stored.manifest, ListingManifest, path) if stored.lists_clips else None
+        manifest = listed or parse_manifest(stored.manifest, BuiltManifest, path)
     except FormatError as error:
         raise FormatError(f"{error}; {store.remedy(folder)}") from error
-    if missing := next((name for name in needed if name not in arrays), None):
+    lacking = (name for name in needed if name not in arrays and not (listed and name in ENTRIES))
+    if missing := next(lacking, None):
         raise FormatError(f"lists no array {missing}; {store.remedy(folder)}", path=path)
     body, states, is_new = manifest.skeleton, manifest.space, not stored.is_checked
     try:
         skeleton = Skeleton(body.name, body.names, body.parents, np.array(body.offsets), np.array(body.tips))
         if is_new:
             check_forms(arrays, skeleton, manifest.facing)
+            if not listed:
+                check_entries(arrays)
         corpus = Corpus(
             skeleton=skeleton,
-            clips=manifest.clips,
+            clips=listed.clips if listed else _clips(arrays),
             rotations=arrays["rotations"],
             root=arrays["root"],
             times=arrays["times"],
             detail=arrays["detail"],
-            faults=manifest.faults,
+            faults=listed.faults if listed else Entries(_packed("faults", arrays), JointFlip),
             origins=manifest.origins,
             flip_degrees=manifest.flip_degrees,
             **{key: getattr(manifest, key) for key in _CORPUS_KEYS},
@@ -245,6 +252,16 @@ def _read_arrays(
     return corpus, space, arrays["states"]
 
 
+def _clips(arrays: Mapping[str, NDArray[Any]]) -> StoredClips:
+    """Return the clips of a corpus from its arrays."""
+    columns = Columns(*(arrays[f"clips.{key}"] for key in Columns._fields))
+    return StoredClips(_packed("clips", arrays), Clip, columns)
+
+
+def _packed(name: str, arrays: Mapping[str, NDArray[Any]]) -> Packed:
+    return Packed(*(arrays[f"{name}.{key}"] for key in Packed._fields))
+
+
 def _part(kind: type[_Part], name: str, arrays: Mapping[str, NDArray[Any]]) -> _Part:
     """Return a part of what was learned from its arrays, which are named after its fields."""
     values: dict[str, Any] = {key: arrays[f"{name}.{key}"] for key in _array_names(kind)}
@@ -263,7 +280,7 @@ def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours
 
 
 def _clip_entry(clip: Clip) -> dict[str, Any]:
-    """Return a clip's entry in the manifest, without values at their defaults: there may be thousands of clips."""
+    """Return a clip's entry, without values at their defaults: there may be thousands of clips."""
     values = {field.name: (getattr(clip, field.name), field.default) for field in fields(clip)}
     return {name: value for name, (value, default) in values.items() if value != default}
 

@@ -222,7 +222,7 @@ def _summary_values(corpus: Corpus, grammar: Grammar) -> dict[str, Any]:
         ],
         "origins": origins(corpus),
         "postures": len(corpus),
-        "moves": len(corpus.begins),
+        "moves": len(corpus.moves),
         "skeleton": corpus.skeleton.name,
         "joints": list(corpus.skeleton.names),
         "facing": corpus.facing,

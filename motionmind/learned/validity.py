@@ -2,7 +2,7 @@
 
 Letters are sizes: N postures, M moves, J joints, L chains, G states in all, H = N + M moments, S = 2 M steps, E
 transitions, B bridges, V pair rows and Q pairs of the coordination, K frames of detail between postures, P pairs of
-limbs, D nodes of the trees over moments.
+limbs, D nodes of the trees over moments, C clips and F faults, whose entries have so many bytes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from motionmind.body.capsules import capsules_of
 from motionmind.body.limbs import limbs_of, parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus.corpus import Corpus, Facing
+from motionmind.corpus.entries import Columns
 from motionmind.discretize import StateSpace
 from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
@@ -48,6 +49,13 @@ FORMS = {
     "detail": _Form("f2", "N K J 3", -4.0, 4.0),
     "states": _Form("i4", "N L"),
     "centres": _Form("f8", "G 4", -2.0, 2.0),
+    "clips.text": _Form("u1", "clip_bytes"),
+    "clips.lines": _Form("i8", "C+1"),
+    "clips.starts": _Form("i8", "C+1"),
+    "clips.weights": _Form("f8", "C 2", 0.0, 1e15),
+    "clips.order": _Form("i4", "C"),
+    "faults.text": _Form("u1", "fault_bytes"),
+    "faults.lines": _Form("i8", "F+1"),
     "transitions.starts": _Form("i8", "L+1"),
     "transitions.indptr": _Form("i8", "G+1"),
     "transitions.targets": _Form("i4", "E"),
@@ -100,14 +108,15 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.weights": _Form("f8", "parts D", 0.0, 1e15),
 }
 
-MOVEMENT = [name for name in FORMS if "." not in name]  # from these, all the others can be learned
+MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
+ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions
 
 
 def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: Facing) -> None:
     """Check the type, shape and range of each array; ValueError names the first that is wrong.
 
     Args:
-        arrays: all arrays of `FORMS` or those of `MOVEMENT`, by name.
+        arrays: all arrays of `FORMS` or those of `MOVEMENT`, by name, each with or without those of `ENTRIES`.
         skeleton: the body.
         facing: whether the body's turn is a chain.
     """
@@ -131,6 +140,23 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
             raise ValueError(f"{name} is of the shape {list(array.shape)}, not {shape}")
         if form.kind.startswith("f") and not _is_all(array, partial(_is_in_range, form)):
             raise ValueError(f"{name} holds a number that is not from {form.low:g} to {form.high:g}")
+
+
+def check_entries(arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Check where the entries of clips and faults begin, and the clips' postures; ValueError names what is wrong.
+
+    Args:
+        arrays: as for `check_forms`, with those of `ENTRIES`.
+    """
+    for name, last in (
+        ("clips.lines", len(arrays["clips.text"])),
+        ("faults.lines", len(arrays["faults.text"])),
+        ("clips.starts", len(arrays["rotations"])),
+    ):
+        starts = arrays[name]
+        if starts[0] != 0 or starts[-1] != last or (np.diff(starts) <= 0).any():
+            raise ValueError(f"{name} does not rise from 0 to {last}")
+    _check_range("clips.order", arrays, len(arrays["clips.order"]))
 
 
 def _is_in_range(form: _Form, part: NDArray[Any]) -> bool:
@@ -162,17 +188,33 @@ def check_values(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: Stat
         corpus: the corpus.
         space: the states of each chain.
     """
+    _check_clips(corpus)
     moves = corpus.moves
     _check_units("rotations", arrays)
     later = (corpus.times[moves.ends] - corpus.times[moves.begins]) * np.sign(moves.ends - moves.begins)
     if not (later > 0.0).all():
         raise ValueError("times does not rise within a clip")
     _check_range("states", arrays, space.sizes)
-    if FORMS.keys() <= arrays.keys():
+    if FORMS.keys() - ENTRIES <= arrays.keys():
         _check_grammar(arrays, corpus, space, later)
         _check_carriage(arrays, len(corpus), len(later))
     if TREES.keys() & arrays.keys():
         _check_trees(arrays)
+
+
+def _check_clips(corpus: Corpus) -> None:
+    """Check that each clip and fault can be read, and that the columns are those of the clips."""
+    for name in ("clips", "faults"):
+        try:
+            for _ in getattr(corpus, name):
+                pass
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{name}.text holds what is no entry: {error}") from error
+    corpus.check_clips()
+    found = Columns.of(corpus.clips)
+    for name in Columns._fields:
+        if not np.array_equal(getattr(corpus.columns, name), getattr(found, name)):
+            raise ValueError(f"clips.{name} is not what clips.text says")
 
 
 def _check_grammar(arrays: Mapping[str, NDArray[Any]], corpus: Corpus, space: StateSpace, later: Floats) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 
 from motionmind.body.motion import Motion, Posture
 from motionmind.corpus import store
-from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
 from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
@@ -125,23 +125,40 @@ class _CorpusCollection(Collection):
 
         return persistence.load(self.word, self._home).corpus
 
-    @cached_property
-    def _clips(self) -> dict[str, Clip]:
-        return {clip.label: clip for clip in self._corpus.clips}
-
     @property
     def postures(self) -> Sequence[str]:
         return list(self._scores)
 
     @property
     def clips(self) -> Mapping[str, str]:
-        return {label: clip.about for label, clip in self._clips.items()}
+        return _Labels(self._corpus)
 
     def posture(self, name: str) -> Posture:
         return compose.posture(self._scores[name], name)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
-        return [replace(self._corpus.motion(self._clips[name]), name=name) for name in names]
+        corpus = self._corpus
+        return [replace(corpus.motion(corpus.clip_labelled(name)), name=name) for name in names]
+
+
+class _Labels(Mapping[str, str]):
+    """The clips of a corpus by their labels: what each is about; to find one takes no look at all of them."""
+
+    def __init__(self, corpus: Corpus) -> None:
+        self._corpus = corpus
+
+    def __getitem__(self, label: str) -> str:
+        return self._corpus.clip_labelled(label).about
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict(self.items()))
+
+    def items(self) -> ItemsView[str, str]:
+        """Return all labels, each with what its clip is about."""
+        return {clip.label: clip.about for clip in self._corpus.clips}.items()
+
+    def __len__(self) -> int:
+        return len(self._corpus.clips)
 
 
 _Stamps = dict[Path, tuple[int, int] | None]

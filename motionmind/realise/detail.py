@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from motionmind._typing import Floats, Ints
-from motionmind.corpus.corpus import Corpus, Moves
+from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.moves import Moves
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.jit import jit
@@ -48,10 +49,11 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
     """
     poses = np.ascontiguousarray(poses)
     if among is None:
-        among, begins, ends = np.arange(len(moves.begins)), moves.begins, moves.ends
+        among, begins, ends = np.arange(len(moves)), moves.begins, moves.ends
         shown = orientations[:, : poses.shape[1]]
     else:
-        postures, which = np.unique([moves.begins[among], moves.ends[among]], return_inverse=True)
+        some = moves.take(among)
+        postures, which = np.unique([some.begins, some.ends], return_inverse=True)
         begins, ends = which.reshape(2, -1)
         shown = orientations[postures, : poses.shape[1]]
     distances = _squared_distances(np.ascontiguousarray(shown), poses) / poses.shape[1]
@@ -80,7 +82,7 @@ def moves_near(moves: Moves, carriage: Carriage, poses: Floats) -> Ints | None:
     count = len(carriage.weights) - len(carriage.turn)
     near = [postures_near(carriage.trees, carriage.orientations, pose, NEAREST, count, LEAVES) for pose in poses]
     leaving = steps_at(np.unique(np.concatenate(near)), True, carriage.begins, carriage.ends, count)[2]
-    return np.unique(np.clip(leaving[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(moves.begins) - 1))
+    return np.unique(np.clip(leaving[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(moves) - 1))
 
 
 def detail_of(corpus: Corpus, moves: Ints) -> Floats:
@@ -93,7 +95,8 @@ def detail_of(corpus: Corpus, moves: Ints) -> Floats:
         corpus: a corpus that keeps K frames of detail a move.
         moves: numbers of its moves [T].
     """
-    begins, ends = corpus.moves.begins[moves], corpus.moves.ends[moves]
+    some = corpus.moves.take(moves)
+    begins, ends = some.begins, some.ends
     between = corpus.detail[np.minimum(begins, ends)].astype(np.float64)
     backward = ends < begins
     between[backward] = between[backward, ::-1]
@@ -121,7 +124,8 @@ def share_of_detail(
         seconds: durations of the movement's moves [T].
     """
     speed = _turns(poses[:-1], poses[1:]) / seconds
-    copied_speed = _turns(orientations[moves.begins[copied]], orientations[moves.ends[copied]]) / moves.seconds[copied]
+    some = moves.take(copied)
+    copied_speed = _turns(orientations[some.begins], orientations[some.ends]) / some.seconds
     relative = np.divide(speed, copied_speed, out=np.ones(len(copied)), where=speed < copied_speed)
     legs = np.minimum(LIVELIER * relative, 1.0)
     return legs, legs * (1.0 + MISSES * (1.0 - relative))
@@ -137,7 +141,8 @@ def _predecessors(moves: Moves, among: Ints) -> Ints:
 
     Moves are in the order of their clips; those backward in time follow on the ones after them.
     """
-    begins, ends = moves.begins[among], moves.ends[among]
+    some = moves.take(among)
+    begins, ends = some.begins, some.ends
     before = among + np.where(ends > begins, -1, 1)
     place = np.minimum(np.searchsorted(among, before), len(among) - 1)
     follows = (among[place] == before) & (ends[place] == begins)

@@ -36,7 +36,7 @@ def detour(corpus: Corpus, carriage: Carriage, ends: tuple[Floats, Floats], move
     joints = len(corpus.skeleton)
     shown = carriage.orientations[: len(corpus), :joints]
     first, last = (end[:joints] for end in ends)
-    starts, stops = (np.array([getattr(clip, name) for clip in corpus.clips]) for name in ("start", "stop"))
+    starts, stops = corpus.columns.starts[:-1], corpus.columns.starts[1:]
     near = [_nearest(carriage, shown, end) for end in (first, last)]
     spare = max(moves - own, 0)
     best, way = np.inf, (0, 0, 0, 0)

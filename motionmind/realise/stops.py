@@ -104,6 +104,6 @@ def _mean_rates(corpus: Corpus, carriage: Carriage, count: int, steps: Sequence[
 
 def _velocities(corpus: Corpus, carriage: Carriage, steps: Ints, moves: int) -> tuple[Floats, Floats]:
     """Return the velocities of the chains [m, L, 3] and of the root [m, 3] in some of the steps."""
-    seconds, shown = 0.5 * corpus.moves.seconds[steps % moves][:, None], carriage.orientations
+    seconds, shown = 0.5 * corpus.moves.take(steps % moves).seconds[:, None], carriage.orientations
     turned = rot.log(rot.inv_mul(shown[carriage.begins[steps]], shown[carriage.ends[steps]]))
     return turned / seconds[..., None], carriage.travel[steps % moves] / seconds

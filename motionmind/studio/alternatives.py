@@ -119,7 +119,7 @@ def account(tween: Tween, corpus: Corpus, own: Floats) -> Account:
 def usual_likelihoods(engine: Engine) -> Floats:
     """Return how likely the corpus's own moves are: quantiles of the mean over the joints that move, of ln P [101]."""
     moves, graph = engine.corpus.moves, engine.grammar.transitions
-    chosen = np.unique(np.linspace(0, len(moves.begins) - 1, _MOVES).astype(int))
+    chosen = np.unique(np.linspace(0, len(moves) - 1, _MOVES).astype(int))
     states = np.asarray(engine.states)
     before, after = states[moves.begins[chosen]], states[moves.ends[chosen]]
     logs = -graph.weights("conditional")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -91,11 +92,20 @@ def list_all(home: Path | None) -> list[dict[str, Any]]:
             entry["title"] = displayed(str(manifest.get("title") or ""), _LINE)
             entry["rate"] = manifest.get("rate")
             if manifest["format"] == store.BUILT:
-                entry["clips"] = len(manifest.get("clips", ()))
+                entry["clips"] = _count_clips(manifest)
         except MotionMindError as error:
             entry["error"] = displayed(str(error), _LINE)
         found.append(entry)
     return found
+
+
+def _count_clips(manifest: dict[str, Any]) -> int:
+    """Return the number of clips of a built corpus: earlier versions' manifests list them."""
+    if "clips" in manifest:
+        return len(manifest["clips"])
+    with suppress(LookupError, TypeError):
+        return int(manifest["arrays"]["clips.order"][1])
+    return 0
 
 
 def _is_own(name: str, folder: Path, home: Path | None) -> bool:

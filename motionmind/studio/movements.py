@@ -265,11 +265,12 @@ class _Corpus:
 
     def motion(self, name: str) -> Motion:
         """Return a clip as it was recorded, else a posture, whose credit is that of the whole corpus."""
-        for clip in self._corpus.clips:
-            if clip.label == name:
-                return replace(self._corpus.recording(clip), name=name)
-        found = self.collection.find(name, as_clip=True)
-        return replace(found, recorded=(credit_clip(self._corpus.own_origin, name),))
+        try:
+            clip = self._corpus.clip_labelled(name)
+        except KeyError:
+            found = self.collection.find(name, as_clip=True)
+            return replace(found, recorded=(credit_clip(self._corpus.own_origin, name),))
+        return replace(self._corpus.recording(clip), name=name)
 
 
 def version_of(corpus: str, home: Path | None) -> str:

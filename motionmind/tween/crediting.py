@@ -44,4 +44,4 @@ def _credit(corpus: Corpus, clip: tuple[str, str] | None, share: float) -> Credi
     """Return so large a share for a clip, by its corpus and its name; for the engine where there is none."""
     if clip is None:
         return Credit(share)
-    return replace(corpus.credit_of(corpus.clips_by_name[clip]), share=share)
+    return replace(corpus.credit_of(corpus.clips_named(*clip)[-1]), share=share)

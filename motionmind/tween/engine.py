@@ -269,13 +269,13 @@ class Engine(LearnedCorpus):
             warnings.warn(
                 f"faster than anything in the corpus: {worded(tempo.faster)}", MotionMindWarning, stacklevel=3
             )
-        moves = self.corpus.moves
+        moves = self.corpus.moves.take(realised.detail)
         # A curve through the frames: a move may fall between two, and the arc between them is a chord.
         reached = rotation_spline(motion.times, motion.rotations, motion.insertions[0].times)
         path_degrees = self.space.distance(self.corpus.to_chains(reached), path)
         followed = path_degrees <= self.space.tolerances + SAME_ANGLE
         shown = _shown(sources, followed)
-        found = tuple(source_of(self.corpus, int(moves.begins[m]), int(moves.ends[m])) for m in realised.detail)
+        found = tuple(source_of(self.corpus, int(a), int(b)) for a, b in zip(moves.begins, moves.ends, strict=True))
         return Tween(
             motion=_credited(motion, credit_tween(self.corpus, shown, found, motion.insertions[0].times)),
             joints=self.corpus.chains,

@@ -258,7 +258,7 @@ class TransitionTest:
     def _fastest(self) -> Floats:
         """Degrees a second that each chain turns at most in a move of the corpus [L]."""
         corpus, moves = self.engine.corpus, self.engine.corpus.moves
-        if len(moves.begins) == 0:
+        if len(moves) == 0:
             return np.zeros(len(corpus.chains))
         chains = corpus.to_chains(np.asarray(corpus.rotations))
         angles = np.degrees(rot.angle(chains[moves.begins], chains[moves.ends]))

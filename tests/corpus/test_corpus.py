@@ -18,6 +18,7 @@ from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Clip, Corpus
+from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.flips import find_flips
 from motionmind.corpus.gather import gather
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
@@ -409,7 +410,7 @@ def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str,
     ("text", "words"),
     [
         ('{"format": "motionmind-corpus", "version": 2}', "version 2; version 1 can be read"),
-        ('{"format": "motionmind-built-corpus", "version": 7}', "version 7; version 6 can be read"),
+        ('{"format": "motionmind-built-corpus", "version": 8}', "version 8; version 7 can be read"),
         ('{"format": "motionmind-built-corpus", "version": 3, "folder": 3}', "there is no folder 3 beside it"),
         ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
         ("{}", "is None version None"),
@@ -507,9 +508,9 @@ def test_a_fingerprint_tells_files_apart(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_bytes(b"ab")
     two.write_bytes(b"c")
-    before = store.fingerprint([one, two])
-    assert store.fingerprint([one, two]) == before
+    before = fingerprint([one, two])
+    assert fingerprint([one, two]) == before
     two.write_bytes(b"d")
-    assert store.fingerprint([one, two]) != before
+    assert fingerprint([one, two]) != before
     with pytest.raises(FormatError, match="three"):
-        store.fingerprint([tmp_path / "three"])
+        fingerprint([tmp_path / "three"])

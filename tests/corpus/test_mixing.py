@@ -23,6 +23,7 @@ from command_line import Run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from saved_corpora import entries, put_entries
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23
@@ -770,11 +771,9 @@ def test_a_manifest_that_lacks_an_array_or_has_no_such_weight_is_refused(everyth
     with pytest.raises(FormatError, match=r"lists no array transitions\.arrives; build the corpus again: motionmind"):
         Engine.load(str(tmp_path / "old"))
     everything.save(tmp_path / "bent")
-    manifest = json.loads((tmp_path / "bent" / "manifest.json").read_text("utf-8"))
+    clips = entries(tmp_path / "bent")
     for key, value in (("weight", 0.0), ("weight", -2.0), ("reverse", -1.0), ("reverse", 1e9)):
-        bent = json.loads(json.dumps(manifest))
-        bent["clips"][1][key] = value
-        (tmp_path / "bent" / "manifest.json").write_text(json.dumps(bent), "utf-8")
+        put_entries(tmp_path / "bent", [clips[0], clips[1] | {key: value}, *clips[2:]])
         with pytest.raises(CorpusError, match="trio weighs"):
             Engine.load(str(tmp_path / "bent"))
 

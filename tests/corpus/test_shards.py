@@ -24,6 +24,7 @@ from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.corpus import shards
 from motionmind.corpus.corpus import Corpus
+from motionmind.corpus.fingerprint import fingerprint
 from motionmind.corpus.gather import gather
 from motionmind.corpus.recordings import Taking
 from motionmind.corpus.shards import Reading, Taken, shards_of, take_files
@@ -161,7 +162,7 @@ def test_a_shard_depends_on_all_that_was_read(tmp_path: Path) -> None:
     with open_team() as team:
         for bend in (30, 30, 60):
             (tmp_path / "two.score").write_text(second.format(bend))
-            job = shards.Job(tmp_path / "one.score", "", Reading(Taking()), tmp_path, shards.store.fingerprint([]))
+            job = shards.Job(tmp_path / "one.score", "", Reading(Taking()), tmp_path, fingerprint([]))
             (taken,) = team.map(shards.take_file, [job])
             assert taken.key, taken.fault
             opened = shards._open(job, taken.key)
@@ -180,7 +181,7 @@ def test_other_options_are_other_shards(files: dict[Path, str], tmp_path: Path) 
 
 def test_warnings_are_given_again_from_a_shard(tmp_path: Path) -> None:
     write_motion(tmp_path / "still.bvh", dance("still", 0).slice(0, 1))
-    job = shards.Job(tmp_path / "still.bvh", "still", Reading(Taking()), tmp_path, shards.store.fingerprint([]))
+    job = shards.Job(tmp_path / "still.bvh", "still", Reading(Taking()), tmp_path, fingerprint([]))
     for _ in range(2):
         with pytest.warns(MotionMindWarning, match="holds one posture"):
             list(shards._recordings(job, shards.take_file(job)))

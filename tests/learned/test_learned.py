@@ -17,6 +17,7 @@ from saved_corpora import as_in_0_1
 
 import motionmind
 from motionmind.corpus import store
+from motionmind.corpus.fingerprint import LEARNED_BY, fingerprint
 from motionmind.learned.model import LearnedCorpus
 from motionmind.learned.summary import CorpusCheck, CorpusSummary, summarise, to_plain
 from motionmind.learned.validity import MOVEMENT
@@ -87,11 +88,11 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("file", ["render/camera.py", "cli/tweens.py", "search/astar.py", "__init__.py"])
 def test_a_change_to_what_learning_does_not_use_leaves_the_fingerprint(copied: Path, file: str) -> None:
-    before = store.fingerprint([], copied)
-    assert before == store.fingerprint([])
+    before = fingerprint([], copied)
+    assert before == fingerprint([])
     source = (copied / file).read_bytes()
     (copied / file).write_bytes(source + b"\n# changed\n")
-    assert store.fingerprint([], copied) == before
+    assert fingerprint([], copied) == before
     (copied / file).write_bytes(source)
 
 
@@ -100,11 +101,11 @@ def test_a_change_to_what_learning_does_not_use_leaves_the_fingerprint(copied: P
     ["learned/carriage.py", "geometry/rotations.py", "formats/bvh.py", "jit.py", "body/bodies/human23.toml"],
 )
 def test_a_change_to_what_learning_uses_changes_the_fingerprint(copied: Path, file: str) -> None:
-    before, source = store.fingerprint([], copied), (copied / file).read_bytes()
+    before, source = fingerprint([], copied), (copied / file).read_bytes()
     (copied / file).write_bytes(source + b"\n# changed\n")
-    assert store.fingerprint([], copied) != before
+    assert fingerprint([], copied) != before
     (copied / file).write_bytes(source)
-    assert store.fingerprint([], copied) == before
+    assert fingerprint([], copied) == before
 
 
 def test_learning_imports_nothing_that_the_fingerprint_leaves_out(tmp_path: Path) -> None:
@@ -122,4 +123,4 @@ def test_learning_imports_nothing_that_the_fingerprint_leaves_out(tmp_path: Path
     )
     rooms = {name.split(".")[1] for name in run.stdout.split() if "." in name}
     assert "notation" in rooms  # it was learned, not found
-    assert rooms - {"_moved"} <= {Path(name).stem for name in store.LEARNED_BY}  # which only finds old names
+    assert rooms - {"_moved"} <= {Path(name).stem for name in LEARNED_BY}  # which only finds old names

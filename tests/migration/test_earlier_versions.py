@@ -17,7 +17,7 @@ from motionmind.corpus import store
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture
 from motionmind.learned import persistence
-from motionmind.learned.validity import FORMS, MOVEMENT
+from motionmind.learned.validity import ENTRIES, FORMS, MOVEMENT
 from motionmind.tween.engine import Engine
 from motionmind.tween.report import read_report
 from motionmind.variation.variation import Variation
@@ -119,6 +119,19 @@ def test_what_was_learned_again_is_kept(archive: Path, tmp_path: Path, monkeypat
     np.testing.assert_array_equal(again.carriage.orientations, first.carriage.orientations)
 
 
+@pytest.mark.parametrize("archive", CORPORA[-2:], ids=lambda path: path.stem)
+def test_a_corpus_that_keeps_all_that_is_learned_is_not_learned_again(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = unpacked(archive, tmp_path / "home") / "corpora" / "piece"
+    monkeypatch.setattr(persistence, "learn_from_states", lambda *_: pytest.fail("it was learned again"))
+    engine = Engine.load("piece", tmp_path / "home")
+    assert [clip.name for clip in engine.corpus.clips] == ["piece"]
+    assert store.rename("piece", "other", tmp_path / "home") == folder.with_name("other")
+    assert Engine.load("other", tmp_path / "home").corpus.clips == engine.corpus.clips
+    assert not store.cache().exists()
+
+
 @each_corpus
 def test_a_build_takes_the_place_of_a_corpus(archive: Path, run: Run, tmp_path: Path) -> None:
     folder = unpacked(archive, tmp_path / "home") / "corpora" / "piece"
@@ -166,7 +179,7 @@ def test_the_newest_of_these_corpora_is_what_this_version_writes(today: Engine, 
     assert kept.manifest.keys() <= now.manifest.keys()  # a key that may lack is no other form
     assert kept.manifest["version"] == now.manifest["version"]
     assert list(kept.manifest["arrays"]) == list(now.manifest["arrays"])
-    assert set(MOVEMENT) < set(FORMS) == set(now.arrays)
+    assert set(MOVEMENT) | set(ENTRIES) < set(FORMS) == set(now.arrays)
 
 
 # --- postures, movement and variations --------------------------------------------------------------------------------

@@ -250,7 +250,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any], Path], None], str]] = {
     "objects that run": (pickled, "cannot be read as an array"),
     "an array lacks": (lacking, "cannot be read as an array"),
     "a version to come": (manifest("version", 999), "is 'motionmind-built-corpus' version 999"),
-    "no clips": (manifest("clips", []), "clips"),
+    "no such clips": (array("clips.starts", 1, 0), "clips.starts does not rise from 0 to"),
     "another folder": (manifest("folder", 2), "there is no folder 2"),
     "arrays elsewhere": (manifest("arrays", {"../../../etc/passwd": None}), "does not say which arrays there are"),
     "another licence": (manifest("licence", "all rights reserved"), "states another licence than the index"),

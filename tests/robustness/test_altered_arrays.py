@@ -7,6 +7,7 @@ import random
 import shutil
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from motionmind.corpus import store, versions
+from motionmind.corpus.corpus import JointFlip, JointRepair
 from motionmind.errors import FormatError, MotionMindError, NoPathError
 from motionmind.learned.validity import FORMS
 from motionmind.tween.engine import Engine
@@ -25,9 +27,14 @@ EVERY = 10  # of the corpora that load, one is used
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A corpus with bridges, coordination and detail, of few postures."""
+    """A corpus with bridges, coordination, detail and faults, of few postures."""
     folder = tmp_path_factory.mktemp("built") / "hexapod"
-    Engine.load("walk-hexapod").save(folder)
+    engine = Engine.load("walk-hexapod")
+    first, *others = engine.corpus.clips
+    joint = engine.corpus.skeleton.names[1]
+    mended = replace(first, repairs=(JointRepair(joint, 3, 5, (0.1, 0.2), exact=False),), performer="Zoë")
+    faults = JointFlip(first.name, joint, 3, 100.0, "reconstructed"), JointFlip(first.name, joint, 9, 50.0)
+    replace(engine, corpus=replace(engine.corpus, clips=(mended, *others), faults=faults)).save(folder)
     return folder
 
 
@@ -43,11 +50,11 @@ def altered(array: NDArray[Any], rng: random.Random) -> NDArray[Any]:
                 case 0:
                     flat[at] = flat[rng.randrange(flat.size)]
                 case 1:
-                    flat[at] += rng.choice([-1, 1])
+                    flat[at : at + 1] += np.array([rng.choice([-1, 1])]).astype(out.dtype)
                 case 2:
                     flat.view(np.uint8)[rng.randrange(flat.nbytes)] ^= 1 << rng.randrange(8)
                 case 3:
-                    flat[at] *= rng.choice([-1, 0, 2])
+                    flat[at : at + 1] *= np.array([rng.choice([-1, 0, 2])]).astype(out.dtype)
                 case 4:
                     wild = (
                         [np.nan, np.inf, -np.inf, 1e300, -1e-300] if out.dtype.kind == "f" else [-1, 10**4, 2**31 - 1]
@@ -146,6 +153,45 @@ def test_what_is_no_number_is_refused_wherever_it_stands(built: Path, tmp_path: 
         np.save(file, array)
         with pytest.raises(MotionMindError, match=name):
             Engine.load(str(folder))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fault"),
+    [
+        ("clips.text", b"\xff", "clips.text holds what is no entry"),
+        ("clips.text", b"[", "clips.text holds what is no entry"),
+        ("clips.text", b'"\n', "clips.text holds what is no entry"),
+        ("faults.text", b"\0", "faults.text holds what is no entry"),
+    ],
+)
+def test_a_clip_or_a_fault_that_cannot_be_read_is_refused(
+    built: Path, tmp_path: Path, name: str, value: bytes, fault: str
+) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    file = store.load(folder).place / f"{name}.npy"
+    array = np.load(file)
+    array[: len(value)] = np.frombuffer(value, np.uint8)
+    np.save(file, array)
+    with pytest.raises(FormatError, match=f"{fault}: .*; build the corpus again"):
+        Engine.load(str(folder))
+
+
+def test_columns_that_are_of_other_clips_are_refused(built: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "altered"
+    shutil.copytree(built, folder)
+    place, clips = store.load(folder).place, len(Engine.load(str(built)).corpus.clips)
+    for name, change in (
+        ("clips.weights", lambda array: 0.5 * array),
+        ("clips.order", lambda array: np.full(clips, 1, np.int32)),
+        ("clips.starts", lambda array: array + np.eye(1, clips + 1, 1, dtype=np.int64)[0]),
+    ):
+        whole = np.load(place / f"{name}.npy")
+        np.save(place / f"{name}.npy", change(whole))
+        with pytest.raises(FormatError, match=f"{name} is not what clips.text says; build the corpus again"):
+            Engine.load(str(folder))
+        np.save(place / f"{name}.npy", whole)
+    Engine.load(str(folder))
 
 
 def test_arrays_are_checked_once_and_again_when_a_file_is_another(built: Path, tmp_path: Path) -> None:

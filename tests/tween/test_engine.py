@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import insect
+from saved_corpora import entries, put_entries
 
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
@@ -410,12 +411,19 @@ def test_a_built_corpus_that_is_damaged_is_a_clear_error(six_segments: Engine, t
         refused(lambda broken, key=key: broken.pop(key), "arrays" if key == "arrays" else f"no key `{key}`")
     for name in manifest["arrays"]:
         refused(lambda broken, name=name: broken["arrays"].pop(name), f"lists no array {name}")
-    refused(lambda broken: broken["clips"].pop(), "clips do not follow one another")
     refused(lambda broken: broken["skeleton"]["names"].pop(), "joints need as many parents")
     refused(lambda broken: broken["skeleton"].update(parents=[0] * 14), "must be the root")
     refused(lambda broken: broken["space"].update(starts=[0, 1]), "state space")
     refused(lambda broken: broken.update(facing="north"), r"\$.facing")
     (good / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    clips = entries(good)
+    put_entries(good, [*clips[:-1], clips[-1] | {"stop": clips[-1]["stop"] - 1}])
+    with pytest.raises(MotionMindError, match="clips do not follow one another"):
+        Engine.load(str(good))
+    put_entries(good, clips[:-1])
+    with pytest.raises(FormatError, match=r"clips\.starts is of the shape"):
+        Engine.load(str(good))
+    put_entries(good, clips)
     Engine.load(str(good))
     (good / "1" / "carriage.travel.npy").unlink()
     with pytest.raises(FormatError, match=r"carriage\.travel\.npy"):

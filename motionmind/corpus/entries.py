@@ -1,0 +1,118 @@
+"""Clips and faults of a corpus on disk: an entry for each, read when it is asked for, and columns beside them.
+
+A corpus of a hundred hours has tens of thousands of clips. Loading it reads none of them: all that a tween asks of
+every clip is where it starts and what it counts, and that is in the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
+
+import msgspec
+import numpy as np
+
+from motionmind._typing import Bytes, Floats, Int32s, Ints
+
+if TYPE_CHECKING:
+    from motionmind.corpus.corpus import Clip
+
+_Kind = TypeVar("_Kind")
+
+
+class Packed(NamedTuple):
+    """A line of JSON for each of n entries.
+
+    Attributes:
+        text: the lines, one after the other [B], UTF-8.
+        lines: where each begins [n + 1], and the end.
+    """
+
+    text: Bytes
+    lines: Ints
+
+    @classmethod
+    def of(cls, entries: Iterable[object]) -> Packed:
+        """Pack entries."""
+        encoder = msgspec.json.Encoder()
+        lines = [encoder.encode(entry) + b"\n" for entry in entries]
+        return cls(np.frombuffer(b"".join(lines), np.uint8), np.cumsum([0, *map(len, lines)], dtype=np.int64))
+
+
+class Entries(Sequence[_Kind]):
+    """Packed entries, each of which is read when it is asked for.
+
+    Args:
+        packed: the entries.
+        kind: the type of each.
+    """
+
+    def __init__(self, packed: Packed, kind: type[_Kind]) -> None:
+        self._text, self._lines = packed
+        self._decoder = msgspec.json.Decoder(kind)
+
+    def __len__(self) -> int:
+        return len(self._lines) - 1
+
+    @overload
+    def __getitem__(self, index: int) -> _Kind: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[_Kind, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> _Kind | tuple[_Kind, ...]:
+        numbers = range(len(self))[index]
+        return self._read(numbers) if isinstance(numbers, int) else tuple(map(self._read, numbers))
+
+    def __iter__(self) -> Iterator[_Kind]:
+        return map(self._read, range(len(self)))
+
+    def __eq__(self, other: object) -> bool:
+        return tuple(self) == tuple(other) if isinstance(other, tuple | Entries) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _read(self, number: int) -> _Kind:
+        return self._decoder.decode(self._text[self._lines[number] : self._lines[number + 1]].tobytes())
+
+
+class Columns(NamedTuple):
+    """Columns of C clips.
+
+    Attributes:
+        starts: first posture of each [C + 1], and the number of postures.
+        weights: counts of each of its moves forwards and backwards [C, 2]; 0 if it is not learned backwards.
+        order: the clips, by the corpus that they were taken from and by name [C].
+    """
+
+    starts: Ints
+    weights: Floats
+    order: Int32s
+
+    @classmethod
+    def of(cls, clips: Sequence[Clip]) -> Columns:
+        """Return the columns of clips that follow one another from 0."""
+        return cls(
+            np.array([0, *(clip.stop for clip in clips)], dtype=np.int64),
+            np.array([(clip.weight, clip.reverse_weight) for clip in clips], dtype=np.float64).reshape(-1, 2),
+            np.array(sorted(range(len(clips)), key=[key_of(clip) for clip in clips].__getitem__), dtype=np.int32),
+        )
+
+
+def key_of(clip: Clip) -> tuple[str, str]:
+    """Return what clips are ordered by."""
+    return clip.corpus, clip.name
+
+
+class StoredClips(Entries["Clip"]):
+    """The clips of a corpus on disk.
+
+    Args:
+        packed: their entries.
+        kind: Clip.
+        columns: their columns, which agree with the entries.
+    """
+
+    def __init__(self, packed: Packed, kind: type[Clip], columns: Columns) -> None:
+        super().__init__(packed, kind)
+        self.columns = columns

@@ -1,0 +1,38 @@
+"""A name for what is learned from files, by which it is found again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from motionmind.files import read_bytes
+
+# The sources of the package by which a corpus is read and learned, and no others: see `fingerprint`.
+LEARNED_BY = (
+    *("_cells.py", "_typing.py", "arguments.py", "bundled.py", "display.py", "errors.py", "files.py", "jit.py"),
+    *("plugins.py", "executors", "geometry", "credits", "body", "retarget", "formats", "notation", "corpus"),
+    *("discretize", "grammar", "learned"),
+)
+
+
+def fingerprint(files: Iterable[Path], package: Path = Path(__file__).parents[1]) -> str:
+    """Return a name [16 hexadecimal digits] for what is learned from these files, that changes whenever that may.
+
+    It is a hash of the files, and of the code and the bodies' descriptions that learning uses (`LEARNED_BY`): a change
+    to the search or to pictures leaves a corpus that was learned before valid.
+
+    Args:
+        files: all files that a corpus is learned from.
+        package: folder of the package's sources.
+
+    Raises:
+        FormatError: a file cannot be read.
+    """
+    digest = hashlib.sha256()
+    rooms = [package / name for name in LEARNED_BY]
+    code = [path for room in rooms for path in ([room] if room.suffix else sorted(room.rglob("*.py")))]
+    for path in [*code, *sorted(package.glob("body/bodies/*.toml")), *files]:
+        data = read_bytes(path)
+        digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
+    return digest.hexdigest()[:16]
