@@ -42,7 +42,10 @@ def open_page(served: Served, browser: Any) -> Iterator[Open]:
 
     def visit(width: int = 1440, height: int = 900, scheme: str = "light") -> Any:
         size = {"width": width, "height": height}
-        context = browser.new_context(viewport=size, device_scale_factor=0.5, color_scheme=scheme)
+        # As for `studio_page`, nothing plays: drawing in software is most of a test's time.
+        context = browser.new_context(
+            viewport=size, device_scale_factor=0.5, color_scheme=scheme, reduced_motion="reduce"
+        )
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(LONG)

@@ -4,26 +4,47 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from studio_server import LARGE, SMALL
+from studio_server import LARGE, SMALL, Served, serving
 
 from motionmind.geometry import rotations as rot
 from motionmind.studio.placement import performance
+from motionmind.studio.project import Project
 from motionmind.studio.view import layout_of
 
 BEGIN = [("b1", "plies", 0, 12), ("b2", "adagio-barre", 9, 15), ("b3", "tendus", 11, 18)]
 POSTURE = "application/x-motionmind-posture"
 
 
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The file of a piece of three stretches, two insertions found between them: searches take more than a page."""
+    path = tmp_path_factory.mktemp("begun") / "piece.motionmind"
+    with serving(Project.create(path, "ballet")) as served, served.listening() as events:
+        for name, clip, first, last in BEGIN:
+            served.insert(name, f"ballet/{clip}", first, last)
+        while [seam["state"] for seam in served.project()["piece"]["seams"]] != ["inserted", "inserted"]:
+            next(events)
+    return path.read_bytes()
+
+
 @pytest.fixture
-def page(studio_server: Any, studio_page: Any) -> Any:
-    """A page with a piece of three stretches, two insertions found between them."""
-    for name, clip, first, last in BEGIN:
-        studio_server.insert(name, f"ballet/{clip}", first, last)
+def studio_server(begun: bytes, tmp_path: Path) -> Iterator[Served]:
+    """A studio with a copy of that piece, in this process, at a free port; one worker."""
+    path = tmp_path / "piece.motionmind"
+    path.write_bytes(begun)
+    with serving(Project.open(path)) as served:
+        yield served
+
+
+@pytest.fixture
+def page(studio_page: Any) -> Any:
+    """A page with that piece, all of which is seen."""
     wait_for_states(studio_page, ["inserted", "inserted"])
     studio_page.get_by_test_id("zoom-fit").click()
     return studio_page
