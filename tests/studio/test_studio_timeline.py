@@ -340,7 +340,9 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
 
 
 def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, page: Any, browser: Any) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, has_touch=True)
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce", has_touch=True
+    )
     touched = context.new_page()
     try:
         touched.goto(studio_server.entry)
