@@ -105,7 +105,8 @@ def largest_exponent(
     """
     if steps < 1:
         raise MotionMindError(f"an exponent needs 1 step at least, not {steps}")
-    return _once(_exponent, _Run.of(flow, start, step, transient), steps)
+    exponent: float = _once(_exponent, _Run.of(flow, start, step, transient), steps)
+    return exponent
 
 
 @dataclass(frozen=True, eq=False)
