@@ -233,8 +233,11 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
     assert errors[0].startswith("broken.bvh:")
     assert errors[1].startswith("dance.fbx: FBX is not read")
     assert "a person of 23 joints" in page.get_by_test_id("understood").inner_text()
+    page.emulate_media(reduced_motion="no-preference")  # what is looked at plays then
     page.get_by_test_id("look").click()
-    until(page, "studio.viewer.title.includes('bends.score')")
+    until(page, "studio.viewer.title.includes('bends.score') && studio.viewer.player.playing")
+    page.evaluate("studio.viewer.player.pause()")
+    page.emulate_media(reduced_motion="reduce")
     page.get_by_test_id("put").click()
     until(page, "studio.store.state.piece.blocks.length === 1")
     # A corpus of it and of another, looked through, and deleted, which it asks about.
