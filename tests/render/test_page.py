@@ -669,6 +669,12 @@ def test_a_telephone_has_enough_of_two_pixels_to_one(show: Callable[..., Opened]
     assert tab.get("motionmind.stage.view") == "top"
 
 
+def test_a_page_that_is_zoomed_out_is_drawn_with_twice_its_screens_pixels_at_most(show: Callable[..., Opened]) -> None:
+    tab = show(still(2), device_scale_factor=0.5)
+    tab.picture()
+    assert tab.get("motionmind.stage.renderer.getPixelRatio()") <= 1.0
+
+
 def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:
     tab = show(bridged())
     tab.get(
