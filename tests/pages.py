@@ -12,6 +12,7 @@ from PIL import Image
 from motionmind._typing import Bools, Int16s
 
 SIZE = {"width": 640, "height": 480}  # of a page, where its size is all the same
+FINE = {"device_scale_factor": 1}  # for pictures that are measured
 
 # The sizes of a notebook computer, of a telephone, upright and lying, and of the smallest; these are used by fingers.
 SCREENS: dict[str, dict[str, Any]] = {

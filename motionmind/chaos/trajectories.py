@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from types import FunctionType
 from typing import Any
 
@@ -41,6 +41,7 @@ _APART = 1e-8  # distance of Benettin's second trajectory from the first, relati
 _ENOUGH = 20.0  # nats by which the distance must grow in a chaotic flow
 _PATIENCE = 200_000  # steps within which it must
 _LONG = 10_000  # steps in which a trajectory that nears a fixed point comes to rest
+_KEPT = 4096  # runs whose beginning is kept: a search for a nudge makes some hundred
 _STILL = 1e-9  # relative to the speed at the flow's own start: slower points are at rest
 
 
@@ -76,9 +77,7 @@ def trajectory(
     if every < 1:
         raise MotionMindError(f"a trajectory's points are 1 step apart at least, not {every}")
     run = _Run.of(flow, start, step, transient)
-    begin = run.settled()
-    run.check(begin)
-    return run.follow(begin, count, every)
+    return run.follow(_once(_begin, run), count, every)
 
 
 def largest_exponent(
@@ -106,9 +105,8 @@ def largest_exponent(
     """
     if steps < 1:
         raise MotionMindError(f"an exponent needs 1 step at least, not {steps}")
-    run = _Run.of(flow, start, step, transient)
-    growth, used = run.growth(run.settled(), steps, np.inf)
-    return growth / (used * run.step)
+    exponent: float = _once(_exponent, _Run.of(flow, start, step, transient), steps)
+    return exponent
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +150,17 @@ class _Run:
     @property
     def parameters(self) -> tuple[float, ...]:
         return tuple(self.flow.parameters.values())
+
+    @property
+    def _all(self) -> tuple[object, ...]:
+        numbers = (*self.parameters, *self.flow.start, self.flow.step, *self.start, self.step)
+        return self.flow.field, np.array(numbers).tobytes(), len(self.parameters), self.transient
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Run) and self._all == other._all
+
+    def __hash__(self) -> int:
+        return hash(self._all)
 
     def settled(self) -> Floats:
         """The point at which the transient ends [d]."""
@@ -212,6 +221,27 @@ class _Run:
             f"{self.step:g} it is farther than {_FAR:g} from the origin; a start nearer to "
             f"{_written(self.flow.start)} or a smaller step may stay on the attractor"
         )
+
+
+def _begin(run: _Run) -> Floats:
+    """The first point of a trajectory [d], from which the flow is chaotic."""
+    begin = run.settled()
+    run.check(begin)
+    return begin
+
+
+def _exponent(run: _Run, steps: int) -> float:
+    growth, used = run.growth(run.settled(), steps, np.inf)
+    return growth / (used * run.step)
+
+
+_kept = {function: lru_cache(_KEPT)(function) for function in (_begin, _exponent)}
+
+
+def _once(function: Callable[..., Any], run: _Run, *rest: int) -> Any:
+    """Call a function of a run, or return what it returned before: whoever varies a piece asks for the same runs again
+    and again. What is not compiled may have changed."""
+    return (_kept[function] if run.compiled else function)(run, *rest)
 
 
 def _written(point: Sequence[float] | Floats) -> str:

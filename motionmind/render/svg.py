@@ -194,17 +194,19 @@ class _Artist:
         """Draw a body: its colours, the shades on them, and lines where one part stands before another."""
         solid, depth, shade = drawing.buffer.solid, drawing.buffer.depth, drawing.buffer.shade
         surfaces, filled = self.surface_of[solid], solid != EMPTY
+        seen, depths = surfaces[filled], depth[filled]
         regions, text = outlines(surfaces), ""
         for surface in np.unique(regions.labels):
             # Farther is paler, as in a picture, but evenly over a surface, to leave no edges on it.
             near, full, most = haze(self.stage.body)
-            far = most * float(np.clip((near - depth[surfaces == surface].mean()) / (near - full), 0.0, 1.0))
+            far = most * float(np.clip((near - depths[seen == surface].mean()) / (near - full), 0.0, 1.0))
             paint = np.array(BRIDGED) if surface == len(self.surfaces) else drawing.paints[self.first[surface]]
             ink = hexadecimal(paint * _LIT * (1.0 - far) + 255.0 * far)
             data = self._path(regions.only(regions.labels == surface), drawing.corner)
             text += f'<path fill="{ink}" stroke="{ink}" d="{data}"/>'
+        few, shade = filled[::SMOOTH, ::SMOOTH], shade[::SMOOTH, ::SMOOTH]
         for limit in _SHADES:
-            shaded = outlines(np.where(filled & (shade < limit), 0, EMPTY).astype(np.int16)[::SMOOTH, ::SMOOTH])
+            shaded = outlines(np.where(few & (shade < limit), 0, EMPTY).astype(np.int16))
             shaded = shaded.only(np.abs(shaded.areas()) > _SPECK)
             text += f'<path stroke="none" opacity="{_SHADE}" d="{self._path(shaded, drawing.corner, 1)}"/>'
         lines = ridges(self.part_of[solid], depth, STEP * self.stage.body.size)

@@ -200,7 +200,8 @@ def host(browser: Any, tmp_path: Path) -> Iterator[Host]:
     state = {key: player.get_state(key)[key] for key in ("time", "selection", "height", "_page")}
     text = [json.dumps(part).replace("<", "\\u003c") for part in (state, player.get_state("_esm")["_esm"])]
     (tmp_path / "host.html").write_text(HOST.replace("ESM", text[1]).replace("STATE", text[0]), "utf-8")
-    tab = browser.new_page(viewport={"width": 800, "height": 900})
+    # Few pixels, and nothing plays by itself: drawing two views in software is most of a test's time.
+    tab = browser.new_page(viewport={"width": 800, "height": 900}, device_scale_factor=0.5, reduced_motion="reduce")
     asked: list[str] = []
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto((tmp_path / "host.html").as_uri())

@@ -16,7 +16,7 @@ import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
 from numpy.typing import ArrayLike
-from pages import SCREENS, reachable_controls, readable_words
+from pages import FINE, SCREENS, reachable_controls, readable_words
 from PIL import Image
 from scipy.spatial import cKDTree
 
@@ -371,7 +371,7 @@ def show(browser: Any, tmp_path: Path, danced: Variation, said: list[str]) -> It
     write_attractor(tmp_path / "page.html", danced)
 
     def show(ready: str = "window.motionmind?.attractor", script: str = "", **options: Any) -> Any:
-        usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce"}
+        usual = {"viewport": {"width": 900, "height": 500}, "reduced_motion": "reduce", "device_scale_factor": 0.5}
         contexts.append(browser.new_context(**(usual | options)))
         tab = contexts[-1].new_page()
         tab.on("console", lambda message: said.append(message.text))
@@ -393,7 +393,7 @@ def show(browser: Any, tmp_path: Path, danced: Variation, said: list[str]) -> It
 
 
 def test_the_page_follows_the_variation_on_its_attractor(show: Callable[..., Any], danced: Variation) -> None:
-    variation, tab = danced, show()
+    variation, tab = danced, show(**FINE)
     times = variation.motion().times[variation.arrange().frames]
     found = tab.evaluate(
         "motionmind.attractor.times.map(time => (motionmind.player.seek(time), motionmind.attractor.posture))"

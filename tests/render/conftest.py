@@ -22,7 +22,9 @@ def show(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
     def show(motion: Motion, ready: str = "window.motionmind", script: str = "", **options: Any) -> Opened:
         path = tmp_path / f"{len(opened)}.html"
         write_page(path, motion)
-        context = browser.new_context(**({"viewport": SIZE, "reduced_motion": "reduce"} | options))
+        # Few pixels: drawing in software is most of a test's time. Tests that measure pictures ask for all of them.
+        usual = {"viewport": SIZE, "reduced_motion": "reduce", "device_scale_factor": 0.5}
+        context = browser.new_context(**(usual | options))
         tab = Opened(context.new_page())
         tab.page.on("console", lambda message: tab.said.append(message.text))
         tab.page.on("pageerror", lambda error: tab.said.append(str(error)))

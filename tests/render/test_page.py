@@ -16,7 +16,7 @@ from bundled_clips import ballet_clip
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from pages import SCREENS, SIZE, Opened, near, reachable_controls, readable_words
+from pages import FINE, SCREENS, SIZE, Opened, near, reachable_controls, readable_words
 from PIL import Image
 
 from motionmind._typing import Bools, Floats, Indices
@@ -141,7 +141,7 @@ def test_what_is_inserted_and_bridged_is_what_the_motion_says(show: Callable[...
 
 
 def test_left_is_warm_and_on_the_right_of_the_front_view(show: Callable[..., Opened]) -> None:
-    tab = show(still(2))
+    tab = show(still(2), **FINE)
     tab.click("front")
     picture = tab.picture()
     warm, cool = near(picture, COLOURS["left"]), near(picture, COLOURS["right"])
@@ -153,7 +153,7 @@ def test_left_is_warm_and_on_the_right_of_the_front_view(show: Callable[..., Ope
 
 
 def test_cameras_look_from_where_they_say(show: Callable[..., Opened]) -> None:
-    tab = show(still(2))
+    tab = show(still(2), **FINE)
     extents = {}
     for view in ("front", "side", "top", "quarter"):
         tab.click(view)
@@ -193,7 +193,7 @@ def test_dragging_turns_the_camera_and_reset_brings_it_back(show: Callable[..., 
 
 
 def test_inserted_frames_are_violet_and_bridged_joints_emerald(show: Callable[..., Opened]) -> None:
-    tab = show(bridged())
+    tab = show(bridged(), **FINE)
     tab.click("front")
     tab.click("ends")  # ghosts off
     seen = {}
@@ -217,7 +217,7 @@ def test_inserted_frames_are_violet_and_bridged_joints_emerald(show: Callable[..
 def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[..., Opened]) -> None:
     motion = bridged()
     moving = replace(motion, root=motion.root + np.outer(np.arange(12), [0.25, 0.0, 0.0]))
-    tab = show(moving)
+    tab = show(moving, **FINE)
     tab.click("front")
     tab.get("motionmind.player.seek(0.4)")
     pictures = {"both": tab.picture()}
@@ -245,7 +245,7 @@ def test_ghosts_of_a_and_b_and_the_onion_skin_can_be_switched(show: Callable[...
 def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., Opened]) -> None:
     motion = still(3)
     rising = replace(motion, root=motion.root + np.outer([0.0, 0.1, 1.0], [0.0, 1.0, 0.0]))
-    tab = show(rising)
+    tab = show(rising, **FINE)
     darkness = []
     for time in (0.0, 0.1, 0.2):
         tab.get(f"motionmind.player.seek({time}); motionmind.stage.figure.group.visible = false")
@@ -256,7 +256,7 @@ def test_the_shadow_is_under_the_body_and_fades_as_it_rises(show: Callable[..., 
 
 
 def test_timeline_shows_insertions_and_bridges(show: Callable[..., Opened]) -> None:
-    tab = show(bridged())
+    tab = show(bridged(), **FINE)
     shot = tab.page.locator("#timeline canvas").screenshot()
     picture = np.array(Image.open(BytesIO(shot)).convert("RGB")).astype(np.int16)
     violet = np.flatnonzero(near(picture, INSERTED["middle"]).any(axis=0)) / picture.shape[1]
@@ -325,7 +325,7 @@ def test_a_small_page_begins_without_the_legend(show: Callable[..., Opened]) -> 
 
 
 def test_it_is_dark_where_the_system_is_until_it_is_switched(show: Callable[..., Opened]) -> None:
-    tab = show(still(2), color_scheme="dark")
+    tab = show(still(2), color_scheme="dark", **FINE)
     dark = tab.picture()
     tab.press("d")
     light = tab.picture()
@@ -348,7 +348,7 @@ def test_it_is_dark_where_the_system_is_until_it_is_switched(show: Callable[...,
 
 
 def test_it_follows_the_system_while_nobody_switches(show: Callable[..., Opened]) -> None:
-    tab = show(still(2))
+    tab = show(still(2), **FINE)
     light = tab.picture()
     tab.page.emulate_media(color_scheme="dark")
     assert tab.picture()[5, 5].max() < 60
@@ -611,7 +611,7 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
     ids=["one posture", "no moves", "six legs", "a point", "far above the floor"],
 )
 def test_it_shows_odd_motions(show: Callable[..., Opened], motion: Motion) -> None:
-    tab = show(motion)
+    tab = show(motion, **FINE)
     picture = tab.picture()
     body = picture.min(axis=-1) < 200
     assert body.sum() > 50
@@ -667,6 +667,12 @@ def test_a_telephone_has_enough_of_two_pixels_to_one(show: Callable[..., Opened]
     assert tab.get("document.getElementById('canvas').width") == 780
     tab.page.tap("#top")
     assert tab.get("motionmind.stage.view") == "top"
+
+
+def test_a_page_that_is_zoomed_out_is_drawn_with_twice_its_screens_pixels_at_most(show: Callable[..., Opened]) -> None:
+    tab = show(still(2), device_scale_factor=0.5)
+    tab.picture()
+    assert tab.get("motionmind.stage.renderer.getPixelRatio()") <= 1.0
 
 
 def test_every_control_has_a_name(show: Callable[..., Opened]) -> None:

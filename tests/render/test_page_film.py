@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bundled_clips import ballet_clip
-from pages import SCREENS, Opened, near, readable_words
+from pages import FINE, SCREENS, Opened, near, readable_words
 from PIL import Image
 
 from motionmind._typing import Floats, Int16s, Pixels
@@ -74,7 +74,7 @@ def test_a_film_lasts_as_long_as_the_movement_and_has_all_of_it(
 ) -> None:
     seconds = 0.777
     motion = briefly("the adagio", seconds)
-    tab = show(motion)
+    tab = show(motion, **FINE)
     tab.click("front")
     name = film(tab, tmp_path / "film.webm")
     assert name == "the adagio.webm"

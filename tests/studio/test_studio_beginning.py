@@ -16,7 +16,7 @@ from motionmind.variation.variation_json import is_variation, read_variation, wr
 def variation() -> Variation:
     engine = Engine.load("ballet")
     motion = engine.corpus.motion(engine.corpus.clips[0])
-    return vary(motion, engine, nudge=1.0)
+    return vary(motion, engine, nudge=1.0, alternatives=2)
 
 
 @pytest.fixture

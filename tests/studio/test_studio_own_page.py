@@ -42,7 +42,10 @@ def open_page(served: Served, browser: Any) -> Iterator[Open]:
 
     def visit(width: int = 1440, height: int = 900, scheme: str = "light") -> Any:
         size = {"width": width, "height": height}
-        context = browser.new_context(viewport=size, device_scale_factor=0.5, color_scheme=scheme)
+        # As for `studio_page`, nothing plays: drawing in software is most of a test's time.
+        context = browser.new_context(
+            viewport=size, device_scale_factor=0.5, color_scheme=scheme, reduced_motion="reduce"
+        )
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(LONG)
@@ -230,8 +233,11 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
     assert errors[0].startswith("broken.bvh:")
     assert errors[1].startswith("dance.fbx: FBX is not read")
     assert "a person of 23 joints" in page.get_by_test_id("understood").inner_text()
+    page.emulate_media(reduced_motion="no-preference")  # what is looked at plays then
     page.get_by_test_id("look").click()
-    until(page, "studio.viewer.title.includes('bends.score')")
+    until(page, "studio.viewer.title.includes('bends.score') && studio.viewer.player.playing")
+    page.evaluate("studio.viewer.player.pause()")
+    page.emulate_media(reduced_motion="reduce")
     page.get_by_test_id("put").click()
     until(page, "studio.store.state.piece.blocks.length === 1")
     # A corpus of it and of another, looked through, and deleted, which it asks about.

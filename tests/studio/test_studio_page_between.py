@@ -84,14 +84,14 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
         assert painted(studio_page, f"[data-testid=alternative-{n}] > canvas") > 50
 
 
-def test_only_one_renderer_draws_all_alternatives(studio_page: Any) -> None:
+def test_one_renderer_draws_all_nothing_plays_where_it_may_not_and_pointing_says_where_a_joint_was_seen(
+    studio_page: Any,
+) -> None:
+    studio_page.emulate_media(reduced_motion="reduce")
     from_a_to_b(studio_page)
+    assert studio_page.get_by_test_id("play-alternatives").get_attribute("aria-label") == "Play all"
     script = "[...document.querySelectorAll('.alternatives canvas')].filter((c) => c.getContext('webgl2')).length"
     assert studio_page.evaluate(script) == 1
-
-
-def test_pointing_at_a_joint_says_where_it_was_seen(studio_page: Any) -> None:
-    from_a_to_b(studio_page)
     box = studio_page.get_by_test_id("alternative-1").bounding_box()
     words = studio_page.get_by_test_id("alternative-1").locator(".seen")
     said = set()
@@ -206,12 +206,6 @@ def test_paper_is_as_the_system_has_it_until_it_is_switched(studio_page: Any, sc
     assert (before == "rgb(27, 26, 30)") == (scheme == "dark")
     studio_page.get_by_test_id("dark").click()
     assert studio_page.evaluate(paper) != before
-
-
-def test_nothing_plays_by_itself_where_motion_is_to_be_reduced(studio_page: Any) -> None:
-    studio_page.emulate_media(reduced_motion="reduce")
-    from_a_to_b(studio_page)
-    assert studio_page.get_by_test_id("play-alternatives").get_attribute("aria-label") == "Play all"
 
 
 def test_the_sheet_of_keys_tells_what_they_do(studio_page: Any) -> None:

@@ -40,7 +40,9 @@ def test_the_address_forgets_the_token_and_a_reload_keeps_the_window(
 
 
 def test_no_request_leaves_this_machine(studio_server: Served, browser: Any, expect: Any) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, device_scale_factor=0.5)
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce"
+    )
     page, asked = context.new_page(), set[str]()
     page.on("request", lambda request: asked.add(urlsplit(request.url).netloc))
     page.goto(studio_server.entry)

@@ -29,7 +29,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 def page(served: Served, browser: Any) -> Iterator[Any]:
     """A page, 1440x900, that fingers can touch; an error on its console fails the test."""
     served.edit(edit="arrange", blocks=[], about={"words": "begin anew"})
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=0.5, has_touch=True)
+    context = browser.new_context(
+        viewport={"width": 1440, "height": 900}, device_scale_factor=0.5, reduced_motion="reduce", has_touch=True
+    )
     page, errors = context.new_page(), []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: errors.append(str(error)))

@@ -167,7 +167,9 @@ def test_handles_follow_the_body_in_little_time(studio_page: Any) -> None:
 
 
 def test_a_finger_drags_a_handle(studio_server: Served, browser: Any) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, has_touch=True)
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce", has_touch=True
+    )
     page = context.new_page()
     page.goto(studio_server.entry)
     _open(page)

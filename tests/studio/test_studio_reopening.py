@@ -126,7 +126,9 @@ def test_a_corpus_that_there_is_not_is_refused(home: Path, path: Path) -> None:
 def test_the_page_says_what_is_missing(home: Path, path: Path, browser: Any) -> None:
     store.delete("mine", home)
     with serving(Project.open(path, home), home) as client:
-        context = browser.new_context(viewport={"width": 1440, "height": 900}, device_scale_factor=0.5)
+        context = browser.new_context(
+            viewport={"width": 1440, "height": 900}, device_scale_factor=0.5, reduced_motion="reduce"
+        )
         page = context.new_page()
         errors: list[str] = []
         page.on("console", lambda message: message.type == "error" and errors.append(message.text))

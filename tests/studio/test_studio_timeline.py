@@ -3,52 +3,51 @@
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from studio_server import LARGE, SMALL
+from piece_page import piece, wait_for
+from studio_server import LARGE, SMALL, Served, serving
 
 from motionmind.geometry import rotations as rot
 from motionmind.studio.placement import performance
+from motionmind.studio.project import Project
 from motionmind.studio.view import layout_of
 
 BEGIN = [("b1", "plies", 0, 12), ("b2", "adagio-barre", 9, 15), ("b3", "tendus", 11, 18)]
 POSTURE = "application/x-motionmind-posture"
 
 
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The file of a piece of three stretches, two insertions found between them: searches take more than a page."""
+    path = tmp_path_factory.mktemp("begun") / "piece.motionmind"
+    with serving(Project.create(path, "ballet")) as served, served.listening() as events:
+        for name, clip, first, last in BEGIN:
+            served.insert(name, f"ballet/{clip}", first, last)
+        while [seam["state"] for seam in served.project()["piece"]["seams"]] != ["inserted", "inserted"]:
+            next(events)
+    return path.read_bytes()
+
+
 @pytest.fixture
-def page(studio_server: Any, studio_page: Any) -> Any:
-    """A page with a piece of three stretches, two insertions found between them."""
-    for name, clip, first, last in BEGIN:
-        studio_server.insert(name, f"ballet/{clip}", first, last)
+def studio_server(begun: bytes, tmp_path: Path) -> Iterator[Served]:
+    """A studio with a copy of that piece, in this process, at a free port; one worker."""
+    path = tmp_path / "piece.motionmind"
+    path.write_bytes(begun)
+    with serving(Project.open(path)) as served:
+        yield served
+
+
+@pytest.fixture
+def page(studio_page: Any) -> Any:
+    """A page with that piece, all of which is seen."""
     wait_for_states(studio_page, ["inserted", "inserted"])
     studio_page.get_by_test_id("zoom-fit").click()
     return studio_page
-
-
-def piece(page: Any) -> Any:
-    return page.evaluate("studio.store.state.piece")
-
-
-def blocks(page: Any) -> list[str]:
-    """What stands where, the new blocks under their sources' names."""
-    return [
-        ("~" if one["mirrored"] else "") + f"{one['title']} {one['first']}-{one['last']}"
-        for one in piece(page)["blocks"]
-    ]
-
-
-def wait_for(page: Any, expression: str, seconds: float = 120.0) -> None:
-    """Wait until an expression of JavaScript, in which `piece` is the piece, is true; the page's policy lets no page
-    evaluate one, but the debugger may."""
-    wanted = f"(() => {{ const {{ piece }} = studio.store.state ?? {{}}; return Boolean(piece && ({expression})); }})()"
-    end = time.monotonic() + seconds
-    while not page.evaluate(wanted):
-        assert time.monotonic() < end, (expression, blocks(page), [seam["state"] for seam in piece(page)["seams"]])
-        page.wait_for_timeout(30)
 
 
 def wait_for_states(page: Any, states: list[str]) -> None:
@@ -319,7 +318,9 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
 
 
 def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, page: Any, browser: Any) -> None:
-    context = browser.new_context(viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, has_touch=True)
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce", has_touch=True
+    )
     touched = context.new_page()
     try:
         touched.goto(studio_server.entry)
@@ -341,41 +342,6 @@ def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, pag
         wait_for_blocks(touched, ["tendus 11-18", "plies 0-12", "adagio-barre 9-15"])
     finally:
         context.close()
-
-
-def test_long_pieces_stay_fluent(studio_server: Any, studio_page: Any) -> None:
-    """A piece of 5,000 postures in 1,000 stretches: own script takes at most 4 ms a frame where it plays."""
-    made = [
-        {"id": f"n{n}", "source": f"ballet/{clip}", "first": 2 * (n % 5), "last": 2 * (n % 5) + 4}
-        for n, clip in enumerate(["plies", "adagio-barre", "tendus", "fondus", "frappes"] * 200)
-    ]
-    studio_server.send("DELETE", "/api/seams")
-    studio_server.edit(edit="arrange", blocks=made, about={"words": "a long piece"})
-    studio_server.send("DELETE", "/api/seams")
-    wait_for(studio_page, "piece.blocks.length === 1000")
-    studio_page.get_by_test_id("ruler").click(position={"x": 5, "y": 5})  # shows the piece
-    wait_for(studio_page, "studio.viewer.player.motion.length === 5000")
-    assert studio_page.locator(".timeline [role=option]").count() < 800
-    studio_page.wait_for_timeout(2000)
-    taken = studio_page.evaluate(
-        """async () => {
-          const { viewer } = studio;
-          const spent = [];
-          viewer.player.play();
-          for (let frame = 0; frame < 200; frame++) {
-            await new Promise((next) => requestAnimationFrame(next));
-            const begin = performance.now();
-            viewer.player.advance(1 / 60);
-            viewer.stage.show(viewer.player.time, { ends: true, onion: 0 });
-            spent.push(performance.now() - begin);
-          }
-          viewer.player.pause();
-          return spent.sort((one, other) => one - other);
-        }"""
-    )
-    assert taken[100] < 4.0, taken[::20]
-    nodes = studio_page.locator(".timeline *").count()
-    assert nodes < 4000
 
 
 def test_the_page_plays_what_is_taken_away(studio_server: Any, page: Any) -> None:

@@ -249,8 +249,8 @@ export class Stage {
 
   /** Without a GPU to smooth all edges takes longer than all else: there what moves is drawn plainly, what rests finely. */
   #sharpen(moving) {
-    const own = Math.min(window.devicePixelRatio, SHARPEST);
-    const ratio = this.software ? (moving ? 1 : SHARPEST) : own;
+    const screen = window.devicePixelRatio; // below 1 where the page is zoomed out: more would not be seen
+    const ratio = Math.min(this.software ? (moving ? Math.min(screen, 1) : 2 * screen) : screen, SHARPEST);
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
   }
 
