@@ -15,7 +15,7 @@ from motionmind.geometry import rotations as rot
 
 _LONG = 64  # knots; a longer curve is computed in pieces, each with a margin of knots on either side
 _PIECE, _MARGIN = 32, 14  # a knot's influence falls to about a quarter with each further knot: 1e-8 of it is lost
-_MANY = 6144  # values from which compiled code does the same arithmetic
+_MANY = 512  # values from which compiled code does the same arithmetic
 
 
 def natural_spline(times: Floats, values: Floats, at: Floats) -> Floats:
