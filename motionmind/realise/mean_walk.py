@@ -193,6 +193,12 @@ def _mean_between(
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
+        # Limbs share what walks of larger parts say.
+        shared = {}
+        for numbers in groups if trees is None else ():
+            if numbers[:-1] not in shared:
+                whole, half = numbers[:-1]
+                shared[numbers[:-1]] = SIZES[0] * known[whole][1] + SIZES[1] * known[half][1]
 
         def move(number: int) -> float:
             mine = known[number] if number in known else walk(number)
@@ -202,8 +208,8 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    whole, half, limb = (marginals for _, marginals, *_ in walks)
-                    weights = SIZES[0] * whole + SIZES[1] * half + SIZES[2] * limb
+                    weights = SIZES[2] * mine[1]
+                    weights += shared[numbers[:-1]]
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
