@@ -199,7 +199,7 @@ class Anatomy:
         masses, centres = self._segments
         if skeleton is not None:
             centres = centres * (skeleton.height / self.skeleton.height)
-        segments = body.positions_with(rotations, root, range(len(body)), centres)[..., len(body) :, :]
+        segments = body.positions_with(rotations, root, np.arange(len(body)), centres)[..., len(body) :, :]
         return np.asarray(np.einsum("j,...jk->...k", masses, segments))
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Charts of the rotations, compiled: rotation vectors from one key of a curve to those around it, and curves by them."""
+"""Charts of the rotations, compiled: rotation vectors from one key of a curve to those near it, and curves by them."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def natural_curve(times: Floats, values: Floats, at: Floats) -> Floats:
 @jit
 def piece_of(times: Floats, at: float) -> int:
     """Return the knot that begins the piece of a spline which a time lies in: beyond its ends, the outermost piece."""
-    return min(max(np.searchsorted(times, at, side="right") - 1, 0), len(times) - 2)
+    return min(max(int(np.searchsorted(times, at, side="right")) - 1, 0), len(times) - 2)
 
 
 @jit
