@@ -19,7 +19,8 @@ from motionmind.body.support import centre_of_mass
 from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import Foot, bend_legs, departure, fade_at_ends, pose, softness
+from motionmind.realise.departures import departure, fade_at_ends
+from motionmind.realise.feet import Foot, bend_legs, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.knees import cover, smoothed
 from motionmind.realise.least_squares import solve
@@ -130,7 +131,7 @@ def carry(
     planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
     bearing = find_bearing(*planned)
     if "steps" in without:
-        bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
+        bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape).copy())
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving

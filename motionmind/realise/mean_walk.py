@@ -188,7 +188,8 @@ def _mean_between(
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
                 here = _taken(shown, np.asarray(chosen.moments), part)
-                own = squared_distances(here, np.zeros((len(part), 1), int), 1, np.ascontiguousarray(passed[:, part]))[0]
+                to = np.ascontiguousarray(passed[:, part])
+                own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
@@ -206,8 +207,7 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = SIZES[2] * mine[1]
-                    weights += shared[numbers[0], numbers[1]]
+                    weights = SIZES[2] * mine[1] + shared[numbers[0], numbers[1]]
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)

@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
-from motionmind.realise.feet import LIFT, departure
+from motionmind.realise.departures import LIFT, departure
 from motionmind.realise.flight import PUSHES, Flight, find_flights, flying_frames
 from motionmind.realise.footfalls import (
     BRIEF,
