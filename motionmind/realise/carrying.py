@@ -16,6 +16,7 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
+from motionmind.jit import jit
 from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
@@ -275,7 +276,19 @@ def _falls(
 
 def _points_on_floor(shape: Shape, bearing: Bearing, root: Floats) -> Floats:
     """Return the level places of a body's points [N, P, 2], metres: those of feet where the feet are to be."""
-    points = shape.places[..., [0, 2]] + root[:, None, [0, 2]]
-    for number, foot_points in enumerate(shape.feet):
-        points[:, foot_points] += (bearing.targets[:, number] - root[:, [0, 2]])[:, None]
-    return np.asarray(points)
+    return _moved_points(shape.places, shape.feet, bearing.targets, root)
+
+
+@jit
+def _moved_points(places: Floats, feet: Bools, targets: Floats, root: Floats) -> Floats:
+    """Return level places of points [N, P, 2], from `places` relative to the root [N, P, 3] and of which feet [F, P]
+    they are, for which the root would have to be at `targets` [N, F, 2]."""
+    out = np.empty((*places.shape[:2], 2))
+    for t in range(len(places)):
+        for point in range(places.shape[1]):
+            for k in range(2):
+                out[t, point, k] = places[t, point, 2 * k] + root[t, 2 * k]
+                for foot in range(len(feet)):
+                    if feet[foot, point]:
+                        out[t, point, k] += targets[t, foot, k] - root[t, 2 * k]
+    return out

@@ -175,8 +175,8 @@ def ease_knees(
         hip, knee, end = foot.chain(skeleton)
         bones = foot.bones(skeleton)
         legs[:, number] = posed.places[:, end] - posed.places[:, hip]
-        now, aim = np.linalg.norm(legs[:, number], axis=-1), legs[:, number] + off[:, number]
-        wanted = np.linalg.norm(aim, axis=-1)
+        now, aim = rot.norm(legs[:, number]), legs[:, number] + off[:, number]
+        wanted = rot.norm(aim)
         far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
         far[fixed] = now[fixed]
         own[:, number] = bend_of(now, *bones)
@@ -194,7 +194,7 @@ def ease_knees(
     finer = lengths.copy()
     for number, foot in enumerate(feet):
         bones = foot.bones(skeleton)
-        bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
+        bends = bend_of(rot.norm(aims[:, number]), *bones)
         bends = slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps)
         lengths[:, number] = distance_of(bends, *bones)
         if fine:
@@ -213,14 +213,14 @@ def ease_knees(
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:
     """Return legs from hip to foot [N, feet, 3] as long as given [N, feet], metres: steep ones, with feet level."""
-    own = np.linalg.norm(legs, axis=-1)
+    own = rot.norm(legs)
     out = legs * (lengths / np.maximum(own, 1e-9))[..., None]
     level = np.minimum(own**2 - legs[..., 1] ** 2, lengths**2)
     upright = legs.copy()
     upright[..., 1] = -np.sqrt(lengths**2 - level)
     s = np.clip((-legs[..., 1] / np.maximum(own, 1e-9) - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0, 1.0)[..., None]
     out += s * s * (3.0 - 2.0 * s) * (upright - out)
-    return np.asarray(out * (lengths / np.maximum(np.linalg.norm(out, axis=-1), 1e-9))[..., None])
+    return np.asarray(out * (lengths / np.maximum(rot.norm(out), 1e-9))[..., None])
 
 
 def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, soft: Floats) -> Floats:
