@@ -477,6 +477,19 @@ def test_fine_detail_of_knees_lifts_no_standing_foot_for_long() -> None:
     assert np.all(np.mean(heights < 0.004, axis=0) > 0.4)
 
 
+def test_rounding_errors_do_not_decide_in_which_frame_a_flight_begins() -> None:
+    aloft, heights = np.zeros(41), 0.25 * (1.0 + 1e-15 * np.arange(-40, 40))
+    aloft[2:14] = 1.0  # sooner than the body can push off, which takes seven frames and a half
+    begins = {
+        flight.start
+        for height in heights
+        for flight in find_flights(
+            aloft, np.full(41, height), np.ones(41), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
+        )
+    }
+    assert begins == {8}
+
+
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
     still, leaps = np.full(31, 1.0), np.full(31, 0.3)
     on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY, 30.0)
