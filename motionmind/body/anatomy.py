@@ -199,7 +199,7 @@ class Anatomy:
         masses, centres = self._segments
         if skeleton is not None:
             centres = centres * (skeleton.height / self.skeleton.height)
-        segments = body.positions_with(rotations, root, range(len(body)), centres)[..., len(body) :, :]
+        segments = body.positions_with(rotations, root, np.arange(len(body)), centres)[..., len(body) :, :]
         return np.asarray(np.einsum("j,...jk->...k", masses, segments))
 
     @cached_property
@@ -277,12 +277,8 @@ def to_rotations(conventions: Conventions, degrees: Floats) -> Floats:
 
 def to_degrees(conventions: Conventions, turned: Floats) -> Floats:
     """Return degrees [..., J, 3] about x, y and z of joints' rotations [..., J, 4]: the inverse of `to_rotations`."""
+    from motionmind.body.angles import swings_and_twists  # numba is slow to import
+
     long, outer, rest, mirrored = conventions
-    turned, every = np.where(mirrored[:, None], rot.mirror(turned), turned), np.arange(len(long))
-    rests = rest != 0.0
-    turned[..., rests, :] = rot.mul(turned[..., rests, :], rot.from_axis_angle(_Z, -np.radians(rest[rests])))
-    angle = np.angle(np.exp(2j * np.arctan2(turned[..., every, long], turned[..., 3])))
-    twist = rot.from_axis_angle(np.eye(3)[long], angle)
-    vector = rot.log(np.where(outer[:, None], rot.inv_mul(twist, turned), rot.mul_inv(turned, twist)))
-    vector[..., every, long] = angle
-    return np.degrees(vector)
+    rows = np.ascontiguousarray(turned, dtype=np.float64).reshape(-1, len(long), 4)
+    return np.degrees(swings_and_twists(rows, long, outer, np.radians(rest), mirrored)).reshape(*turned.shape[:-1], 3)

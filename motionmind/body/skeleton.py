@@ -10,7 +10,7 @@ from numbers import Integral
 
 import numpy as np
 
-from motionmind._typing import Floats, Indices
+from motionmind._typing import Floats, Indices, Ints
 from motionmind.arguments import as_floats, check_integer, check_items, check_text, check_type
 from motionmind.display import displayed
 from motionmind.errors import SkeletonError, suggestion
@@ -137,6 +137,11 @@ class Skeleton:
         return dict(zip(self.names, above, strict=True))
 
     @cached_property
+    def _tree(self) -> Ints:
+        """The joints' parents [J], as compiled code takes them."""
+        return np.array(self.parents, dtype=np.int64)
+
+    @cached_property
     def rest(self) -> Floats:
         """Positions of all joints, then of all tips, at rest [2 J, 3], metres: identity rotations, the root at 0."""
         places = np.zeros((len(self), 3))
@@ -156,7 +161,7 @@ class Skeleton:
         from motionmind.body.kinematics import turn_with_parents  # numba is slow to import
 
         out = np.ascontiguousarray(as_floats("rotations", rotations))
-        turn_with_parents(out.reshape(-1, len(self), 4), np.array(self.parents))
+        turn_with_parents(out.reshape(-1, len(self), 4), self._tree)
         return out
 
     def local_rotations(self, turned: Floats) -> Floats:
@@ -179,7 +184,7 @@ class Skeleton:
 
         A joint without a tip has its own position for one; arguments as for `positions`.
         """
-        return self.positions_with(rotations, root, range(len(self)), self.tips)
+        return self.positions_with(rotations, root, np.arange(len(self)), self.tips)
 
     def positions_with(
         self, rotations: Floats, root: Floats, joints: Sequence[int] | Indices, points: Floats
@@ -195,11 +200,13 @@ class Skeleton:
         from motionmind.body.kinematics import place_points  # numba is slow to import
 
         root, points = as_floats("root", root), as_floats("points", points)
-        check_items("joints", joints, "joints' indices", Integral)
+        if not (isinstance(joints, np.ndarray) and joints.dtype.kind in "iu"):
+            check_items("joints", joints, "joints' indices", Integral)
         turned, count = self.global_rotations(rotations), len(self) + len(joints)
         out = np.empty((*turned.shape[:-2], count, 3))
         out[..., 0, :] = root
-        frames, offsets = np.array([*self.parents, *joints]), np.concatenate([self.offsets, points])
+        frames = np.concatenate([self._tree, np.asarray(joints, dtype=np.int64)])
+        offsets = np.concatenate([self.offsets, points])
         place_points(out.reshape(-1, count, 3), turned.reshape(-1, len(self), 4), frames, offsets)
         return out
 

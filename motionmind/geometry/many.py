@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Floats
 from motionmind.jit import jit
 
 
@@ -127,22 +127,3 @@ def matrices(q: Floats, out: Floats) -> None:
             out[n, 0, k] = vx + w * tx + (y * tz - z * ty)
             out[n, 1, k] = vy + w * ty + (z * tx - x * tz)
             out[n, 2, k] = vz + w * tz + (x * ty - y * tx)
-
-
-@jit
-def cubics(values: Floats, bends: Floats, first: Ints, weights: Floats, out: Floats) -> None:
-    """Write values of cubic pieces at N moments [N, m].
-
-    Args:
-        values: at the ends of pieces [R, m].
-        bends: second derivatives there [R, m].
-        first: the row that begins each moment's piece [N]; the next one ends it.
-        weights: of the two values, the length of the piece, and weights of the two bends [N, 5].
-        out: the values.
-    """
-    for n in range(len(out)):
-        row = first[n]
-        a, b, step, c, d = weights[n]
-        for k in range(out.shape[1]):
-            line = (values[row, k] * a + values[row + 1, k] * b) / step
-            out[n, k] = line + (bends[row, k] * c + bends[row + 1, k] * d) / 6.0

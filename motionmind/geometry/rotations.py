@@ -20,7 +20,7 @@ from motionmind._typing import Floats
 
 IDENTITY: Floats = np.array([0.0, 0.0, 0.0, 1.0])
 IDENTITY.setflags(write=False)
-_MANY = 2048  # items from which compiled code (`many`) does the same arithmetic; it takes as long to load as it saves
+_MANY = 64  # items from which compiled code (`many`) does the same arithmetic
 _LEAST = 1e-12  # longer is what can be made a rotation
 
 

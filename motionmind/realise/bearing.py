@@ -10,6 +10,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 from motionmind.realise.feet import Foot, foot_points, track_of
 from motionmind.realise.footfalls import Stance, find_stances, standing_costs
 
@@ -204,7 +205,7 @@ def find_bearing(
 
 def _weights(shape: Shape, mass: Floats) -> Floats:
     """Return about how much of the weight each foot would bear if all stood [N, feet]: the more the nearer it is."""
-    far = np.linalg.norm(shape.tracks - mass[:, None], axis=-1)
+    far = rot.norm(shape.tracks - mass[:, None])
     near = 1.0 / np.maximum(far, 0.03) ** 2
     return np.asarray(near / np.maximum(near.sum(axis=1, keepdims=True), 1e-9)) ** 2
 

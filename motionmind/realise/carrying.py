@@ -16,10 +16,12 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import contact_points
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass
+from motionmind.jit import jit
 from motionmind.realise.balance import balance_rows, falls_without, is_beyond, walks
 from motionmind.realise.bearing import Bearing, Shape, find_bearing, find_staying, lowest, points_of_feet, shape_of
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import Foot, bend_legs, departure, fade_at_ends, pose, softness
+from motionmind.realise.departures import departure, fade_at_ends
+from motionmind.realise.feet import Foot, bend_legs, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.knees import cover, smoothed
 from motionmind.realise.least_squares import solve
@@ -130,7 +132,7 @@ def carry(
     planned = shape, root[:, [0, 2]], mass[:, [0, 2]], firm, flying, staying, known.moving, feet, fps
     bearing = find_bearing(*planned)
     if "steps" in without:
-        bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape))
+        bearing = bearing._replace(targets=np.broadcast_to(root[:, None, [0, 2]], bearing.targets.shape).copy())
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
@@ -274,7 +276,19 @@ def _falls(
 
 def _points_on_floor(shape: Shape, bearing: Bearing, root: Floats) -> Floats:
     """Return the level places of a body's points [N, P, 2], metres: those of feet where the feet are to be."""
-    points = shape.places[..., [0, 2]] + root[:, None, [0, 2]]
-    for number, foot_points in enumerate(shape.feet):
-        points[:, foot_points] += (bearing.targets[:, number] - root[:, [0, 2]])[:, None]
-    return np.asarray(points)
+    return _moved_points(shape.places, shape.feet, bearing.targets, root)
+
+
+@jit
+def _moved_points(places: Floats, feet: Bools, targets: Floats, root: Floats) -> Floats:
+    """Return level places of points [N, P, 2], from `places` relative to the root [N, P, 3] and of which feet [F, P]
+    they are, for which the root would have to be at `targets` [N, F, 2]."""
+    out = np.empty((*places.shape[:2], 2))
+    for t in range(len(places)):
+        for point in range(places.shape[1]):
+            for k in range(2):
+                out[t, point, k] = places[t, point, 2 * k] + root[t, 2 * k]
+                for foot in range(len(feet)):
+                    if feet[foot, point]:
+                        out[t, point, k] += targets[t, foot, k] - root[t, 2 * k]
+    return out

@@ -9,25 +9,15 @@ import numpy as np
 from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
-from motionmind.realise.footfalls import Stance
 from motionmind.realise.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
-from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
-SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
 LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
-FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
-BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
-RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
-LIFT = 0.1  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
 KNEE = 8.0  # radians a second at which knees bend at most, where nothing is known of the corpus's
-FLICKS = 11.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
 QUICK = 1.2  # times as fast as all but a hundredth of the corpus's moments: as knees bend at most
 STEEP = 0.4, 0.7  # cosines of a leg's lean from which its foot is raised and lowered, not drawn along the leg
 GIVES = 0.15  # seconds over which the height of a body changes that gives way to a knee
-FAR = 0.4  # metres that a foot must go to be lifted so far
 
 
 class Foot(NamedTuple):
@@ -117,126 +107,6 @@ def _hold(height: Floats) -> Floats:
     return np.asarray(share / share.sum(axis=-1, keepdims=True))
 
 
-def departure(
-    places: Floats,
-    track: Floats,
-    height: Floats,
-    stances: list[Stance],
-    leg: float,
-    fps: float,
-    moving: tuple[bool, bool],
-) -> Floats:
-    """Return a foot's displacement from the movement's own track [N, 3], metres: 0 in the first and the last frame.
-
-    Where the foot stands it is what keeps it in its place, on the floor; between two places it is as smooth as can be,
-    and tends to 0. A foot that swings is kept above the floor, lifted the more the farther it goes, and moves level the
-    less the lower it is.
-
-    Args:
-        places: of the foot where it stands [N, 2], metres, level.
-        track: where the movement has it [N, 2], metres.
-        height: of its lowest point above the floor [N], metres.
-        stances: when it stands.
-        leg: length of the leg, metres.
-        fps: frames a second.
-        moving: whether the foot's velocity is given in the first and in the last frame.
-    """
-    count = len(places)
-    wanted, stands, lift, slides = np.zeros((count, 3)), np.zeros(count), np.zeros(count), np.zeros(count - 1)
-    for stance in stances:
-        here = slice(stance.start, stance.end + 1)
-        wanted[here, 0], wanted[here, 2] = (places[here] - track[here]).T
-        wanted[here, 1] = _settled(height, stance, fps) - height[here]
-        stands[here] = 1.0
-    at = np.where(stands[:, None] > 0.0, places, track)
-    edges = [0, *(edge for stance in stances for edge in (stance.start, stance.end)), count - 1]
-    for last, first in zip(edges[::2], edges[1::2], strict=True):
-        # A foot that is given in the air steps, too, but for one that is given on its way.
-        on_its_way = (last == 0 and moving[0]) or (first == count - 1 and moving[1])
-        if first - last < 2 or on_its_way or not stances:
-            continue
-        rises = _lift(first - last, float(np.linalg.norm(at[first] - at[last])), leg, fps)
-        lift[last : first + 1] = rises
-        up = np.minimum(np.maximum(rises, height[last : first + 1]) / max(rises.max(), 1e-9), 1.0)
-        slides[last:first] = (1.0 - 0.5 * (up[1:] + up[:-1])) ** 2
-    out = _bend(wanted, np.diff(track, axis=0), stands, slides, fps)
-    free = stands == 0.0
-    above = height + out[:, 1] - lift
-    soft = 0.1 * lift + 1e-4
-    # A smooth maximum of where it is and how far it is to be lifted.
-    lifted = np.where(above > 30.0 * soft, above, soft * np.log1p(np.exp(np.minimum(above / soft, 30.0))))
-    out[free, 1] += (lifted - above)[free]
-    return out * fade_at_ends(count, moving, fps)[:, None]
-
-
-def fade_at_ends(count: int, moving: tuple[bool, bool], fps: float) -> Floats:
-    """Return a curve [count] that is 0 at both ends, and elsewhere 1; where the end moves it rises smoothly."""
-    out, frames = np.ones(count), np.arange(count)
-    out[[0, -1]] = 0.0
-    for moves, away in ((moving[0], frames), (moving[1], frames[::-1])):
-        if moves:
-            s = np.minimum(away / (FADES * fps), 1.0)
-            out *= s * s * (3.0 - 2.0 * s)
-    return out
-
-
-def _lift(frames: int, far: float, leg: float, fps: float) -> Floats:
-    """Return how far a step lifts a foot, from one stance to the next [frames + 1], metres.
-
-    The shorter and the quicker a step, the less: by what a knee bends from straight in the time that it rises.
-
-    Args:
-        frames: that the step takes.
-        far: how far it takes the foot, metres.
-        leg: length of the leg, metres.
-        fps: frames a second.
-    """
-    bend = min(FLICKS * RISES * frames / (1.5 * fps), np.pi)
-    s = np.linspace(0.0, 1.0, frames + 1)
-    s = np.minimum(np.minimum(s, 1.0 - s) / RISES, 1.0)
-    highest = min(leg * (1.0 - np.cos(0.5 * bend)), LIFT) * min(far / FAR, 1.0)
-    return np.asarray(highest * s * s * (3.0 - 2.0 * s))
-
-
-def _settled(height: Floats, stance: Stance, fps: float) -> Floats:
-    """Return how high a foot stands above the floor during a stance: 0, but as it is given at an end nearby."""
-    frames = np.arange(stance.start, stance.end + 1)
-    out = np.zeros(len(frames))
-    for end, at in ((0, stance.start == 0), (len(height) - 1, stance.end == len(height) - 1)):
-        if at:
-            s = np.clip(1.0 - np.abs(frames - end) / (SETTLES * fps), 0.0, 1.0)
-            out += height[end] * s * s * (3.0 - 2.0 * s)
-    return out
-
-
-def _bend(wanted: Floats, moves: Floats, stands: Floats, slides: Floats, fps: float) -> Floats:
-    """Return departures [N, 3] that are as wanted where a foot stands, smooth, and elsewhere near 0.
-
-    They minimise sum_t 1e6 s^2 |d - wanted|^2 + (1 - s) |d|^2 + BENDS^4 |d''|^2 + SLIDES^2 l |d' + track'|^2, with s
-    how much it stands, and l how low it is in a step. They are 0, and depart smoothly, at both ends.
-
-    Args:
-        wanted: displacements of a foot that stands [N, 3], metres.
-        moves: of the movement's own track from frame to frame, level [N - 1, 2], metres.
-        stands: how much it stands [N], from 0 to 1.
-        slides: how much it is to move level as little as it can [N - 1], from 0 to 1.
-        fps: frames a second.
-    """
-    count = len(wanted)
-    firm, bend, still = 1e6 * stands**2, (BENDS * fps) ** 4, slides * (SLIDES * fps) ** 2
-    diagonals = bending_diagonals(np.full(count - 2, bend))
-    diagonals[0] += firm + 1.0 - stands
-    diagonals[0, [1, -2]] += bend
-    right = firm[:, None] * wanted
-    for k, sign in ((0, 1.0), (1, -1.0)):
-        diagonals[0, k : count - 1 + k] += still
-        right[k : count - 1 + k, [0, 2]] += sign * still[:, None] * moves
-    diagonals[1, :-1] -= still
-    diagonals[0, [0, -1]] += 1e12
-    right[[0, -1]] = 0.0
-    return np.stack([solve_diagonals(diagonals, one) for one in right.T], axis=1)
-
-
 class Posed(NamedTuple):
     """A movement as its rotations have it, about its root: what legs are bent from.
 
@@ -305,8 +175,8 @@ def ease_knees(
         hip, knee, end = foot.chain(skeleton)
         bones = foot.bones(skeleton)
         legs[:, number] = posed.places[:, end] - posed.places[:, hip]
-        now, aim = np.linalg.norm(legs[:, number], axis=-1), legs[:, number] + off[:, number]
-        wanted = np.linalg.norm(aim, axis=-1)
+        now, aim = rot.norm(legs[:, number]), legs[:, number] + off[:, number]
+        wanted = rot.norm(aim)
         far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
         far[fixed] = now[fixed]
         own[:, number] = bend_of(now, *bones)
@@ -324,7 +194,7 @@ def ease_knees(
     finer = lengths.copy()
     for number, foot in enumerate(feet):
         bones = foot.bones(skeleton)
-        bends = bend_of(np.linalg.norm(aims[:, number], axis=-1), *bones)
+        bends = bend_of(rot.norm(aims[:, number]), *bones)
         bends = slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps)
         lengths[:, number] = distance_of(bends, *bones)
         if fine:
@@ -343,14 +213,14 @@ def ease_knees(
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:
     """Return legs from hip to foot [N, feet, 3] as long as given [N, feet], metres: steep ones, with feet level."""
-    own = np.linalg.norm(legs, axis=-1)
+    own = rot.norm(legs)
     out = legs * (lengths / np.maximum(own, 1e-9))[..., None]
     level = np.minimum(own**2 - legs[..., 1] ** 2, lengths**2)
     upright = legs.copy()
     upright[..., 1] = -np.sqrt(lengths**2 - level)
     s = np.clip((-legs[..., 1] / np.maximum(own, 1e-9) - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0, 1.0)[..., None]
     out += s * s * (3.0 - 2.0 * s) * (upright - out)
-    return np.asarray(out * (lengths / np.maximum(np.linalg.norm(out, axis=-1), 1e-9))[..., None])
+    return np.asarray(out * (lengths / np.maximum(rot.norm(out), 1e-9))[..., None])
 
 
 def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, soft: Floats) -> Floats:

@@ -89,7 +89,8 @@ def find_flights(
         for middle in middles:
             half = min(0.5 * seconds * fps, 0.5 * (end - begin))
             top = float(np.clip(middle, begin + half, max(end - half, begin + half)))
-            flight = Flight(round(top - half), round(top + half), (None, None))
+            # Rounded before: what lies midway between two frames is not for rounding errors to decide.
+            flight = Flight(round(round(top - half, 6)), round(round(top + half, 6)), (None, None))
             if half >= 0.5 * SHORTEST * fps and flight.end - flight.start > 2:
                 out.append(flight)
                 begin = flight.end + push

@@ -78,31 +78,63 @@ def find_stances(
         flying: whether the body is in the air [N].
         fps: frames a second.
     """
-    around = round(SHIFTS * fps)
-    surely = np.convolve(others, np.ones(2 * around + 1))[around : around + len(others)] > 2 * around
-    swing = np.where(flying, 0.0, swing + np.where(others, np.where(surely, 0.0, SOON), ALONE)) / fps
-    stand = np.where(flying, 1e3, stand) / fps
-    origin = track - track[0]
+    track, outward = np.ascontiguousarray(track), np.ascontiguousarray(outward)
     brief = max(2, round(BRIEF * fps))
-    parted = _part(np.ascontiguousarray(origin), np.ascontiguousarray(outward), stand, swing, brief, fps)
-    out, last = [], len(track) - 1
-    for start, end in parted:
-        here, side = track[start : end + 1], outward[start : end + 1].mean(axis=0)
-        place = here.mean(axis=0)
+    stand, swing = _costs(stand, swing, others, flying, round(SHIFTS * fps), fps)
+    parted = _part(track - track[0], outward, stand, swing, brief, fps)
+    places, slips = _places(track, outward, parted, brief)
+    return [
+        Stance(start, end, place, slip)
+        for (start, end), place, slip in zip(parted.tolist(), places, slips, strict=True)
+    ]
+
+
+@jit
+def _costs(
+    stand: Floats, swing: Floats, others: Bools, flying: Bools, around: int, fps: float
+) -> tuple[Floats, Floats]:
+    """Return what it costs a foot to stand and to swing [N] in each frame, by what else bears the body then.
+
+    Another limb surely bears it where it does in all of so many frames around.
+    """
+    stands, swings = np.full(len(stand), 1e3), np.zeros(len(stand))
+    for t in range(len(stand)):
+        if not flying[t]:
+            stands[t], swings[t] = stand[t], swing[t]
+            if not others[t]:
+                swings[t] += ALONE
+            elif t < around or t + around >= len(stand) or not others[t - around : t + around + 1].all():
+                swings[t] += SOON
+    return stands / fps, swings / fps
+
+
+@jit
+def _places(track: Floats, outward: Floats, parted: Ints, brief: int) -> tuple[Floats, Floats]:
+    """Return where a foot stands [K, 2], and how far it slips meanwhile [K, 2], in intervals [K, 2] of frames."""
+    places, slips, last = np.empty((len(parted), 2)), np.zeros((len(parted), 2)), len(track) - 1
+    for k in range(len(parted)):
+        start, end = parted[k]
+        place, side = np.zeros(2), np.zeros(2)
+        for t in range(start, end + 1):
+            place += track[t]
+            side += outward[t]
+        place /= end + 1 - start
+        side /= end + 1 - start
         # On its own side of where the movement has it: feet that travel sideways do not cross.
-        place = place + OUTSIDE * max(float(np.max((here - place) @ side)), 0.0) * side
+        beyond = 0.0
+        for t in range(start, end + 1):
+            beyond = max(beyond, (track[t, 0] - place[0]) * side[0] + (track[t, 1] - place[1]) * side[1])
+        place += OUTSIDE * beyond * side
         # A foot that comes from the air has no time to go elsewhere.
-        place = here[0] + min(start / brief, 1.0) * (place - here[0])
-        place = here[-1] + min((last - end) / brief, 1.0) * (place - here[-1])
-        slip = np.zeros(2)
+        place = track[start] + min(start / brief, 1.0) * (place - track[start])
+        places[k] = track[end] + min((last - end) / brief, 1.0) * (place - track[end])
         if start == 0:
-            place = track[0]
+            places[k] = track[0]
             if end == last:
-                slip = track[last] - track[0]
+                slips[k] = track[last] - track[0]
         elif end == last:
-            place = track[last]
-        out.append(Stance(int(start), int(end), place, slip))
-    return out
+            places[k] = track[last]
+    return places, slips
 
 
 @jit

@@ -24,12 +24,12 @@ from motionmind.geometry.splines import natural_spline
 from motionmind.realise.balance import GRAVITY
 from motionmind.realise.carrying import Carried, Ends, carry, foot_heights
 from motionmind.realise.corrections import Correction
+from motionmind.realise.departures import fade_at_ends
 from motionmind.realise.feet import (
     KNEE,
     Foot,
     bend_legs,
     ease_knees,
-    fade_at_ends,
     find_free_feet,
     pose,
     softness,

@@ -8,10 +8,15 @@ foot: that a leg which is all but straight kept it exactly would be seen in its 
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.jit import either
 from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
+
+_Lengths = TypeVar("_Lengths", Floats, float)
 
 SHIFTS = 0.008  # metres that a foot may be off so that its knee keeps the fine detail of a movement
 STIRS = 2.0, 0.3  # rad/s^2 by which it may accelerate otherwise, and share of its own acceleration
@@ -20,10 +25,12 @@ LIFTS = 0.3  # seconds before and after a part would be too low, in which it is 
 EASES = 0.05  # seconds over which a knee that is too fast changes its speed
 
 
-def bend_of(distances: Floats, thigh: float, shank: float) -> Floats:
+@either
+def bend_of(distances: _Lengths, thigh: float, shank: float) -> _Lengths:
     """Return the bends [N] of a knee, radians from straight, by how far the leg's ends are from each other [N]."""
     cosines = (distances**2 - thigh**2 - shank**2) / (2.0 * thigh * shank)
-    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    bends: _Lengths = np.arccos(np.minimum(np.maximum(cosines, -1.0), 1.0))
+    return bends
 
 
 def distance_of(bends: Floats, thigh: float, shank: float) -> Floats:

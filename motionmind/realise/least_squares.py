@@ -99,6 +99,13 @@ def solve_diagonals(diagonals: Floats, right: Floats) -> Floats:
 @jit
 def solve_rows(matrix: Floats, right: Floats) -> None:
     """Solve a positive definite system in place, by Cholesky's factors: matrix[i, k] is that of i and i - k [M, B]."""
+    factorise(matrix)
+    substitute(matrix, right)
+
+
+@jit
+def factorise(matrix: Floats) -> None:
+    """Write Cholesky's factor of a positive definite matrix in its place, as `solve_rows` takes it [M, B]."""
     size, width = matrix.shape
     for i in range(size):
         for k in range(min(i, width - 1), -1, -1):
@@ -107,6 +114,12 @@ def solve_rows(matrix: Floats, right: Floats) -> None:
                 if m - k < width:
                     total -= matrix[i, m] * matrix[i - k, m - k]
             matrix[i, k] = np.sqrt(total) if k == 0 else total / matrix[i - k, 0]
+
+
+@jit
+def substitute(matrix: Floats, right: Floats) -> None:
+    """Solve a system with such a factor [M, B] in place of its right side [M]."""
+    size, width = matrix.shape
     for i in range(size):
         for k in range(1, min(i, width - 1) + 1):
             right[i] -= matrix[i, k] * right[i - k]

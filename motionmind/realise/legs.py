@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,23 @@ from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limbs_of, stem_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
+from motionmind.geometry.single import (
+    about,
+    between,
+    cross,
+    dot,
+    length,
+    minus,
+    plus,
+    product,
+    rotation,
+    turned,
+    unit,
+    vector,
+)
+from motionmind.jit import either, jit
+
+_Lengths = TypeVar("_Lengths", Floats, float)
 
 SOFT = 0.02  # of a leg's length: this near to its full length a leg that stands stretches less than it would have to
 HINGE = 0.1  # sine of a knee's bend below which its axis is mostly the one of other frames
@@ -56,16 +74,23 @@ def find_hinge(skeleton: Skeleton, knee: int) -> Floats | None:
     return np.asarray(axis * np.array([1.0, -1.0, -1.0]) if mirrored else axis)
 
 
-def stretched(now: Floats, wanted: Floats, length: Floats | float, soft: Floats | float) -> Floats:
+@either
+def stretched(now: _Lengths, wanted: _Lengths, straight: Floats | float, soft: Floats | float) -> _Lengths:
     """Return how far a leg's ends are from each other [N], metres, that is to be longer or shorter.
+
+    All that is wanted, up to `soft` from the end of the room; then exponentially less, so the end is never reached.
 
     Args:
         now: how far they are [N], metres.
         wanted: how far they are to be [N], metres.
-        length: of the straight leg, metres.
+        straight: length of the straight leg, metres.
         soft: of the leg's length: this near to its full length it stretches less than it would have to [N].
     """
-    return np.asarray(now + _soft_stretch(wanted - now, length - now, np.asarray(soft * length)))
+    room = straight - now
+    near = np.maximum(np.minimum(soft * straight, room), 1e-9)
+    over = np.maximum(wanted - now - (room - near), 0.0)
+    longer: _Lengths = np.minimum(wanted - now, room - near) + near * -np.expm1(-over / near)
+    return now + longer
 
 
 def reach(
@@ -83,52 +108,61 @@ def reach(
         hinge: axis in the hip's frame about which each knee bends where the leg is all but straight [..., 3]; None for
             that of frames where it is not.
         soft: of the leg's length: this near to its full length it stretches less than it would have to [N, ...].
+
+    Raises:
+        ValueError: a leg or its target has no direction.
     """
-    start, middle, end = np.moveaxis(leg, -2, 0)
-    thigh, shank = middle - start, end - middle
-    axis = _hinge(hip, thigh, shank, hinge)
-    # Components along the axis do not change; across it, the bones and their angle form a triangle.
-    along = np.sum(thigh * axis, axis=-1), np.sum(shank * axis, axis=-1)
-    across = np.sqrt(np.sum(thigh**2, axis=-1) - along[0] ** 2), np.sqrt(np.sum(shank**2, axis=-1) - along[1] ** 2)
-    least, product = (along[0] + along[1]) ** 2 + across[0] ** 2 + across[1] ** 2, 2.0 * across[0] * across[1]
-    now, wanted = rot.norm(end - start), rot.norm(target - start)
-    far = stretched(now, wanted, np.sqrt(least + product), soft)
-    bends = [np.arccos(np.clip((distance**2 - least) / product, -1.0, 1.0)) for distance in (now, far)]
-    bend = rot.from_axis_angle(axis, bends[1] - bends[0])
-    turn = rot.between(thigh + rot.mul_vec(bend, shank), target - start)
-    return turn, rot.mul(turn, bend)
+    shape, usual = target.shape[:-1], _usual_hinge(hip, leg, hinge)
+    thigh, shank = np.empty((2, *shape, 4))
+    _reach(
+        np.ascontiguousarray(hip).reshape(-1, 4),
+        np.ascontiguousarray(leg).reshape(-1, 3, 3),
+        np.ascontiguousarray(target).reshape(-1, 3),
+        np.ascontiguousarray(np.broadcast_to(usual, target.shape)).reshape(-1, 3),
+        np.ascontiguousarray(np.broadcast_to(soft, shape)).reshape(-1),
+        thigh.reshape(-1, 4),
+        shank.reshape(-1, 4),
+    )
+    if not np.isfinite(thigh).all():
+        raise ValueError("a leg, or the way to its target, has no direction")
+    return thigh, shank
 
 
-def _hinge(hip: Floats, thigh: Floats, shank: Floats, usual: Floats | None) -> Floats:
-    """Return unit axes [N, ..., 3] about which knees bend, from their bones [N, ..., 3], metres.
+def _usual_hinge(hip: Floats, leg: Floats, usual: Floats | None) -> Floats:
+    """Return unit axes [..., 3] in the hip's frame about which knees bend where legs are all but straight.
 
-    In frames where a leg is all but straight the axis is the usual one [..., 3], as seen from the hip [N, ..., 4]: if
-    that is not given, that of other frames.
+    They are those given [..., 3] or, if there are none, those of other frames. Arguments are as for `reach`.
     """
-    normal = rot.cross(thigh, shank)
     if usual is None:
+        normal = rot.cross(leg[..., 1, :] - leg[..., 0, :], leg[..., 2, :] - leg[..., 1, :])
         usual = rot.mul_vec(rot.inv(hip), normal).sum(axis=0)
     straight = rot.norm(usual)[..., None] < 1e-9
     if straight.any():  # in all frames: the body axis most nearly at right angles to the thigh, made exactly so
-        bone = rot.mul_vec(rot.inv(hip[0]), thigh[0])
+        bone = rot.mul_vec(rot.inv(hip[0]), leg[0, ..., 1, :] - leg[0, ..., 0, :])
         across = np.eye(3)[np.argmin(np.abs(bone), axis=-1)]
         across -= bone * (np.sum(across * bone, axis=-1) / np.sum(bone * bone, axis=-1))[..., None]
         usual = np.where(straight, across, usual)
-    size = rot.norm(thigh) * rot.norm(shank)
-    normal += (HINGE * size)[..., None] * rot.mul_vec(hip, usual / rot.norm(usual)[..., None])
-    return np.asarray(normal / rot.norm(normal)[..., None])
+    return np.asarray(usual / rot.norm(usual)[..., None])
 
 
-def _soft_stretch(wanted: Floats, room: Floats, soft: Floats) -> Floats:
-    """Return how much longer a leg becomes [N], metres.
-
-    All that is wanted, up to `soft` from the end of the room; then exponentially less, so the end is never reached.
-
-    Args:
-        wanted: how much longer it should become [N], metres.
-        room: how much longer it could become [N], metres.
-        soft: distance from the end at which it begins to fall short [N], metres.
-    """
-    soft = np.maximum(np.minimum(soft, room), 1e-9)
-    over = np.maximum(wanted - (room - soft), 0.0)
-    return np.asarray(np.minimum(wanted, room - soft) + soft * -np.expm1(-over / soft))
+@jit
+def _reach(
+    hip: Floats, leg: Floats, target: Floats, usual: Floats, soft: Floats, thighs: Floats, shanks: Floats
+) -> None:
+    """Write what `reach` returns [N, 4], each: `usual` hinges [N, 3] are unit vectors in the hips' frames."""
+    for n in range(len(leg)):
+        start, middle, end = vector(leg[n, 0]), vector(leg[n, 1]), vector(leg[n, 2])
+        thigh, shank, whole, aim = minus(middle, start), minus(end, middle), minus(end, start), vector(target[n])
+        aim = minus(aim, start)
+        size = HINGE * (length(thigh) * length(shank))
+        axis = unit(plus(cross(thigh, shank), turned(rotation(hip[n]), vector(usual[n])), size))
+        # Components along the axis do not change; across it, the bones and their angle form a triangle.
+        along, further = dot(thigh, axis), dot(shank, axis)
+        across, beyond = np.sqrt(dot(thigh, thigh) - along**2), np.sqrt(dot(shank, shank) - further**2)
+        least, twice = (along + further) ** 2 + across**2 + beyond**2, 2.0 * across * beyond
+        now, wanted = length(whole), length(aim)
+        far = stretched(now, wanted, np.sqrt(least + twice), soft[n])
+        was = np.arccos(min(max((now**2 - least) / twice, -1.0), 1.0))
+        bend = about(axis, np.arccos(min(max((far**2 - least) / twice, -1.0), 1.0)) - was)
+        turn = between(plus(thigh, turned(bend, shank), 1.0), aim)
+        thighs[n], shanks[n] = turn, product(turn, bend)

@@ -54,27 +54,19 @@ def _forward_messages(
     goes to each posture in proportion to its weight.
     """
     out = np.empty_like(near)
-    came, pooled = weights.copy(), np.empty(len(over))
-    for t in range(len(near)):
-        total = 0.0
-        if t == 0:
-            for i in range(len(came)):
-                out[t, i] = near[t, i] * came[i]
-                total += out[t, i]
-        else:
-            came[:] = 0.0
-            for m in range(len(begins)):
-                came[ends[m]] += shares[m] * out[t - 1, begins[m]]
-            pooled[:] = 0.0
-            for i in range(len(came)):
-                pooled[clusters[i]] += came[i]
-            whole = anywhere * pooled.sum()
-            pooled *= over
-            for i in range(len(came)):
-                mixed = STRAIGHT_ON * came[i] + weights[i] * (pooled[clusters[i]] + whole)
-                out[t, i] = near[t, i] * mixed
-                total += out[t, i]
-        out[t] /= total
+    came, pooled = weights.copy(), np.empty((4, len(over)))
+    for i in range(len(came)):
+        out[0, i] = near[0, i] * came[i]
+    _scale(out[0])
+    for t in range(1, len(near)):
+        came[:] = 0.0
+        for m in range(len(begins)):
+            came[ends[m]] += shares[m] * out[t - 1, begins[m]]
+        whole = anywhere * _pool(came, clusters, pooled)
+        shared = over * pooled[0]
+        for i in range(len(came)):
+            out[t, i] = near[t, i] * (STRAIGHT_ON * came[i] + weights[i] * (shared[clusters[i]] + whole))
+        _scale(out[t])
     return out
 
 
@@ -92,20 +84,48 @@ def _times_backward_messages(
 ) -> None:
     """Multiply rows [S + 1, N] by beta with beta[t] = mixed(beta[t + 1] * near[t + 1]) moved back by a step, and scale
     them to sum 1."""
-    back, on, pooled = np.ones(near.shape[1]), np.empty(near.shape[1]), np.empty(len(over))
-    out[-1] /= out[-1].sum()
+    back, on, weighs = np.ones(near.shape[1]), np.empty(near.shape[1]), np.empty(near.shape[1])
+    pooled = np.empty((4, len(over)))
     for t in range(len(near) - 2, -1, -1):
-        pooled[:] = 0.0
         for i in range(len(on)):
             on[i] = back[i] * near[t + 1, i]
-            pooled[clusters[i]] += weights[i] * on[i]
-        whole = anywhere * pooled.sum()
-        pooled *= over
+            weighs[i] = weights[i] * on[i]
+        whole = anywhere * _pool(weighs, clusters, pooled)
+        shared = over * pooled[0]
         for i in range(len(on)):
-            on[i] = STRAIGHT_ON * on[i] + pooled[clusters[i]] + whole
+            on[i] = STRAIGHT_ON * on[i] + shared[clusters[i]] + whole
         back[:] = 0.0
         for m in range(len(begins)):
             back[begins[m]] += shares[m] * on[ends[m]]
-        back /= back.sum()
-        out[t] *= back
-        out[t] /= out[t].sum()
+        _scale(back)
+        for i in range(len(back)):
+            out[t, i] *= back[i]
+        _scale(out[t])
+
+
+@jit
+def _pool(values: Floats, clusters: Int32s, pooled: Floats) -> float:
+    """Write the sums of values [N] in clusters [N] to pooled[0] [4, K], and return the sum of all.
+
+    Neighbours are mostly in one cluster. They are added to different sums: one addition need not wait for another.
+    """
+    pooled[:] = 0.0
+    for i in range(len(values)):
+        pooled[i % 4, clusters[i]] += values[i]
+    for k in range(1, 4):
+        pooled[0] += pooled[k]
+    return float(pooled[0].sum())
+
+
+@jit
+def _scale(row: Floats) -> None:
+    """Scale a row to sum 1; it is added up in four sums, as in `_pool`."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    last = len(row) - len(row) % 4
+    for i in range(0, last, 4):
+        a, b, c, d = a + row[i], b + row[i + 1], c + row[i + 2], d + row[i + 3]
+    for i in range(last, len(row)):
+        a += row[i]
+    share = 1.0 / (a + b + c + d)
+    for i in range(len(row)):
+        row[i] *= share

@@ -188,11 +188,16 @@ def _mean_between(
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
                 here = _taken(shown, np.asarray(chosen.moments), part)
-                whole = np.zeros((len(part), 1), dtype=np.int64)
-                own = squared_distances(here, whole, 1, np.ascontiguousarray(passed[:, part]))[0]
+                to = np.ascontiguousarray(passed[:, part])
+                own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
+        # Limbs share what walks of larger parts say.
+        shared = {
+            (one, other): SIZES[0] * known[one][1] + SIZES[1] * known[other][1]
+            for one, other in ({numbers[:-1] for numbers in groups} if trees is None else ())
+        }
 
         def move(number: int) -> float:
             mine = known[number] if number in known else walk(number)
@@ -202,8 +207,7 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    whole, half, limb = (marginals for _, marginals, *_ in walks)
-                    weights = SIZES[0] * whole + SIZES[1] * half + SIZES[2] * limb
+                    weights = SIZES[2] * mine[1] + shared[numbers[0], numbers[1]]
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)

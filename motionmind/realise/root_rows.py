@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.skeleton import Skeleton
-from motionmind.geometry import rotations as rot
+from motionmind.geometry.single import length as length_of
+from motionmind.geometry.single import vector
+from motionmind.jit import jit
 from motionmind.realise.bearing import Bearing, Shape
-from motionmind.realise.feet import SETTLES, Foot
+from motionmind.realise.departures import SETTLES
+from motionmind.realise.feet import Foot
 from motionmind.realise.knees import bend_of
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows
 from motionmind.realise.legs import SOFT
@@ -47,16 +50,24 @@ def prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
 
 def hurry_rows(root: Floats, travels: float, fps: float) -> Rows:
     """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second."""
-    moved = fps * np.diff(root, axis=0) * np.array([1.0, 0.0, 1.0])
-    speed = np.linalg.norm(moved, axis=1)
-    along = moved / np.maximum(speed, 1e-9)[:, None]
     # Rows look at three frames: each at its first two, and the last one at its last two.
-    first = np.minimum(np.arange(len(along)), len(root) - 3)
-    coefficients = np.zeros((len(along), 9))
-    coefficients[:, :6] = fps * np.concatenate([-along, along], axis=1)
-    coefficients[-1] = np.roll(coefficients[-1], 3)
-    weights = np.where(speed > NEARLY * travels, HURRY**-2.0, 0.0)
-    return Rows(first, coefficients, np.full(len(along), min(travels, 1e3)), weights)
+    first = np.minimum(np.arange(len(root) - 1), len(root) - 3)
+    return Rows(first, *_hurry_rows(root, first, travels, fps))
+
+
+@jit
+def _hurry_rows(root: Floats, first: Ints, travels: float, fps: float) -> tuple[Floats, Floats, Floats]:
+    """Return the coefficients [N - 1, 9], targets and weights of rows that begin with the `first` frames [N - 1]."""
+    coefficients, weights = np.zeros((len(first), 9)), np.zeros(len(first))
+    for t in range(len(first)):
+        x, z = fps * (root[t + 1, 0] - root[t, 0]), fps * (root[t + 1, 2] - root[t, 2])
+        speed = np.sqrt(x * x + z * z)
+        if speed > NEARLY * travels:
+            weights[t] = HURRY**-2.0
+            for k, way in ((0, x), (2, z)):
+                along, at = way / max(speed, 1e-9), 3 * (t - first[t]) + k
+                coefficients[t, at], coefficients[t, at + 3] = -fps * along, fps * along
+    return coefficients, np.full(len(first), min(travels, 1e3)), weights
 
 
 def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> list[Rows]:
@@ -118,20 +129,43 @@ def reach_rows(
         feet: its feet.
         fps: frames a second.
     """
-    rows, every = [], np.arange(len(root))
-    within = np.minimum(np.minimum(every, every[::-1]) / (SETTLES * fps), 1.0)
-    for number, foot in enumerate(feet):
-        own, leg = legs[number]
-        leans = rot.norm(bearing.targets[:, number] - root[:, [0, 2]]) / LEANS
-        length = foot.length(skeleton)
-        straight = rot.norm(own) / length
-        longest = length * np.maximum(np.minimum(straight, 1.0 - SOFT * np.minimum(leans**2, 1.0)), 1.0 - SOFT)
-        far = rot.norm(leg)
-        along = leg / np.maximum(far, 1e-9)[:, None]
-        short = (far > longest + 1e-6) & bearing.stands[:, number]
-        target = np.sum(along * root, axis=-1) + far - longest
-        rows.append(position_rows(every, along, target, np.where(short, (within / REACH) ** 2, 0.0)))
-    return rows
+    every = np.arange(len(root))
+    return [
+        Rows(every, *_reach_rows(*legs[number], bearing.targets, bearing.stands, number, root, length, SETTLES * fps))
+        for number, length in enumerate(foot.length(skeleton) for foot in feet)
+    ]
+
+
+@jit
+def _reach_rows(
+    own: Floats, leg: Floats, targets: Floats, stands: Bools, foot: int, root: Floats, length: float, settles: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg is of some length, metres.
+
+    In the first and the last frames, which it `settles` in, a row has less weight.
+    """
+    count = len(root)
+    coefficients, aims, weights = np.zeros((count, 9)), np.zeros(count), np.zeros(count)
+    for t in range(count):
+        x, z = targets[t, foot, 0] - root[t, 0], targets[t, foot, 1] - root[t, 2]
+        bent = SOFT * min((x * x + z * z) / LEANS**2, 1.0)
+        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
+        longest = length * max(min(was / length, 1.0 - bent), 1.0 - SOFT)
+        if far > longest + 1e-6 and stands[t, foot]:
+            aims[t] = _write_along(leg[t], far, 1.0, root[t], coefficients[t]) + far - longest
+            weights[t] = (min(min(t, count - 1 - t) / settles, 1.0) / REACH) ** 2
+    return coefficients, aims, weights
+
+
+@jit
+def _write_along(leg: Floats, far: float, times: float, root: Floats, coefficients: Floats) -> float:
+    """Write the coefficients [9] of a root's place along a leg [3] that is so `far`, metres, so many `times`: return
+    what they are of a root [3]."""
+    total = 0.0
+    for k in range(3):
+        coefficients[k] = times * leg[k] / max(far, 1e-9)
+        total += coefficients[k] * root[k]
+    return total
 
 
 def knee_rows(
@@ -147,17 +181,27 @@ def knee_rows(
     A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
     then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
     """
-    rows, every = [], np.arange(len(root))
-    for number, foot in enumerate(feet):
-        own, leg = legs[number]
-        thigh, shank = foot.bones(skeleton)
-        was, far = rot.norm(own), rot.norm(leg)
-        bends = np.maximum(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
-        lever = far / (thigh * shank * np.sin(bends))  # radians that the knee bends a metre of the leg's length
-        along = lever[:, None] * leg / np.maximum(far, 1e-9)[:, None]
-        target = np.sum(along * root, axis=-1) + lever * (far - was)
-        rows.append(position_rows(every, along, target, bearing.loads[:, number] * (1.0 - freedom) * KNEE**-2.0))
-    return rows
+    every = np.arange(len(root))
+    return [
+        Rows(every, *_knee_rows(*legs[number], bearing.loads, number, root, freedom, *foot.bones(skeleton)))
+        for number, foot in enumerate(feet)
+    ]
+
+
+@jit
+def _knee_rows(
+    own: Floats, leg: Floats, loads: Floats, foot: int, root: Floats, freedom: Floats, thigh: float, shank: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg has bones of these lengths."""
+    count = len(root)
+    coefficients, aims, weights = np.zeros((count, 9)), np.empty(count), np.empty(count)
+    for t in range(count):
+        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
+        bend = max(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
+        lever = far / (thigh * shank * np.sin(bend))  # radians that the knee bends a metre of the leg's length
+        aims[t] = _write_along(leg[t], far, lever, root[t], coefficients[t]) + lever * (far - was)
+        weights[t] = loads[t, foot] * (1.0 - freedom[t]) * KNEE**-2.0
+    return coefficients, aims, weights
 
 
 def legs_to_places(

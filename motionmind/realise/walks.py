@@ -31,6 +31,7 @@ TRAVELS_WITHIN = 0.5  # metres a second, the same of its travel
 FOLLOWS_WITHIN = 0.35  # radians a joint, the same: how closely a walk follows a given path
 SIZES = (0.25, 0.25, 0.5)  # weights of the walks of the whole body, of its half, and of the limb that a joint is in
 STRAIGHT_ON = 0.6  # share of steps after which a walk goes straight on as its clip does
+_BLOCK = 256  # moments whose distances are measured at a time: their sums are in the processor's own memory
 ANYWHERE = 0.006  # share of steps after which it goes on from any posture: some walk joins any two
 
 
@@ -45,20 +46,22 @@ def squared_distances(orientations: Floats, members: Ints, parts: int, postures:
         postures: orientations of the joints that distances are measured from [K, J, 4].
     """
     out, sizes = np.zeros((parts, len(postures), len(orientations))), np.bincount(members.ravel(), minlength=parts)
-    shown, own = np.empty((4, len(orientations))), np.empty(len(orientations))
-    for joint in range(len(members)):
-        for i in range(len(orientations)):  # side by side, so that several are measured at once
-            for c in range(4):
-                shown[c, i] = orientations[i, joint, c]
-        for k in range(len(postures)):
-            x, y, z, w = postures[k, joint]
-            for i in range(len(own)):  # as `squared_turn`
-                cosine = shown[0, i] * x + shown[1, i] * y + shown[2, i] * z + shown[3, i] * w
-                own[i] = 4.0 * max(1.0 - cosine * cosine, 0.0)
-            for part in members[joint]:
-                sums = out[part, k]
-                for i in range(len(own)):
-                    sums[i] += own[i]
+    shown, own = np.empty((4, _BLOCK)), np.empty(_BLOCK)
+    for first in range(0, len(orientations), _BLOCK):
+        count = min(_BLOCK, len(orientations) - first)
+        for joint in range(len(members)):
+            for i in range(count):  # side by side, so that several are measured at once
+                for c in range(4):
+                    shown[c, i] = orientations[first + i, joint, c]
+            for k in range(len(postures)):
+                x, y, z, w = postures[k, joint]
+                for i in range(count):  # as `squared_turn`
+                    cosine = shown[0, i] * x + shown[1, i] * y + shown[2, i] * z + shown[3, i] * w
+                    own[i] = 4.0 * max(1.0 - cosine * cosine, 0.0)
+                for part in members[joint]:
+                    sums = out[part, k, first : first + count]
+                    for i in range(count):
+                        sums[i] += own[i]
     for part in range(parts):
         out[part] /= sizes[part]
     return out

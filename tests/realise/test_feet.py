@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
-from motionmind.realise.feet import LIFT, departure
+from motionmind.realise.departures import LIFT, departure
 from motionmind.realise.flight import PUSHES, Flight, find_flights, flying_frames
 from motionmind.realise.footfalls import (
     BRIEF,
@@ -475,6 +475,19 @@ def test_fine_detail_of_knees_lifts_no_standing_foot_for_long() -> None:
     assert heights.max() < 0.02
     assert heights.min() > -0.006
     assert np.all(np.mean(heights < 0.004, axis=0) > 0.4)
+
+
+def test_rounding_errors_do_not_decide_in_which_frame_a_flight_begins() -> None:
+    aloft, heights = np.zeros(41), 0.25 * (1.0 + 1e-15 * np.arange(-40, 40))
+    aloft[2:14] = 1.0  # sooner than the body can push off, which takes seven frames and a half
+    begins = {
+        flight.start
+        for height in heights
+        for flight in find_flights(
+            aloft, np.full(41, height), np.ones(41), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
+        )
+    }
+    assert begins == {8}
 
 
 def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
