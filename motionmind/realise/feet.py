@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
 KNEE = 8.0  # radians a second at which knees bend at most, where nothing is known of the corpus's
 QUICK = 1.2  # times as fast as all but a hundredth of the corpus's moments: as knees bend at most
 STEEP = 0.4, 0.7  # cosines of a leg's lean from which its foot is raised and lowered, not drawn along the leg
-GIVES = 0.15  # seconds over which the height of a body changes that gives way to a knee
+GIVES = 0.15, 0.1, 0.06, 0.04  # seconds over which the height of a body changes that gives way to a knee, by round
+SHOWS = 0.01  # metres by which a foot that stands may rise, and nobody sees it
 
 
 class Foot(NamedTuple):
@@ -169,36 +171,53 @@ def ease_knees(
     fixed = np.zeros(len(off), dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= moving
-    legs, aims, own = np.empty(off.shape), np.empty(off.shape), np.empty(off.shape[:2])
-    lengths, most = np.empty(off.shape[:2]), np.empty(len(feet))
+    legs, own = np.empty(off.shape), np.empty(off.shape[:2])
+    most, bones = np.empty(len(feet)), [foot.bones(skeleton) for foot in feet]
     for number, foot in enumerate(feet):
         hip, knee, end = foot.chain(skeleton)
-        bones = foot.bones(skeleton)
         legs[:, number] = posed.places[:, end] - posed.places[:, hip]
-        now, aim = rot.norm(legs[:, number]), legs[:, number] + off[:, number]
-        wanted = rot.norm(aim)
-        far = stretched(now, wanted, sum(bones), softness(holds[:, number]))
-        far[fixed] = now[fixed]
-        own[:, number] = bend_of(now, *bones)
+        own[:, number] = bend_of(rot.norm(legs[:, number]), *bones[number])
         most[number] = max(QUICK * float(fastest[knee]), fps * float(np.abs(np.diff(own[:, number])).max()))
-        eased = slow_down(bend_of(far, *bones), holds[:, number] == 1.0, fixed, most[number], fps)
-        aims[:, number] = aim * (far / np.maximum(wanted, 1e-9))[:, None]
-        lengths[:, number] = distance_of(eased, *bones)
-    bears = holds**4
+    now, full, soft = rot.norm(legs), np.array([sum(bone) for bone in bones]), softness(holds)
+
+    def aims_at(places: Floats) -> Floats:
+        """Return where feet come to that are to be at places [N, feet, 3] from the hips: legs stretch softly."""
+        wanted = rot.norm(places)
+        far = stretched(now, wanted, full, soft)
+        far[fixed] = now[fixed]
+        return np.asarray(places * (far / np.maximum(wanted, 1e-9))[..., None])
+
+    def bends_of(aims: Floats, stands: Bools) -> list[Floats]:
+        """Return the bends of knees, slow enough, whose feet come near their aims."""
+        far = rot.norm(aims)
+        return [
+            slow_down(bend_of(far[:, number], *bones[number]), stands[:, number], fixed, most[number], fps)
+            for number in range(len(feet))
+        ]
+
+    bears, places = holds**4, legs + off
     share = bears / np.maximum(bears.sum(axis=1, keepdims=True), 1.0)
-    shift = np.zeros((len(off), 3))
-    gives = np.sum(share * (aims - _lengthened(aims, lengths))[..., 1], axis=1)
-    shift[:, 1] = smoothed(gives, GIVES, fps) * bound
-    aims -= shift[:, None]
+    shift, stands = np.zeros((len(off), 3)), holds == 1.0
+    for number_of_round, seconds in enumerate(GIVES):
+        places_now = places - shift[:, None]
+        aims = aims_at(places_now)
+        made, wanted = _lengthened(aims, _lengths(bends_of(aims, stands), bones)), aims
+        if number_of_round:
+            # Finer rounds are seen in the body: they are for a foot that stands all the time, and is seen to rise.
+            if staying is None or (made - places_now)[:, staying, 1].max() < SHOWS:
+                break
+            wanted = places_now
+        gives = np.sum(share * (wanted - made)[..., 1], axis=1)
+        shift[:, 1] += smoothed(gives, seconds, fps) * bound
+    aims = aims_at(places) - shift[:, None] if staying is None else aims_at(places - shift[:, None])
     # What the body does not give, the feet do: upward, for the floor is in the way of the rest.
-    finer = lengths.copy()
-    for number, foot in enumerate(feet):
-        bones = foot.bones(skeleton)
-        bends = bend_of(rot.norm(aims[:, number]), *bones)
-        bends = slow_down(bends, np.zeros_like(fixed), fixed, most[number], fps)
-        lengths[:, number] = distance_of(bends, *bones)
-        if fine:
-            finer[:, number] = distance_of(keep_detail(bends, own[:, number], fixed, *bones, fps), *bones)
+    bends = bends_of(aims, np.zeros_like(stands))
+    lengths = finer = _lengths(bends, bones)
+    if fine:
+        finer = _lengths(
+            [keep_detail(bend, one, fixed, *bone, fps) for bend, one, bone in zip(bends, own.T, bones, strict=True)],
+            bones,
+        )
     if not fine:
         return _lengthened(aims, lengths) - legs, shift
     lowest = (legs + off - shift[:, None])[..., 1] - room
@@ -209,6 +228,11 @@ def ease_knees(
         height = firm[:, staying, 1]
         out[:, staying, 1] = height + SHIFTS * np.tanh((out[:, staying, 1] - height) / SHIFTS)
     return out - legs, shift
+
+
+def _lengths(bends: Sequence[Floats], bones: Sequence[tuple[float, float]]) -> Floats:
+    """Return how far legs' ends are from each other [N, feet], metres, by the bends of their knees [N]."""
+    return np.stack([distance_of(bend, *bone) for bend, bone in zip(bends, bones, strict=True)], axis=1)
 
 
 def _lengthened(legs: Floats, lengths: Floats) -> Floats:

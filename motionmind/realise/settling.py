@@ -11,14 +11,20 @@ from dataclasses import replace
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import standing_rise
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
+from motionmind.realise.feet import SHOWS
+from motionmind.realise.knees import smoothed
 from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
 from motionmind.realise.timeline import Timeline
+
+FOLLOWS = 0.1  # seconds over which a body follows a leg that is turned aside under it
 
 
 def keeper(
@@ -74,11 +80,32 @@ def settled(
         without: corrections to leave out.
     """
     skeleton, root = motion.skeleton, motion.root
+    given = _given_frames(clock, stops, moving)
     rotations = keeper(clock, stops, fixed, wished, carriage, skeleton, without)(motion.rotations, root)
+    if standing_rise(skeleton, rotations, root) > SHOWS:
+        root = _with_its_legs(motion, rotations, given, fps)
     if "balance" not in without:
-        given, joints = _given_frames(clock, stops, moving), fixed[: len(skeleton)]
+        joints = fixed[: len(skeleton)]
         rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
     return replace(motion, rotations=rotations, root=root)
+
+
+def _with_its_legs(motion: Motion, rotations: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, that sinks or rises with a leg that was turned aside under it.
+
+    Args:
+        motion: the movement before that.
+        rotations: local rotations after it [N, J, 4].
+        given: frames that must not change [N].
+        fps: frames a second.
+    """
+    skeleton, root = motion.skeleton, motion.root
+    lifted = lowest_height(skeleton, rotations, root) - lowest_height(skeleton, motion.rotations, root)
+    frames = np.arange(len(root))
+    since = np.abs(frames[:, None] - np.flatnonzero(given)).min(axis=1) / fps
+    out = root.copy()
+    out[:, 1] -= smoothed(lifted, FOLLOWS, fps) * np.minimum(since / FOLLOWS, 1.0)
+    return out
 
 
 def _given_frames(clock: Timeline, stops: Sequence[int], moving: tuple[bool, bool]) -> Bools:

@@ -194,6 +194,21 @@ def test_fine_detail_takes_the_foot_that_stays_off_the_floor_by_millimetres(join
     assert limb_heights(human23(), *grounded(wavers, root, plain=q))[:, 1].max() < 0.01
 
 
+@pytest.mark.parametrize(("degrees", "fastest"), [(30.0, 2.0), (40.0, 4.0), (50.0, 8.0)])
+def test_the_body_comes_down_where_a_knee_is_too_slow_for_the_foot_that_stays(degrees: float, fastest: float) -> None:
+    """A foot that rolls onto its toes in two frames, and back, under a knee that bends by `fastest` rad/s at most."""
+    frames = 31
+    bends = {"right_hip": (-20.0, 0.0, 0.0), "right_knee": (37.0, 0.0, 0.0), "right_ankle": (-17.0, 0.0, 0.0)}
+    q = posed(bends | {"left_hip": (-80.0, 0.0, 0.0), "left_knee": (80.0, 0.0, 0.0)}, frames)
+    root = stand(human23(), q, np.zeros((frames, 3)), np.zeros(frames))
+    up = np.clip((np.arange(frames) - 10.0) / 2.0, 0.0, 1.0) * np.clip((20.0 - np.arange(frames)) / 2.0, 0.0, 1.0)
+    ankle = human23().index("right_ankle")
+    q[:, ankle] = rot.mul(q[:, ankle], rot.from_axis_angle([1.0, 0.0, 0.0], np.radians(degrees) * up))
+    found, went = grounded(q, root, fastest=np.full(23, fastest))
+    heights = limb_heights(human23(), found, went)[:, 1]
+    assert -0.004 < heights.min() <= heights.max() < 0.02
+
+
 @pytest.mark.parametrize("turn", [-1.8, 0.9, 1.8])
 def test_a_foot_that_turns_on_the_spot_stays_there(turn: float) -> None:
     """About its heel, its toes go a foot's length, which is no step."""
