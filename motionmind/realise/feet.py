@@ -209,19 +209,16 @@ def ease_knees(
             wanted = places_now
         gives = np.sum(share * (wanted - made)[..., 1], axis=1)
         shift[:, 1] += smoothed(gives, seconds, fps) * bound
+    # With a soft stretch from where the body is now, a few more of the ballet would lean at rest: for that foot alone.
     aims = aims_at(places) - shift[:, None] if staying is None else aims_at(places - shift[:, None])
     # What the body does not give, the feet do: upward, for the floor is in the way of the rest.
     bends = bends_of(aims, np.zeros_like(stands))
-    lengths = finer = _lengths(bends, bones)
-    if fine:
-        finer = _lengths(
-            [keep_detail(bend, one, fixed, *bone, fps) for bend, one, bone in zip(bends, own.T, bones, strict=True)],
-            bones,
-        )
+    firm = _lengthened(aims, _lengths(bends, bones))
     if not fine:
-        return _lengthened(aims, lengths) - legs, shift
+        return firm - legs, shift
+    pairs = zip(bends, own.T, bones, strict=True)
+    out = _lengthened(aims, _lengths([keep_detail(bend, one, fixed, *bone, fps) for bend, one, bone in pairs], bones))
     lowest = (legs + off - shift[:, None])[..., 1] - room
-    firm, out = (_lengthened(aims, longer) for longer in (lengths, finer))
     # Detail that would take a foot into the floor is left out there: to lift the foot for a while would be seen.
     out[..., 1] = np.maximum(out[..., 1], np.minimum(firm[..., 1], lowest))
     if staying is not None:
