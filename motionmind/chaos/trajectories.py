@@ -224,13 +224,14 @@ class _Run:
 
 
 def _begin(run: _Run) -> Floats:
-    """The first point of a trajectory [d], from which the flow is chaotic."""
+    """Return the first point of a trajectory [d], from which the flow is chaotic."""
     begin = run.settled()
     run.check(begin)
     return begin
 
 
 def _exponent(run: _Run, steps: int) -> float:
+    """Return the largest Lyapunov exponent of a trajectory of so many steps, nats per unit of the flow's time."""
     growth, used = run.growth(run.settled(), steps, np.inf)
     return growth / (used * run.step)
 
