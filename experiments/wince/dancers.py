@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -13,10 +13,11 @@ from motionmind import Motion, Posture
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.capsules import legs_depth
 from motionmind.body.contact import FAR, floor_height, foot_slides, lowest_height
-from motionmind.body.plausibility import CALM
+from motionmind.body.plausibility import CALM, GRAVITY
 from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support, stands_alone
 from motionmind.geometry import rotations as rot
+from motionmind.realise.flight import FALLING
 
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
@@ -39,6 +40,7 @@ class Seen(NamedTuple):
         fall: vertical acceleration in frames in the air whose neighbours are in the air, too, m/s^2.
         skates: whether a foot skates [T - 1].
         airborne: whether the body is in the air [T].
+        falls: whether it falls there, by more than half of gravity [T].
     """
 
     greatest: dict[str, Floats]
@@ -48,13 +50,15 @@ class Seen(NamedTuple):
     fall: Floats
     skates: Bools
     airborne: Bools
+    falls: Bools
 
 
-def see(motion: Motion, floor: float | Floats) -> Seen:
-    """Look at movement at 30 frames a second above a floor, whose height may change from frame to frame [T]."""
+def see(motion: Motion) -> Seen:
+    """Look at movement at 30 frames a second above a floor at 0."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
-    support = find_support(body, rotations, root, FPS, floor)
+    support = find_support(body, rotations, root, FPS)
     bounce, lean, fall = np.zeros(0), np.zeros((0, len(CALMS))), np.zeros(0)
+    falls = np.zeros(len(motion), dtype=np.bool_)
     if support.mass is not None and support.overhang is not None:
         accelerations = FPS**2 * np.diff(support.mass, 2, axis=0)
         level = np.full((len(motion), 1), np.inf)
@@ -64,7 +68,8 @@ def see(motion: Motion, floor: float | Floats) -> Seen:
         bounce = np.abs(accelerations[:, 1])
         up = support.airborne
         fall = accelerations[up[:-2] & up[1:-1] & up[2:], 1]
-    slides = foot_slides(body, rotations, root, floor).max(axis=1, initial=0.0)
+        falls[1:-1] = up[1:-1] & (accelerations[:, 1] < -FALLING * GRAVITY)
+    slides = foot_slides(body, rotations, root).max(axis=1, initial=0.0)
     greatest = {
         "root speed": FPS * np.linalg.norm(np.diff(root, axis=0), axis=1),
         "root acceleration": FPS**2 * np.linalg.norm(np.diff(root, 2, axis=0), axis=1),
@@ -72,7 +77,7 @@ def see(motion: Motion, floor: float | Floats) -> Seen:
         "legs": legs_depth(body, rotations),
     }
     joints = FPS * rot.angle(rotations[:-1], rotations[1:])
-    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, support.airborne)
+    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, support.airborne, falls)
 
 
 class Limits(NamedTuple):
@@ -93,21 +98,21 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Dancers:
-    """A corpus's clips at 30 frames a second, and its postures.
+    """A corpus's clips at 30 frames a second, and its postures, each clip with its floor at 0.
 
     Attributes:
         body: the skeleton.
         clips: the unbroken pieces.
-        floors: height of the floor under each, metres.
         seen: how a viewer sees each.
-        ends: postures that pairs are drawn from, each with the height of its floor.
+        ends: postures that pairs are drawn from.
+        aloft: numbers of those that are in the air: of recorded ones, those in which the dancers fall.
     """
 
     body: Skeleton
     clips: list[Motion]
-    floors: list[float]
     seen: list[Seen]
-    ends: list[tuple[Posture, float]]
+    ends: list[Posture]
+    aloft: Ints
     _limits: dict[int, Limits] = field(default_factory=dict)
 
     def limits(self, frames: int) -> Limits:
@@ -176,37 +181,40 @@ class Dancers:
 
     def jumps(self, count: int, seed: int) -> list[tuple[int, int]]:
         """Random pairs of a posture and one in the air."""
-        rng = np.random.default_rng(seed)
-        up = [k for k, (posture, floor) in enumerate(self.ends) if _is_airborne(posture, floor)]
-        return [(int(rng.integers(len(self.ends))), int(rng.choice(up))) for _ in range(count)] if up else []
+        rng, some = np.random.default_rng(seed), count if len(self.aloft) else 0
+        return [(int(rng.integers(len(self.ends))), int(rng.choice(self.aloft))) for _ in range(some)]
 
     def _legs(self) -> dict[int, Ints]:
-        postures = [posture for posture, _ in self.ends]
-        rotations, root = np.stack([p.rotations for p in postures]), np.stack([p.root for p in postures])
+        rotations, root = np.stack([p.rotations for p in self.ends]), np.stack([p.root for p in self.ends])
         alone = stands_alone(self.body, rotations, root)
         # In the air, too, one limb is the lowest; nothing stands on it.
-        alone[[_is_airborne(posture, floor) for posture, floor in self.ends]] = -1
+        alone[[_is_airborne(posture) for posture in self.ends]] = -1
         return {int(limb): np.flatnonzero(alone == limb) for limb in np.unique(alone) if limb >= 0}
 
 
 @lru_cache(maxsize=2)
 def dancers(data: str | None, name: str) -> Dancers:
     """The dancers of a corpus, bundled or recorded."""
-    clips, floors = [], []
+    clips = []
     for pieces in movement(data, name, 1).values():
-        low = np.concatenate([lowest_height(piece.skeleton, piece.rotations, piece.root) for piece in pieces])
-        long = [piece for piece in pieces if len(piece) > 3]
-        clips += long
-        floors += [floor_height(low)] * len(long)
-    seen = [see(clip, floor) for clip, floor in zip(clips, floors, strict=True)]
+        clips += [piece for piece in _on_the_floor(pieces) if len(piece) > 3]
+    seen = [see(clip) for clip in clips]
     if name in RECORDED:
-        ends = [(clip.posture(k), floor) for clip, floor in zip(clips, floors, strict=True) for k in range(len(clip))]
+        ends = [clip.posture(k) for clip in clips for k in range(len(clip))]
+        aloft = np.flatnonzero(np.concatenate([one.falls for one in seen]))
     else:  # keyframes are what an author writes, and asks for
         whole = corpus(data, name)
-        keyed = [whole.motion(clip) for clip in whole.clips]
-        heights = [floor_height(lowest_height(one.skeleton, one.rotations, one.root)) for one in keyed]
-        ends = [(one.posture(k), floor) for one, floor in zip(keyed, heights, strict=True) for k in range(len(one))]
-    return Dancers(clips[0].skeleton, clips, floors, seen, ends)
+        keyed = [one for clip in whole.clips for one in _on_the_floor([whole.motion(clip)])]
+        ends = [one.posture(k) for one in keyed for k in range(len(one))]
+        aloft = np.flatnonzero([_is_airborne(posture) for posture in ends])
+    return Dancers(clips[0].skeleton, clips, seen, ends, aloft)
+
+
+def _on_the_floor(pieces: list[Motion]) -> list[Motion]:
+    """Pieces of one recording, whose zero may be a decimetre off, with their floor at 0."""
+    low = [lowest_height(piece.skeleton, piece.rotations, piece.root) for piece in pieces]
+    up = np.array([0.0, floor_height(np.concatenate(low)), 0.0])
+    return [replace(piece, root=piece.root - up) for piece in pieces]
 
 
 def nearer(a: Posture, b: Posture, metres: float) -> Posture:
@@ -216,11 +224,10 @@ def nearer(a: Posture, b: Posture, metres: float) -> Posture:
     return b if far <= metres else Posture(b.skeleton, b.rotations, b.root - way * (1.0 - metres / far))
 
 
-def on_the_same_spot(a: Posture, b: Posture, up: float) -> Posture:
+def on_the_same_spot(a: Posture, b: Posture) -> Posture:
     """Posture `b`, turned about the vertical and moved so that the leg that it stands on is where that of `a` is.
 
-    The two stand on the same leg; its foot points the same way then, by the bone above its lowest joint. It is moved
-    `up` by so many metres as the floor of `a` is above its own.
+    The two stand on the same leg; its foot points the same way then, by the bone above its lowest joint.
     """
     body = a.skeleton
     places = [body.positions(p.rotations, p.root) for p in (a, b)]
@@ -230,13 +237,13 @@ def on_the_same_spot(a: Posture, b: Posture, up: float) -> Posture:
     turn = rot.about_vertical(np.array(headings[0] - headings[1]))
     rotations = b.rotations.copy()
     rotations[0] = rot.mul(turn, rotations[0])
-    moved = (places[0][low] - places[1][low]) * np.array([1.0, 0.0, 1.0]) + up * np.array([0.0, 1.0, 0.0])
+    moved = (places[0][low] - places[1][low]) * np.array([1.0, 0.0, 1.0])
     return Posture(body, rotations, rot.mul_vec(turn, b.root - places[1][low]) + places[1][low] + moved)
 
 
-def _is_airborne(posture: Posture, floor: float) -> bool:
+def _is_airborne(posture: Posture) -> bool:
     body = posture.skeleton
-    return bool(find_support(body, posture.rotations[None], posture.root[None], FPS, floor).airborne[0])
+    return bool(find_support(body, posture.rotations[None], posture.root[None], FPS).airborne[0])
 
 
 def _percentile(values: list[Floats]) -> float:

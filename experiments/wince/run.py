@@ -49,9 +49,9 @@ def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: 
     rows: list[Row] = []
     bounces: dict[str, list[Floats]] = {maker: [] for maker in MAKERS}
     for number, (kind, i, k) in enumerate(asked):
-        (a, floor_a), (b, floor_b) = danced.ends[i], danced.ends[k]
-        if kind == "one leg":  # and on one floor: that of recordings differs by up to a decimetre
-            b, floor_b = on_the_same_spot(a, b, floor_a - floor_b), floor_a
+        a, b = danced.ends[i], danced.ends[k]
+        if kind == "one leg":
+            b = on_the_same_spot(a, b)
         elif kind == "jump":
             b = nearer(a, b, LEAP)
         try:
@@ -61,7 +61,7 @@ def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: 
             continue
         for maker in MAKERS:
             motion = tween.motion if maker == "motionmind" else eased(a, b, len(tween.motion))
-            seen = see(motion, np.linspace(floor_a, floor_b, len(motion)))
+            seen = see(motion)
             rows.append(_row(by, kind, number, maker, a, b, motion, seen, danced))
             if kind == "far":
                 bounces[maker].append(seen.bounce)

@@ -11,8 +11,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from experiments.harness import HERE
 from experiments.material import FPS, engine
 from experiments.wince.dancers import dancers, see
@@ -36,12 +34,12 @@ def main() -> None:
     found, danced = engine(asked.data, asked.by), dancers(asked.data, asked.by)
     tried: list[tuple[float, str, Motion]] = []
     for number, (i, k) in enumerate(danced.far_pairs(asked.pairs, asked.seed)):
-        (a, floor_a), (b, floor_b) = danced.ends[i], danced.ends[k]
+        a, b = danced.ends[i], danced.ends[k]
         try:
             motion = found.tween(a, b, node_budget=BUDGET, fps=float(FPS)).motion
         except NoPathError:
             continue
-        worst = danced.worst(see(motion, np.linspace(floor_a, floor_b, len(motion))))
+        worst = danced.worst(see(motion))
         beyond = ", ".join(f"{name} {times:.2f}" for name, times in worst.items() if times > 1.0)
         tried.append((max(worst.values()), f"pair {number}, {motion.times[-1]:.2f} s: {beyond or 'nothing'}", motion))
     tried.sort(key=lambda one: -one[0])

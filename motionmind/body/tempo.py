@@ -123,7 +123,7 @@ def _flights(motion: Motion, heights: Floats) -> list[float]:
     lowest = lowest_height(motion.skeleton, motion.rotations, motion.root)
     lift = lowest - floor_height(lowest)
     found = []
-    for begin, end in _runs(lift > _LIFTED):
+    for begin, end in runs_of(lift > _LIFTED):
         times = np.arange(end - begin) / motion.fps
         if begin == 0 or end == len(lift) or times[-1] < _SHORTEST or lift[begin:end].max() < _CLEAR:
             continue
@@ -135,7 +135,7 @@ def _flights(motion: Motion, heights: Floats) -> list[float]:
     return found
 
 
-def _runs(flags: Bools) -> list[tuple[int, int]]:
+def runs_of(flags: Bools) -> list[tuple[int, int]]:
     """Return the first index of each run of true flags, and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

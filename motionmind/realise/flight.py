@@ -12,6 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Bools, Floats
+from motionmind.body.contact import LOW, lowest_height
+from motionmind.body.plausibility import GRAVITY
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import centre_of_mass, size_of
+from motionmind.body.tempo import runs_of
 from motionmind.realise.least_squares import Rows, difference_rows, position_rows
 
 SURELY = 0.5  # share of the corpus's walks that are in the air where a given posture is
@@ -22,6 +27,8 @@ PUSHES = 0.25  # seconds that a push off, or a landing, takes at least
 BENDS = 0.5, 0.2  # seconds before and after a flight in which legs bend for it, and seconds from there to standing
 FALLS = 0.3, 0.5  # metres a second squared off free fall, standard deviation, vertical and level
 RATE = 0.02  # metres a second off a velocity that is given in the air, the same
+FALLING = 0.5  # of gravity: a body off the floor that falls faster is in the air, and one that is pushed so is not
+PAUSES = 0.1  # seconds for which a fall may be slower than that, as where legs are drawn up
 TOUCHES = 0.005  # metres off the height at which legs leave the floor, and come back to it
 
 
@@ -76,8 +83,7 @@ def find_flights(
         return [Flight(0, last, (None, None))]
     out = [first] if first else []
     begin, end = lands + push, rises - push
-    flies = np.flatnonzero(np.diff(np.concatenate([[0], (aloft > EVER).astype(np.int8), [0]])))
-    for start, stop in zip(flies[::2], flies[1::2], strict=True):
+    for start, stop in runs_of(aloft > EVER):
         if (start == 0 and hovering[0]) or (stop > last and hovering[1]):
             continue
         share, frames = aloft[start:stop], np.arange(start, stop)
@@ -111,13 +117,22 @@ def _time_of_fall(
         fps: frames a second.
     """
     seconds = np.arange(len(standing)) / fps
+    free = rate is None
     if rate is None:
         rise = max(mass - float(standing.min()), 0.01)
         most = max(longest, 2.0) / fps
         rate = max(rise / most - 0.5 * gravity * most, 0.0)
-    heights = mass - rate * seconds - 0.5 * gravity * seconds**2
-    below = np.flatnonzero(heights[1:] <= standing[1:])
-    return (int(below[0]) + 1 if len(below) else len(standing) - 1), rate
+    below = np.flatnonzero(mass - rate * seconds[1:] - 0.5 * gravity * seconds[1:] ** 2 <= standing[1:])
+    if not len(below):
+        return len(standing) - 1, rate
+    first = int(below[0]) + 1
+    if not free:
+        return first, rate
+    # It comes off the floor in a whole frame: with which of the two velocities nearest to that one?
+    either = [max(first - 1, 1), first]
+    rates = (mass - standing[either]) / seconds[either] - 0.5 * gravity * seconds[either]
+    nearest = int(np.abs(rates - rate).argmin())
+    return either[nearest], float(rates[nearest])
 
 
 def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int) -> Bools:
@@ -172,3 +187,43 @@ def flight_rows(flights: list[Flight], own: Floats, standing: Floats, gravity: f
     up = np.tile([0.0, 1.0, 0.0], (len(frames), 1))
     rows.append(position_rows(frames, up, standing[frames], np.full(len(frames), TOUCHES**-2.0)))
     return rows + leaves
+
+
+def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, with which the centre of mass falls exactly where it nearly does.
+
+    Legs that bend in the air, limbs that are kept apart and a slower clock each take it a little off its parabola.
+    While it falls off the floor, with more than FALLING of gravity but for PAUSES, it is put back on the parabola
+    through its places just before and just after.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root [N, 3], metres.
+        given: frames that must not change, the first and the last among them [N].
+        fps: frames a second.
+    """
+    low = lowest_height(skeleton, rotations, root)
+    up = ~given & (low > low.min() + LOW * size_of(skeleton))
+    mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
+    if mass is None:
+        return root
+    out, fall = root.copy(), np.zeros(len(root))
+    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
+    for start, stop in runs_of(_without_gaps(up & (fall > FALLING), up & (fall > -FALLING), round(PAUSES * fps))):
+        if stop - start < 2:  # a kink, and no fall
+            continue
+        seconds = np.arange(stop - start + 2) / fps
+        line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
+        fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
+        out[start:stop, 1] += fallen[1:-1] - mass[start:stop, 1]
+    return out
+
+
+def _without_gaps(flags: Bools, bridges: Bools, most: int) -> Bools:
+    """Return flags [N] with gaps of at most so many frames closed, where all of the gap `bridges` it [N]."""
+    out = flags.copy()
+    for start, stop in runs_of(~flags):
+        if start > 0 and stop < len(flags) and stop - start <= most and bridges[start:stop].all():
+            out[start:stop] = True
+    return out

@@ -26,10 +26,10 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
+from motionmind.realise.flight import FALLING
 from motionmind.realise.timeline import Timeline, stretch
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
-FALLS = 0.5  # of gravity: what falls faster is in the air
 ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05
 JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way at most
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
@@ -146,4 +146,4 @@ def _falls(motion: Motion, fps: float) -> Bools:
     """Return in which frames between the first and the last a body falls, off the floor [N - 2]."""
     low = lowest_height(motion.skeleton, motion.rotations, motion.root)
     up = low[1:-1] > low.min() + LOW * size_of(motion.skeleton)
-    return np.asarray(up & (fps**2 * np.diff(motion.root[:, 1], 2) < -FALLS * GRAVITY))
+    return np.asarray(up & (fps**2 * np.diff(motion.root[:, 1], 2) < -FALLING * GRAVITY))

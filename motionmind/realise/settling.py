@@ -18,6 +18,7 @@ from motionmind.body.support import standing_rise
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.feet import SHOWS
+from motionmind.realise.flight import fall_freely
 from motionmind.realise.knees import smoothed
 from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
@@ -87,6 +88,8 @@ def settled(
     if "balance" not in without:
         joints = fixed[: len(skeleton)]
         rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
+    if "flight" not in without:
+        root = fall_freely(skeleton, rotations, root, given, fps)
     return replace(motion, rotations=rotations, root=root)
 
 

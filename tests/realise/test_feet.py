@@ -1,9 +1,9 @@
-"""Feet that stand where they should, steps, a root that is carried in balance, and flights."""
+"""Feet that stand where they should, steps, and a root that is carried in balance, also in the air."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
 from motionmind.realise.departures import LIFT, departure
-from motionmind.realise.flight import PUSHES, Flight, find_flights, flying_frames
 from motionmind.realise.footfalls import (
     BRIEF,
     CROSSES,
@@ -490,66 +489,6 @@ def test_fine_detail_of_knees_lifts_no_standing_foot_for_long() -> None:
     assert heights.max() < 0.02
     assert heights.min() > -0.006
     assert np.all(np.mean(heights < 0.004, axis=0) > 0.4)
-
-
-def test_rounding_errors_do_not_decide_in_which_frame_a_flight_begins() -> None:
-    aloft, heights = np.zeros(41), 0.25 * (1.0 + 1e-15 * np.arange(-40, 40))
-    aloft[2:14] = 1.0  # sooner than the body can push off, which takes seven frames and a half
-    begins = {
-        flight.start
-        for height in heights
-        for flight in find_flights(
-            aloft, np.full(41, height), np.ones(41), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
-        )
-    }
-    assert begins == {8}
-
-
-def test_flights_that_do_not_fit_are_shorter_or_none() -> None:
-    still, leaps = np.full(31, 1.0), np.full(31, 0.3)
-    on_floor = (np.array([1.0, 1.0]), (False, False), (None, None), GRAVITY, 30.0)
-    middle = np.zeros(31)
-    middle[9:22] = 1.0
-    (flight,) = find_flights(middle, leaps, still, *on_floor)
-    assert (flight.start, flight.end) == pytest.approx((8, 22), abs=1)
-    short = find_flights(middle[10:21], leaps[10:21], still[10:21], *on_floor)
-    assert all(one.end - one.start < 6 for one in short)
-    # Between two postures in the air, so near that there is no time to land, all of it is flight.
-    (whole,) = find_flights(
-        np.ones(13), leaps[:13], still[:13], np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
-    )
-    assert (whole.start, whole.end) == (0, 12)
-    first, last = find_flights(
-        np.ones(61), np.zeros(61), np.ones(61), np.array([1.2, 1.2]), (True, True), (None, None), GRAVITY, 30.0
-    )
-    assert (first.start, last.end) == (0, 60)
-    assert first.rates[0] == last.rates[1] == 0.0
-    assert first.end / 30.0 == pytest.approx(np.sqrt(0.4 / GRAVITY), abs=0.04)
-
-
-def test_a_body_that_rises_in_a_or_falls_in_b_is_longer_in_the_air() -> None:
-    """Half a metre above where it stands: as long as it takes to fall from there at that velocity."""
-    calm, masses = np.zeros(61), np.array([1.5, 1.5])
-    for rate in (-2.0, 0.5, 2.0):
-        for hovering, rates, falls in (((True, False), (rate, None), rate), ((False, True), (None, rate), -rate)):
-            (flight,) = find_flights(calm, calm, np.ones(61), masses, hovering, rates, GRAVITY, 30.0)
-            seconds = (falls + np.sqrt(falls**2 + 2.0 * GRAVITY * 0.5)) / GRAVITY
-            assert (flight.end - flight.start) / 30.0 == pytest.approx(seconds, abs=1.0 / 30.0)
-            assert flight.rates == rates
-
-
-def test_jumps_one_after_another_leave_time_to_land_and_push() -> None:
-    flights = find_flights(
-        np.ones(121), np.full(121, 0.05), np.ones(121), np.ones(2), (False, False), (None, None), GRAVITY, 30.0
-    )
-    assert len(flights) > 3
-    assert all(after.start - before.end >= PUSHES * 30.0 - 1.0 for before, after in pairwise(flights))
-
-
-def test_between_the_last_frame_on_the_floor_and_the_first_nothing_bears_the_body() -> None:
-    flights = [Flight(3, 6, (None, None)), Flight(8, 10, (None, 0.0))]
-    assert np.flatnonzero(flying_frames(flights, (False, True), 11)).tolist() == [4, 5, 9, 10]
-    assert np.flatnonzero(flying_frames(flights, (False, False), 11)).tolist() == [4, 5, 9]
 
 
 # --- laws -------------------------------------------------------------------------------------------------------------
