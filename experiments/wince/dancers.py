@@ -7,6 +7,7 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from experiments.material import FPS, RECORDED, corpus, movement
 from motionmind import Motion, Posture
@@ -22,7 +23,7 @@ from motionmind.realise.flight import FALLING
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
-CALMS = CALM, 0.5  # metres a second squared: level accelerations up to which weight is looked at; the second: rest
+REST = 0.5  # metres a second squared: level acceleration of a body at rest; weight is looked at up to CALM
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
 
@@ -35,8 +36,8 @@ class Seen(NamedTuple):
             of the feet [T - 1], depth of the legs in each other [T]; metres and seconds.
         joints: speeds of the joints [T - 1, J], rad/s.
         bounce: vertical acceleration of the mass, up or down [T - 2], m/s^2; empty where masses are unknown.
-        lean: overhang where one limb bears and the mass is accelerated level by less than each of `CALMS` [T, 2],
-            metres, else NaN; or empty.
+        lean: overhang where one limb bears and the mass is accelerated level by less than CALM, less than REST, and
+            less than REST in the frames before and after, too [T, 3], metres, else NaN; or empty.
         fall: vertical acceleration in frames in the air whose neighbours are in the air, too, m/s^2.
         skates: whether a foot skates [T - 1].
         airborne: whether the body is in the air [T].
@@ -57,14 +58,15 @@ def see(motion: Motion) -> Seen:
     """Look at movement at 30 frames a second above a floor at 0."""
     body, rotations, root = motion.skeleton, motion.rotations, motion.root
     support = find_support(body, rotations, root, FPS)
-    bounce, lean, fall = np.zeros(0), np.zeros((0, len(CALMS))), np.zeros(0)
+    bounce, lean, fall = np.zeros(0), np.zeros((0, 3)), np.zeros(0)
     falls = np.zeros(len(motion), dtype=np.bool_)
     if support.mass is not None and support.overhang is not None:
         accelerations = FPS**2 * np.diff(support.mass, 2, axis=0)
-        level = np.full((len(motion), 1), np.inf)
-        level[1:-1, 0] = np.hypot(accelerations[:, 0], accelerations[:, 2])
+        level = np.full(len(motion), np.inf)
+        level[1:-1] = np.hypot(accelerations[:, 0], accelerations[:, 2])
+        calm = np.stack([level < CALM, level < REST, minimum_filter1d(level < REST, 3, mode="constant")], axis=1)
         alone = support.bears.sum(axis=1, keepdims=True) == 1
-        lean = np.where((level < CALMS) & alone, support.overhang[:, None], np.nan)
+        lean = np.where(calm & alone, support.overhang[:, None], np.nan)
         bounce = np.abs(accelerations[:, 1])
         up = support.airborne
         fall = accelerations[up[:-2] & up[1:-1] & up[2:], 1]
@@ -87,7 +89,7 @@ class Limits(NamedTuple):
         most: of each of `MEASURES`; that of the joints as a multiple of `joints`.
         joints: what each joint's greatest speed exceeds in one window of two hundred [J], rad/s.
         own: share of the dancers' windows that are beyond any of them.
-        leans: shares of the dancers' windows in which the mass is beyond each of `Dancers.lean` [2].
+        leans: shares of the dancers' windows in which the mass is beyond each of `Dancers.lean` [3].
     """
 
     most: dict[str, float]
@@ -146,7 +148,7 @@ class Dancers:
         count = min(map(len, all_of.values()))
         beyond = np.any([all_of[name][:count] > most[name] for name in MEASURES], axis=0)
         leans = [np.nan_to_num(seen.lean) > self.lean for seen in chosen if len(seen.lean)]
-        out = greatest(leans, 0).mean(axis=0) if leans else np.zeros(len(CALMS))
+        out = greatest(leans, 0).mean(axis=0) if leans else np.zeros(3)
         return Limits(most, each, float(beyond.mean()), out)
 
     def worst(self, seen: Seen) -> dict[str, float]:
@@ -163,7 +165,10 @@ class Dancers:
 
     @cached_property
     def lean(self) -> Floats:
-        """The 99th percentiles of how far it is outside of what they stand on, as in `Seen` [2], metres."""
+        """The 99th percentiles of how far it is outside of what they stand on, as in `Seen` [3], metres.
+
+        NaN where they never are so.
+        """
         leans = np.concatenate([seen.lean for seen in self.seen])
         return np.array([_percentile([those[np.isfinite(those)]]) for those in leans.T])
 

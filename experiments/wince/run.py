@@ -111,10 +111,12 @@ def _row(
         "own": float("nan"),
         "own_leans": float("nan"),
         "own_rests": float("nan"),
+        "own_stays": float("nan"),
         "any": 0,
         **dict.fromkeys(MEASURES, float("nan")),
         "leans": 0,
         "rests": 0,
+        "stays": 0,
         "crossed": 0,
         "rise": float("nan"),
         "skates": float("nan"),
@@ -124,16 +126,18 @@ def _row(
     if motion is None or seen is None or danced is None:
         return row
     worst, limits = danced.worst(seen), danced.limits(len(motion))
-    leans, rests = np.any(seen.lean > danced.lean, axis=0)
+    leans, rests, stays = np.any(seen.lean > danced.lean, axis=0)
     return row | {
         "seconds": float(motion.times[-1]),
         "own": limits.own,
         "own_leans": float(limits.leans[0]),
         "own_rests": float(limits.leans[1]),
+        "own_stays": float(limits.leans[2]),
         "any": int(max(worst.values()) > 1.0),
         **worst,
         "leans": int(leans),
         "rests": int(rests),
+        "stays": int(stays),
         "crossed": int(seen.greatest["legs"].max() > CROSSED),
         "rise": standing_rise(motion.skeleton, motion.rotations, motion.root) if kind == "one leg" else float("nan"),
         "skates": float(seen.skates.mean()) if len(seen.skates) else 0.0,
@@ -171,6 +175,8 @@ def tell(rows: list[Row]) -> str:
         "their own windows": lambda r: f"{_mean(r['rows'], 'own_leans'):.0%}",
         "leans at rest": lambda r: _interval(r["rows"], "rests"),
         "their own, at rest": lambda r: f"{_mean(r['rows'], 'own_rests'):.0%}",
+        "at rest for 0.1 s": lambda r: _interval(r["rows"], "stays"),
+        "their own, at rest for 0.1 s": lambda r: f"{_mean(r['rows'], 'own_stays'):.0%}",
         "legs over 3 cm": lambda r: _interval(r["rows"], "crossed"),
         "skates over the dancers'": lambda r: f"{_mean(r['rows'], 'skates') / r['rows'][0]['own_skates']:.2f}",
         "standing feet that rise": lambda r: _rises(r["one leg"]),
