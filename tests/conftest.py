@@ -11,6 +11,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+# Before NumPy is loaded, here and in what tests start: there is a process for each processor, and threads that wait for
+# work turn in circles, which takes as much time as the work.
+os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
 import pytest
 from command_line import Ran, Run
 from hypothesis import HealthCheck, settings

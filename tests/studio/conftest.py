@@ -15,7 +15,32 @@ collect_ignore_glob = [] if _IS_HERE else ["test_studio_*.py"]  # the extra stud
 if TYPE_CHECKING:
     from studio_server import Served
 
+    from motionmind.body.motion import Motion
     from motionmind.studio.project import Project
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _thumbnails() -> Iterator[None]:
+    """Every page that is opened shows the same thirty small pictures: each is drawn once, for the same movement."""
+    from motionmind.studio import api, studio
+    from motionmind.studio.thumbnails import thumbnail
+
+    drawn: dict[object, bytes] = {}
+
+    def draw(motion: Motion, frame: int, height: int) -> bytes:
+        motion.posture(frame)
+        body = motion.skeleton
+        shape = body.names, body.parents, body.offsets.tobytes(), body.tips.tobytes()
+        place = motion.rotations[frame].tobytes(), motion.root[frame].tobytes(), bool(motion.inserted()[frame])
+        key = shape, place, height
+        if key not in drawn:
+            drawn[key] = thumbnail(motion, frame, height)
+        return drawn[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (api, studio):
+            patch.setattr(module, "thumbnail", draw)
+        yield
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import pytest
+from command_line import Run
 from studio_server import ROOT, running
 
 from motionmind.errors import MotionMindError
@@ -24,41 +25,56 @@ from motionmind.studio.project import Project
 
 _Found = TypeVar("_Found")
 
-# Appends edits as fast as it can, and says the number of each once it is on disk.
-WRITER = """
-import sys
+# For each line that it reads, forks a writer, which begins with what has been imported: it says its number and how many
+# blocks there are, appends edits as fast as it can, and says the number of each once it is on disk.
+WRITERS = """
+import os, sys
 from pathlib import Path
 from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
-project = Project.open(Path(sys.argv[1]))
-print(len(project.state.blocks), flush=True)
-for number in range(len(project.state.used), 100_000):
-    project.edit("w1", Insert(f"b{number}", "ballet/adagio", 0, 9))
-    print(number + 1, flush=True)
+
+def write(path):
+    project = Project.open(path)
+    print(os.getpid(), len(project.state.blocks), sep="\\n", flush=True)
+    for number in range(len(project.state.used), 100_000):
+        project.edit("w1", Insert(f"b{number}", "ballet/adagio", 0, 9))
+        print(number + 1, flush=True)
+
+for _ in sys.stdin:
+    if (writer := os.fork()) == 0:
+        write(Path(sys.argv[1]))
+        os._exit(0)
+    os.waitpid(writer, 0)
+    print("ended", flush=True)
 """
 
 
 def test_a_kill_loses_at_most_the_edit_in_flight(tmp_path: Path) -> None:
     path, rng = tmp_path / "piece.motionmind", random.Random(1)
     Project.create(path, "ballet").close()
-    for _ in range(12):
-        writer = subprocess.Popen(
-            [sys.executable, "-c", WRITER, str(path)],
-            stdout=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )
-        assert writer.stdout is not None
-        said = [writer.stdout.readline() for _ in range(4)]  # what was there, and three edits more
-        time.sleep(0.2 * rng.random())
-        writer.kill()
-        said += writer.communicate()[0].splitlines()
-        written = int(said[-1])
-        project = Project.open(path)
-        names = [block.id for block in project.state.blocks]
-        project.close()
-        assert names == [f"b{number}" for number in range(len(names))]
-        assert len(names) in (written, written + 1)
+    with subprocess.Popen(
+        [sys.executable, "-c", WRITERS, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    ) as writers:
+        assert writers.stdin is not None
+        assert writers.stdout is not None
+        for _ in range(12):
+            writers.stdin.write("another\n")
+            writers.stdin.flush()
+            writer, *said = [writers.stdout.readline() for _ in range(5)]  # what was there, and three edits more
+            time.sleep(0.2 * rng.random())
+            os.kill(int(writer), signal.SIGKILL)
+            while (line := writers.stdout.readline()) != "ended\n":
+                said.append(line)
+            written = int(said[-1])
+            project = Project.open(path)
+            names = [block.id for block in project.state.blocks]
+            project.close()
+            assert names == [f"b{number}" for number in range(len(names))]
+            assert len(names) in (written, written + 1)
     assert len(names) > 20
 
 
@@ -137,10 +153,10 @@ def test_on_a_full_disk_an_edit_is_refused_in_a_line_and_the_project_stays_whole
     again.close()
 
 
-def test_errors_of_the_command_are_one_line(tmp_path: Path) -> None:
-    home, other = tmp_path / "home", tmp_path / "other.motionmind"
+def test_errors_of_the_command_are_one_line(tmp_path: Path, run: Run) -> None:
+    other = tmp_path / "other.motionmind"
     other.write_text("no project\n")
-    with running(tmp_path / "piece.motionmind", home=home) as (_, client):
+    with running(tmp_path / "piece.motionmind", home=tmp_path / "home") as (_, client):
         port = client.url.rpartition(":")[2]
         for arguments, words in (
             ((tmp_path / "piece.motionmind",), f"is open at {client.url}"),
@@ -153,7 +169,7 @@ def test_errors_of_the_command_are_one_line(tmp_path: Path) -> None:
             ((tmp_path / "nowhere" / "new.motionmind",), "no such file or directory"),
             ((tmp_path / "missing.bvh",), "there is no such file"),
         ):
-            code, err = _run(home, *arguments)
+            code, _, err = run("studio", "--no-browser", *arguments)
             assert (code, err.count("\n")) == (2, 1), err
             assert words in err.lower() or words in err
     assert not (tmp_path / "new.motionmind").exists()
@@ -161,9 +177,16 @@ def test_errors_of_the_command_are_one_line(tmp_path: Path) -> None:
 
 def test_it_says_where_the_extra_is_missing(tmp_path: Path) -> None:
     (tmp_path / "starlette.py").write_text("raise ImportError('no starlette')")
-    code, err = _run(tmp_path, tmp_path / "piece.motionmind", before=str(tmp_path))
-    assert (code, err.count("\n")) == (2, 1)
-    assert 'pip install "motionmind[studio]"' in err
+    ran = subprocess.run(
+        [sys.executable, "-m", "motionmind", "studio", "--no-browser", str(tmp_path / "piece.motionmind")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", "MOTIONMIND_HOME": str(tmp_path)},
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr.count("\n")) == (2, 1)
+    assert 'pip install "motionmind[studio]"' in ran.stderr
 
 
 def test_a_movement_begins_a_project_beside_it(tmp_path: Path) -> None:
@@ -177,18 +200,6 @@ def test_a_movement_begins_a_project_beside_it(tmp_path: Path) -> None:
             blocks = client.project()["piece"]["blocks"]
             assert [block["title"] for block in blocks] == ["one", "two"]
     assert (tmp_path / "bends.motionmind").is_file()
-
-
-def _run(home: Path, *arguments: object, before: str = "") -> tuple[int, str]:
-    ran = subprocess.run(
-        [sys.executable, "-m", "motionmind", "studio", "--no-browser", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env=os.environ | {"PYTHONPATH": f"{before}{os.pathsep}{ROOT}", "MOTIONMIND_HOME": str(home)},
-        check=False,
-    )
-    return ran.returncode, ran.stderr
 
 
 def _children(process: int) -> list[int]:
