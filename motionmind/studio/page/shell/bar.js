@@ -1,6 +1,7 @@
 /** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { preparing } from "../store.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
 import { shownKeys } from "./keys.js";
@@ -47,7 +48,7 @@ export function Bar({ studio }) {
 
 /** How far the studio is that gets ready for its first search. @param {{store: any}} props */
 function Readiness({ store }) {
-  const job = useChange(store, () => [...store.jobs.values()].find(({ kind, state }) => kind === "getting ready" && state === "running"));
+  const job = useChange(store, () => preparing(store));
   return (
     job &&
     html`<span class="hint readiness" role="status">${job.words}
