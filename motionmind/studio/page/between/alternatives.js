@@ -76,6 +76,7 @@ function Alternatives({ studio }) {
           : html`<${Waiting} key=${i} ends=${searching ? desk.ends : {}} begun=${!words} />`,
       )}
     </div>
+    <p class="hint chosen-words">${said(found[chosen]?.account)}</p>
     <footer class="row">
       ${quartet && html`<${Play} quartet=${quartet} ready=${found.length > 0} />`}
       <button class="button primary" data-testid="accept" disabled=${!found[chosen]} title="Put it onto the line of time (Enter)" onClick=${accept}>
@@ -83,6 +84,11 @@ function Alternatives({ studio }) {
       </button>
     </footer>
   </section>`;
+}
+
+/** What stands below each, for where there is no room below them. @param {any} account */
+function said(account) {
+  return account ? [account.usual, account.sure, ...account.beyond].filter(Boolean).join("; ") : "";
 }
 
 /** The place of one that is yet to be found: both its ends, pale. @param {any} props */
