@@ -177,18 +177,22 @@ def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
     page.wait_for_selector(FOUND, timeout=LONG)
     page.keyboard.press("3")
     assert page.get_by_test_id("alternative-3").get_attribute("aria-checked") == "true"
-    reach("[data-testid=alternative-3]")
+    focused = "document.activeElement.dataset.testid"
+    assert page.evaluate(focused) == "alternative-3"
     page.keyboard.press("ArrowDown")
     assert page.get_by_test_id("alternative-3").locator(".seen").inner_text() != ""
     page.keyboard.press("Enter")
     until(page, "studio.store.state.piece.blocks.length === 2")
     assert page.evaluate("studio.store.state.piece.seams[0].chosen") == 3
+    until(page, f"{focused} === 'posture-fifth'")  # the next one begins here
+    page.keyboard.press("t")
+    assert page.evaluate(focused) == "block-b1"
     page.keyboard.press("Control+z")
     until(page, "studio.store.state.piece.blocks.length === 0")
     page.keyboard.press("Control+Shift+z")
     until(page, "studio.store.state.piece.blocks.length === 2")
-    page.evaluate("document.activeElement.blur()")
-    reach("[role=tab]")
+    page.keyboard.press("p")
+    assert page.evaluate(focused) == "open-between"
     while not page.evaluate("document.activeElement.matches('[data-testid=open-take]')"):
         page.keyboard.press("ArrowDown")
     reach("[data-testid=export-bvh]")

@@ -1,6 +1,6 @@
 /** Alternatives side by side, in step: what each shows, how sure and how usual it is, and where each joint was seen. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { thumbnail } from "../places.js";
 import { preparing } from "../store.js";
 import { useChange, useKeys } from "../shell/hooks.js";
@@ -36,6 +36,14 @@ function Alternatives({ studio }) {
   const chosen = useChange(desk, () => desk.chosen);
   const dark = useChange(theme, () => theme.dark);
   const [quartet, setQuartet] = useState(/** @type {Quartet | null} */ (null));
+  const section = useRef(/** @type {any} */ (null));
+  // Whoever came from the gallery by keys goes on there.
+  useLayoutEffect(() => {
+    const before = /** @type {HTMLElement | null} */ (document.activeElement);
+    return () => {
+      if (section.current?.contains(document.activeElement) || document.activeElement === document.body) before?.focus();
+    };
+  }, []);
   useEffect(() => {
     const made = new Quartet(theme.dark);
     setQuartet(made);
@@ -53,13 +61,16 @@ function Alternatives({ studio }) {
       keys: [String(i + 1)],
       does: `choose alternative ${i + 1}`,
       group: GROUP,
-      act: () => desk.choose(i),
+      act: () => {
+        desk.choose(i);
+        document.getElementById(`alternative-${i}`)?.focus(); // where Enter accepts, and arrows go from joint to joint
+      },
     })),
     { keys: ["Enter"], does: "accept the one that is chosen", group: GROUP, act: accept },
     { keys: ["Escape"], does: "back to the viewer", group: GROUP, act: () => desk.show(false) },
   ]);
   const searching = state === "searching";
-  return html`<section class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
+  return html`<section ref=${section} class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
     <header class="row">
       <h2 class="grow">${heading(state, found.length)}</h2>
       <p class="hint" role="status">${searching && words && getting ? `${getting}; then it begins, and all else works meanwhile.` : words}</p>

@@ -19,6 +19,8 @@ export function Bar({ studio }) {
     { keys: ["Ctrl+z"], does: "undo", act: undo },
     { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
     { keys: ["d"], does: "dark paper, or light", act: () => viewer.theme.toggle() },
+    { keys: ["p"], does: "to the panels", act: () => focus(".rail [aria-selected=true]") },
+    { keys: ["t"], does: "to the time line", act: () => focus(".timeline .stretches [tabindex='0']") },
     { keys: ["?"], does: "these keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
@@ -44,6 +46,11 @@ export function Bar({ studio }) {
     </button>
     ${sheet && html`<${Sheet} studio=${studio} close=${() => setSheet(false)} />`}
   </header>`;
+}
+
+/** Let what is found first have the keys. @param {string} selector */
+function focus(selector) {
+  /** @type {HTMLElement | null} */ (document.querySelector(selector))?.focus();
 }
 
 /** How far the studio is that gets ready for its first search. @param {{store: any}} props */
