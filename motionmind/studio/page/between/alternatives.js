@@ -223,8 +223,9 @@ function Play({ quartet, ready }) {
       aria-label="Time of all alternatives"
       disabled=${!ready}
       onInput=${(/** @type {any} */ event) => {
+        const share = Number(event.target.value); // before pausing, which puts the line back
         player.pause();
-        player.seek(Number(event.target.value) * player.motion.end);
+        player.seek(share * player.motion.end);
       }}
     />`;
 }

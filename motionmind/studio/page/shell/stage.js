@@ -120,8 +120,9 @@ function Scrub({ viewer, moving }) {
   }, []);
   const seek = (/** @type {any} */ event) => {
     const { start, end } = player.motion;
+    const share = Number(event.target.value); // before pausing, which puts the line back to where the player is
     if (player.playing) player.pause();
-    player.seek(start + Number(event.target.value) * (end - start));
+    player.seek(start + share * (end - start));
   };
   return html`<input ref=${line} type="range" min="0" max="1" step="any" aria-label="Time" data-testid="scrub" disabled=${!moving} onInput=${seek} />
     <span ref=${made} class="made" title="The engine made this moment: it is not as recorded" data-testid="made" hidden>inserted</span>
