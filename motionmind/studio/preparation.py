@@ -10,11 +10,12 @@ Steps = Generator[tuple[int, int, bool]]  # how far it is, of how much, and whet
 Told = Generator[tuple[int, int, str, bool]]  # the same, with what is going on
 
 _FIRST, _REST = "getting ready, once", "getting the rest ready"
-_SOON = 5  # seconds and steps before which nobody knows how long it will take
+_SOON = 10  # steps before which nobody knows how long it will take: the first functions compile many others
+_LATELY = 15  # steps by which the pace is told
 
 
 def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
-    """Say of each step what is going on, and how long it will take as fast as it has gone until then.
+    """Say of each step what is going on, and how long it will take as fast as it has gone lately.
 
     How fast that is hangs on what else the computer does, so no usual time is promised. To close the iterator closes
     `steps`.
@@ -24,15 +25,16 @@ def told(steps: Steps, now: Callable[[], float] = time.monotonic) -> Told:
         now: returns the time in seconds.
     """
     try:
-        begun: tuple[float, int] | None = None
+        gone: list[tuple[float, int]] = []  # when how many were done
         was_ready = False
         for done, of, is_ready in steps:
-            if begun is None or is_ready != was_ready:
-                begun, was_ready = (now(), done), is_ready
-            seconds, gone = now() - begun[0], done - begun[1]
+            if is_ready != was_ready:
+                gone, was_ready = [], is_ready
+            gone.append((now(), done))
             words = _REST if is_ready else _FIRST
-            if seconds >= _SOON and gone >= _SOON:
-                words += f": {_duration(seconds * (of - done) / gone)}"
+            if done - gone[0][1] >= _SOON:
+                time_then, done_then = next((one for one in reversed(gone) if one[1] <= done - _LATELY), gone[0])
+                words += f": {_duration((now() - time_then) * (of - done) / (done - done_then))}"
             yield done, of, words, is_ready
     finally:
         steps.close()

@@ -320,7 +320,7 @@ def test_it_is_told_how_long_it_takes_to_get_ready_at_the_pace_that_it_goes() ->
     assert [next(found)[2] for _ in range(4)] == ["getting ready, once"] * 4
     assert [next(found) for _ in range(4)] == [
         (110, 160, "getting ready, once: about 2 minutes", False),
-        (120, 160, "getting ready, once: about 8 minutes", False),
+        (120, 160, "getting ready, once: about 9 minutes", False),
         (130, 190, "getting the rest ready", True),
         (189, 190, "getting the rest ready: a few seconds", True),
     ]
