@@ -12,22 +12,25 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
 HERE = Path(__file__).parent
 SIZE = {"width": 1200, "height": 750}  # pixels of the page
+TALL = {"width": 1200, "height": 900}  # where a panel says more
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 FILM_WIDTH = 800  # pixels
 PAUSE = 125  # milliseconds of the film between two pictures
 LONG = 120_000  # milliseconds: the first search compiles
-COLOURS = 160  # in a picture
+COLOURS = 256  # in a picture
+EACH = 20  # pixels of a colour that count: most of a page is paper
 
 
 def main() -> None:
@@ -39,6 +42,7 @@ def main() -> None:
         a_to_b(page, film)
         time_line(page, film)
         film.write(HERE.parent / "studio.gif")
+        page.set_viewport_size(TALL)
         variations(page)
         pose(page)
         movement(page, Path(folder))
@@ -84,7 +88,7 @@ class Film:
 
     def write(self, path: Path) -> None:
         """Write them as a GIF that goes round."""
-        palette = self._pictures[len(self._pictures) // 2].quantize(COLOURS)
+        palette = palette_of(self._pictures)
         first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in self._pictures]
         first.save(path, save_all=True, append_images=others, duration=PAUSE, loop=0, optimize=True)
 
@@ -94,14 +98,42 @@ def seen(page: Any) -> Image.Image:
     return Image.open(BytesIO(page.screenshot())).convert("RGB")
 
 
+def palette_of(pictures: Sequence[Image.Image]) -> Image.Image:
+    """Return a picture with colours for some pictures: half for what there is most of, half for what is small."""
+    pixels = np.concatenate([np.asarray(picture).reshape(-1, 3) for picture in pictures])
+    alike = (pixels >> 3).astype(np.int64) @ [1024, 32, 1]
+    order = np.argsort(alike, kind="stable")
+    _, starts, counts = np.unique(alike[order], return_index=True, return_counts=True)
+    number = np.arange(len(order)) - np.repeat(starts, counts)  # of a pixel among those of its colour
+    colours = [
+        colour
+        for some in (pixels, pixels[order[number < EACH]])
+        for colour in Image.fromarray(some[None]).quantize(COLOURS // 2).getpalette() or []
+    ]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours)
+    return palette
+
+
 def draw(page: Any, name: str) -> None:
     """Draw the page as it looks now."""
-    seen(page).quantize(COLOURS, dither=Image.Dither.NONE).save(HERE / f"{name}.png", optimize=True)
+    picture = seen(page)
+    drawn = picture.quantize(palette=palette_of([picture]), dither=Image.Dither.NONE)
+    drawn.save(HERE / f"{name}.png", optimize=True)
 
 
 def click(page: Any, name: str) -> None:
     """Click what has this test id."""
     page.get_by_test_id(name).first.click()
+
+
+def insert(page: Any, name: str, last: int = 0) -> None:
+    """Put a posture, or a clip up to its frame `last`, at the end of the time line."""
+    page.evaluate(
+        "([name, last]) => studio.api.edit({ edit: 'insert', id: `drawn-${name}`, source: `ballet/${name}`,"
+        " first: 0, last, mirrored: false, before: null })",
+        [name, last],
+    )
 
 
 def a_to_b(page: Any, film: Film) -> None:
@@ -125,11 +157,7 @@ def a_to_b(page: Any, film: Film) -> None:
 def time_line(page: Any, film: Film) -> None:
     """Let the piece grow, and look at what was inserted."""
     for posture in ("attitude", "bow"):
-        page.evaluate(
-            "posture => studio.api.edit({ edit: 'insert', id: `drawn-${posture}`, source: `ballet/${posture}`,"
-            " first: 0, last: 0, mirrored: false, before: null })",
-            posture,
-        )
+        insert(page, posture)
     page.wait_for_timeout(500)
     page.get_by_test_id("insertion-3").wait_for(timeout=LONG)
     page.wait_for_timeout(6000)
@@ -142,20 +170,30 @@ def time_line(page: Any, film: Film) -> None:
 
 
 def variations(page: Any) -> None:
-    """Vary the piece."""
-    click(page, "open-vary")
+    """Vary the piece, with a clip at its end, and look at both."""
+    insert(page, "adagio", 40)
+    page.get_by_test_id("insertion-4").wait_for(timeout=LONG)
     page.wait_for_timeout(3000)
+    click(page, "open-vary")
+    page.get_by_test_id("tile-3").wait_for(timeout=LONG)
+    page.get_by_test_id("depart").fill("25")
+    click(page, "beside")
+    page.wait_for_timeout(3000)
+    page.get_by_test_id("scrub").fill("0.7")
+    page.wait_for_timeout(1000)
     draw(page, "variations")
 
 
 def pose(page: Any) -> None:
     """Move a body by its hand."""
     click(page, "open-pose")
+    page.get_by_test_id("handle-pelvis").wait_for()
+    page.get_by_test_id("pose-from").select_option("ballet/arabesque")
     page.wait_for_timeout(2000)
     handle = page.get_by_test_id("handle-left_wrist")
     handle.focus()
-    for _ in range(6):
-        page.keyboard.press("ArrowUp")
+    for _ in range(8):
+        page.keyboard.press("Shift+ArrowUp")
     page.wait_for_timeout(1500)
     draw(page, "pose")
 

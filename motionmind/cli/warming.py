@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 NOTICE = "compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)"
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
+_SEARCHES = ("body/", "geometry/", "realise/", "search/")  # what a search needs, by folder
+_LATER = ("realise/sparse", "realise/steps", "search/pair_chain", "search/sample")  # of which it needs little
 _LOOK = 0.2  # seconds between two looks at what is compiled
 _AT_ONCE = 3  # processes at most that share the work
 _BACK = 10  # by which processes that stand back are nicer than others
@@ -75,21 +77,30 @@ def is_cold() -> bool:
 def compile_in_steps() -> Generator[tuple[int, int, bool]]:
     """Compile all beside other work, what a search needs first; to close the iterator ends it.
 
-    Yields the number of functions that are compiled, that of all, and whether those of a search are among them.
+    Yields the number of functions that are compiled, that of all, and whether those of a search are among them; until
+    they are, functions that no search calls are not counted.
     """
     from motionmind.jit import compiled_names, decorated_names, note_all_compiled
 
-    total, failed = len(decorated_names()), 0
+    failed = 0
     for is_ready, programs in ((False, [[search], [realise, seek]]), (True, [[draw, learn]])):
+        counted = decorated_names() if is_ready else _first_names()
         workers = _start(programs, stands_back=True)
         try:
             while any(worker.poll() is None for worker in workers):
-                yield min(len(compiled_names()), total), total, is_ready
+                yield len(compiled_names() & counted), len(counted), is_ready
         finally:
             _end(workers)
         failed += sum(worker.returncode != 0 for worker in workers)
     if not failed:
         note_all_compiled()
+
+
+def _first_names() -> frozenset[str]:
+    """Return the functions that a search needs, but for a few."""
+    from motionmind.jit import decorated_names
+
+    return frozenset(name for name in decorated_names() if name.startswith(_SEARCHES) and not name.startswith(_LATER))
 
 
 def announce_first_search() -> None:

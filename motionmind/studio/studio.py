@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import OrderedDict
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
 from motionmind.studio.events import Events
 from motionmind.studio.movements import Movements
+from motionmind.studio.preparation import Steps, told
 from motionmind.studio.project import Project
 from motionmind.studio.thumbnails import HEIGHT, Thumbnails, thumbnail
 from motionmind.studio.view import view_of
@@ -22,9 +23,7 @@ from motionmind.studio.workers import Job, Workers
 if TYPE_CHECKING:
     from motionmind.tween.engine import Engine
 
-Preparation = Generator[tuple[int, int, bool]]  # see `Workers.prepare`
 _ENGINES = 2  # that the server keeps loaded
-_READY = "getting ready, once, for half a minute"
 _FIRST = 2.0  # seconds in which the page comes first, and workers that start would keep it waiting
 
 
@@ -47,7 +46,7 @@ class Studio:
         project: Project,
         home: Path | None = None,
         processes: int | None = None,
-        first: Preparation | None = None,
+        first: Steps | None = None,
     ) -> None:
         """Set up a studio.
 
@@ -76,7 +75,7 @@ class Studio:
         threading.Thread(target=self._draw_first, daemon=True).start()
         asyncio.get_running_loop().call_later(_FIRST, self.workers.begin)
         if self._first is not None:
-            self._preparing = asyncio.create_task(self.workers.prepare("getting ready", _READY, self._first))
+            self._preparing = asyncio.create_task(self.workers.prepare("getting ready", told(self._first)))
 
     def _draw_first(self) -> None:
         """Read what the gallery lists, and draw its first picture, while the browser is yet to open the page."""

@@ -8,13 +8,14 @@ import os
 import sys
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from motionmind.errors import MotionMindError
+from motionmind.studio.preparation import Told
 from motionmind.studio.worker_loop import words_of, work
 
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
@@ -203,19 +204,18 @@ class Workers:
         self.go_on()
         return job
 
-    async def prepare(self, kind: str, words: str, steps: Generator[tuple[int, int, bool]]) -> None:
+    async def prepare(self, kind: str, steps: Told) -> None:
         """Take steps that spare the workers work, as a job that all others wait for until they may begin.
 
         Args:
             kind: what it is for, as the page knows it.
-            words: what is going on.
-            steps: yield how far it has come, of how much, and whether the others may begin; to close them ends it.
+            steps: the steps; to close them ends it.
         """
         job = self._held_by = self._add(Job(self, next(self._numbers), kind, (_nothing, ()), None, None, False))
-        job.state, job.words = "running", words
+        job.state = "running"
         try:
             while job.state == "running" and (step := next(steps, None)):
-                job.done, job.of, may_begin = step
+                job.done, job.of, job.words, may_begin = step
                 if may_begin:
                     self._release(job)
                 self._tell(job)

@@ -24,6 +24,7 @@ from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
 
 _Found = TypeVar("_Found")
+_MOST = 400  # MB that a server with one worker takes
 
 # For each line that it reads, forks a writer, which begins with what has been imported: it says its number and how many
 # blocks there are, appends edits as fast as it can, and says the number of each once it is on disk.
@@ -98,8 +99,13 @@ def test_a_server_that_is_killed_has_all_that_it_answered(tmp_path: Path) -> Non
 
 
 def test_workers_end_with_the_server_that_was_killed(tmp_path: Path) -> None:
-    with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, _):
+    with running(tmp_path / "piece.motionmind", home=tmp_path) as (process, client):
+        ends = {"a": {"key": "ballet/arabesque"}, "b": {"key": "ballet/fifth"}}
+        assert client.wait_for(client.post("/api/between", ends)["job"])["state"] == "done"
         workers = _until(lambda: [worker for child in _children(process.pid) for worker in _children(child)])
+        # The server, the process that workers are forked from, and the worker that searched.
+        kept = sum(map(_memory, [process.pid, *_children(process.pid)])) + max(map(_memory, workers))
+        assert kept < _MOST
         assert workers
         begun = [*_children(process.pid), *workers]
         assert all(b"multiprocessing" in _command(one) for one in begun)
@@ -208,6 +214,12 @@ def _children(process: int) -> list[int]:
         return [int(word) for task in tasks.iterdir() for word in (task / "children").read_text().split()]
     except OSError:
         return []
+
+
+def _memory(process: int) -> float:
+    """The memory that a process takes, its share of what it shares included, MB."""
+    told = Path(f"/proc/{process}/smaps_rollup").read_text()
+    return next(int(line.split()[1]) for line in told.splitlines() if line.startswith("Pss:")) / 1000
 
 
 def _command(process: int) -> bytes:

@@ -236,7 +236,9 @@ def test_own_movement_by_mouse(served: Served, open_page: Open, tmp_path: Path) 
     page.emulate_media(reduced_motion="no-preference")  # what is looked at plays then
     page.get_by_test_id("look").click()
     until(page, "studio.viewer.title.includes('bends.score') && studio.viewer.player.playing")
-    page.evaluate("studio.viewer.player.pause()")
+    page.get_by_test_id("scrub").fill("0.9")  # who takes hold of the time stops there
+    assert not page.evaluate("studio.viewer.player.playing")
+    assert float(page.get_by_test_id("scrub").input_value()) == pytest.approx(0.9)
     page.emulate_media(reduced_motion="reduce")
     page.get_by_test_id("put").click()
     until(page, "studio.store.state.piece.blocks.length === 1")

@@ -71,7 +71,22 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
 
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
     studio_page.emulate_media(reduced_motion="no-preference")
-    from_a_to_b(studio_page)
+    # What is sought is seen to be: both ends, and nothing to play yet.
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    studio_page.route("**/api/between", hold)
+    studio_page.get_by_test_id("posture-arabesque").click()
+    studio_page.get_by_test_id("posture-fifth").click()
+    until(studio_page, "document.querySelectorAll('.waiting img').length === 8")
+    play, time = studio_page.get_by_test_id("play-alternatives"), studio_page.get_by_label("Time of all alternatives")
+    assert play.is_disabled()
+    assert time.is_disabled()
+    assert time.input_value() == "0"
+    held[0].continue_()
+    studio_page.wait_for_selector(FOUND, timeout=LONG)
     assert [studio_page.get_by_test_id(f"alternative-{n}").count() for n in range(1, 6)] == [1, 1, 1, 1, 0]
     cards = studio_page.locator(".alternative .words")
     for text in cards.all_inner_texts():
@@ -79,7 +94,9 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
         assert "ballet" in text  # how usual it is
         assert "best" in text or "better" in text  # how sure
     until(studio_page, "document.querySelector('.alternatives input[type=range]').value > 0.1")
-    studio_page.get_by_test_id("play-alternatives").click()
+    time.fill("0.05")  # who takes hold of the time stops there
+    assert float(time.input_value()) == pytest.approx(0.05)
+    assert play.get_attribute("aria-label") == "Play all"
     for n in range(1, 5):
         assert painted(studio_page, f"[data-testid=alternative-{n}] > canvas") > 50
 
@@ -162,18 +179,22 @@ def test_it_all_goes_by_keyboard_alone(studio_page: Any) -> None:
     page.wait_for_selector(FOUND, timeout=LONG)
     page.keyboard.press("3")
     assert page.get_by_test_id("alternative-3").get_attribute("aria-checked") == "true"
-    reach("[data-testid=alternative-3]")
+    focused = "document.activeElement.dataset.testid"
+    assert page.evaluate(focused) == "alternative-3"
     page.keyboard.press("ArrowDown")
     assert page.get_by_test_id("alternative-3").locator(".seen").inner_text() != ""
     page.keyboard.press("Enter")
     until(page, "studio.store.state.piece.blocks.length === 2")
     assert page.evaluate("studio.store.state.piece.seams[0].chosen") == 3
+    until(page, f"{focused} === 'posture-fifth'")  # the next one begins here
+    page.keyboard.press("t")
+    assert page.evaluate(focused) == "block-b1"
     page.keyboard.press("Control+z")
     until(page, "studio.store.state.piece.blocks.length === 0")
     page.keyboard.press("Control+Shift+z")
     until(page, "studio.store.state.piece.blocks.length === 2")
-    page.evaluate("document.activeElement.blur()")
-    reach("[role=tab]")
+    page.keyboard.press("p")
+    assert page.evaluate(focused) == "open-between"
     while not page.evaluate("document.activeElement.matches('[data-testid=open-take]')"):
         page.keyboard.press("ArrowDown")
     reach("[data-testid=export-bvh]")
@@ -218,9 +239,30 @@ def test_the_sheet_of_keys_tells_what_they_do(studio_page: Any) -> None:
 
 
 def test_a_telephone_shows_and_approves(studio_page: Any) -> None:
-    studio_page.set_viewport_size({"width": 390, "height": 844})
-    from_a_to_b(studio_page)
-    studio_page.get_by_test_id("alternative-2").click()
-    studio_page.get_by_test_id("accept").click()
-    until(studio_page, "studio.store.state.piece.blocks.length === 2")
-    assert studio_page.evaluate("document.documentElement.scrollWidth") <= 390
+    page = studio_page
+    page.set_viewport_size({"width": 390, "height": 844})
+    from_a_to_b(page)
+    page.get_by_test_id("alternative-2").click()
+    assert "ballet" in page.locator(".chosen-words").inner_text()  # how usual, and how sure
+    page.get_by_test_id("accept").click()
+    until(page, "studio.store.state.piece.blocks.length === 2")
+    # What was inserted is flipped through, and seen to be inserted; it is locked, or left out.
+    page.get_by_test_id("insertion-1").click()
+    assert page.get_by_test_id("made").is_hidden()
+    page.get_by_test_id("next").click()
+    until(page, "studio.store.state.piece.seams[0].chosen === 3")
+    page.get_by_test_id("made").wait_for()
+    page.get_by_test_id("lock").click()
+    until(page, "studio.store.state.piece.seams[0].decision === 'locked'")
+    page.get_by_test_id("lock").click()
+    until(page, "studio.store.state.piece.seams[0].decision === 'open'")
+    page.get_by_test_id("discard").click()
+    until(page, "studio.store.state.piece.seams[0].state === 'discarded'")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    # A moment of the piece that is posed is called so.
+    page.get_by_test_id("undo").click()
+    page.get_by_test_id("made").wait_for()
+    page.get_by_test_id("open-pose").click()
+    page.locator(".caption .name").get_by_text("piece at 1.").wait_for()
+    chosen = page.get_by_test_id("pose-from").evaluate("(select) => select.selectedOptions[0].textContent")
+    assert chosen.startswith("piece at 1.")

@@ -308,6 +308,8 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
     said = "document.querySelector('[data-testid=ruler]').getAttribute('aria-valuetext')"
     wait_for(page, f"{said} === '1.00 seconds, eight 1, count 2'")
     box_at_rest(page, "block-b2")
+    pictures = "[...document.querySelectorAll('[data-testid=block-b2] img')].map((one) => one.getAttribute('src'))"
+    before = page.evaluate(pictures)
     wide = page.locator(".timeline .inner").evaluate("(element) => element.clientWidth")
     page.get_by_test_id("block-b2").hover()
     page.keyboard.down("Control")
@@ -315,6 +317,11 @@ def test_the_ruler_counts_and_the_piece_is_zoomed(page: Any) -> None:
     # A wheel's turn comes when the browser is ready for it, and counts as it is with the keys that are down then.
     wait_for(page, f"document.querySelector('.timeline .inner').clientWidth > {2 * wide}")
     page.keyboard.up("Control")
+    # A stretch is pictured all along, closer when it is wider; pictures that were there stay.
+    wait_for(page, f"{pictures}.length > {len(before)}")
+    after = page.evaluate(pictures)
+    assert len(set(after)) == len(after)
+    assert set(before) <= set(after)
 
 
 def test_a_finger_scrolls_and_drags_what_it_has_selected(studio_server: Any, page: Any, browser: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Generator
+from collections.abc import AsyncIterator, Callable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from motionmind.errors import MotionMindError
 from motionmind.studio import events as events_module
 from motionmind.studio import workers as workers_module
 from motionmind.studio.events import Events
+from motionmind.studio.preparation import Steps, Told, told
 from motionmind.studio.workers import Job, JobCancelledError, Workers
 from motionmind.tween.engine import Engine
 
@@ -257,19 +258,19 @@ def test_streams_are_limited_and_those_that_end_make_room() -> None:
 def test_jobs_wait_for_what_makes_them_fast_and_no_longer() -> None:
     ended: list[bool] = []
 
-    def steps(may_begin: threading.Event, over: threading.Event) -> Generator[tuple[int, int, bool]]:
+    def steps(may_begin: threading.Event, over: threading.Event) -> Told:
         try:
             for number in count(1):
                 if over.is_set():
                     return
-                yield number, 1000, may_begin.is_set()
+                yield number, 1000, "once", may_begin.is_set()
         finally:
             ended.append(True)
 
     async def check(workers: Workers, told: list[dict[str, Any]]) -> None:
         may_begin, over = threading.Event(), threading.Event()
         await workers.submit("sum", working.add, 1, 1).result()  # the worker has begun
-        preparing = asyncio.create_task(workers.prepare("getting ready", "once", steps(may_begin, over)))
+        preparing = asyncio.create_task(workers.prepare("getting ready", steps(may_begin, over)))
         await asyncio.sleep(0)
         job = workers.submit("sum", working.add, 2, 3, urgent=True)
         while sum(one["kind"] == "getting ready" for one in told) < 3:
@@ -284,7 +285,7 @@ def test_jobs_wait_for_what_makes_them_fast_and_no_longer() -> None:
         assert (last["state"], last["words"], last["of"]) == ("done", "once", 1000)
         # One that is cancelled keeps nobody waiting.
         over.clear()
-        again = asyncio.create_task(workers.prepare("getting ready", "again", steps(threading.Event(), over)))
+        again = asyncio.create_task(workers.prepare("getting ready", steps(threading.Event(), over)))
         await asyncio.sleep(0)
         waiting = workers.submit("sum", working.add, 3, 4)
         next(one for one in workers.jobs if one.kind == "getting ready").cancel()
@@ -293,3 +294,35 @@ def test_jobs_wait_for_what_makes_them_fast_and_no_longer() -> None:
         assert ended == [True, True]
 
     run(check)
+
+
+def test_it_is_told_how_long_it_takes_to_get_ready_at_the_pace_that_it_goes() -> None:
+    clock = [0.0]
+    ended: list[bool] = []
+
+    def steps() -> Steps:
+        try:
+            for done in range(100, 104):
+                clock[0] += 1.0
+                yield done, 160, False
+            clock[0] = 20.0
+            yield 110, 160, False  # ten in 19 s
+            clock[0] = 219.0
+            yield 120, 160, False  # the computer has come to be busy
+            clock[0] = 220.0
+            yield 130, 190, True
+            clock[0] = 300.0
+            yield 189, 190, True
+        finally:
+            ended.append(True)
+
+    found = told(steps(), lambda: clock[0])
+    assert [next(found)[2] for _ in range(4)] == ["getting ready, once"] * 4
+    assert [next(found) for _ in range(4)] == [
+        (110, 160, "getting ready, once: about 2 minutes", False),
+        (120, 160, "getting ready, once: about 9 minutes", False),
+        (130, 190, "getting the rest ready", True),
+        (189, 190, "getting the rest ready: a few seconds", True),
+    ]
+    found.close()
+    assert ended == [True]

@@ -4,6 +4,7 @@ import { Api } from "./api.js";
 import { movementAt, thumbnail } from "./places.js";
 
 const SEEN = 12; // postures of the gallery that are seen before anybody scrolls
+const FIRST = 3; // of them, for which the body in 3D waits: where there is no GPU it takes longer than all else
 
 /** Requests to the server, the first of which are under way. */
 export const api = new Api();
@@ -11,9 +12,11 @@ export const api = new Api();
 /** @param {any} gallery */
 function expectPictures(gallery) {
   const postures = [gallery.own, ...gallery.corpora.map((/** @type {any} */ corpus) => corpus.postures)].flat();
-  for (const { key } of postures.slice(0, SEEN)) new Image().src = thumbnail(key, 0);
+  const pictures = postures.slice(0, SEEN).map(({ key }) => Object.assign(new Image(), { src: thumbnail(key, 0) }));
   if (postures.length > 0) api.expect(movementAt(postures[0].key));
+  return Promise.allSettled(pictures.slice(0, FIRST).map((picture) => picture.decode()));
 }
 
 api.expect(`/api/project?window=${api.window}`);
-api.expect("/api/gallery").then(expectPictures, () => {}); // who needs it hears why it is not there
+/** @type {Promise<unknown>} over when the gallery's first pictures have come, or will not */
+export const pictured = api.expect("/api/gallery").then(expectPictures, () => {}); // who needs it hears why it is not there

@@ -1,7 +1,7 @@
 /** The page put together: what every panel gets as `studio`, and where each panel stands. */
 
-import { html, render } from "./vendor/htm-preact-standalone.js";
-import { api } from "./begin.js";
+import { html, render, useLayoutEffect, useRef } from "./vendor/htm-preact-standalone.js";
+import { api, pictured } from "./begin.js";
 import * as between from "./between/panel.js";
 import * as take from "./export/panel.js";
 import * as movement from "./imports/panel.js";
@@ -41,9 +41,11 @@ function Studio({ studio, open }) {
   const name = useChange(open, () => open.panel);
   const { views, about } = PANELS.find((panel) => panel.name === name) ?? PANELS[0];
   const Centre = "Centre" in views ? views.Centre : null;
+  const aside = useRef(/** @type {any} */ (null));
+  useLayoutEffect(() => (aside.current.scrollTop = 0), [name]); // where the panel before was scrolled to is not where this begins
   return html`<${Bar} studio=${studio} />
     <${Rail} name=${name} open=${open} />
-    <aside class="panel" aria-label="Panel">
+    <aside ref=${aside} class="panel" aria-label="Panel">
       <div id="panel" role="tabpanel" aria-label=${about} data-testid=${`panel-${name}`}>
         <${views.Panel} key=${name} studio=${studio} />
       </div>
@@ -88,6 +90,11 @@ function Rail({ name, open }) {
   </nav>`;
 }
 
+/** Wait until what is on the page now is painted. */
+function painted() {
+  return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+}
+
 async function start() {
   const open = new Open();
   const toasts = new Toasts();
@@ -101,6 +108,8 @@ async function start() {
     toasts,
     keys,
     window: api.window,
+    /** Wait until the first small pictures are painted. @returns {Promise<unknown>} */
+    pictured: () => pictured.then(painted),
     open: (/** @type {string} */ panel) => open.set(panel),
     say: toasts.say.bind(toasts),
     /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */

@@ -82,6 +82,11 @@ export class Store extends EventTarget {
   }
 }
 
+/** The job that makes searches fast the first time, while it runs. @param {Store} store @returns {any} */
+export function preparing(store) {
+  return [...store.jobs.values()].find(({ kind, state }) => kind === "getting ready" && state === "running");
+}
+
 /**
  * What `pick` takes from the store; the view is made again when that changes.
  * @template T

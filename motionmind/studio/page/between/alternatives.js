@@ -1,6 +1,8 @@
 /** Alternatives side by side, in step: what each shows, how sure and how usual it is, and where each joint was seen. */
 
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { thumbnail } from "../places.js";
+import { preparing } from "../store.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { deskOf } from "./desk.js";
@@ -30,9 +32,18 @@ function Alternatives({ studio }) {
   const found = useChange(desk, () => desk.found);
   const state = useChange(desk, () => desk.state);
   const words = useChange(desk, () => desk.words);
+  const getting = useChange(studio.store, () => preparing(studio.store)?.words);
   const chosen = useChange(desk, () => desk.chosen);
   const dark = useChange(theme, () => theme.dark);
   const [quartet, setQuartet] = useState(/** @type {Quartet | null} */ (null));
+  const section = useRef(/** @type {any} */ (null));
+  // Whoever came from the gallery by keys goes on there.
+  useLayoutEffect(() => {
+    const before = /** @type {HTMLElement | null} */ (document.activeElement);
+    return () => {
+      if (section.current?.contains(document.activeElement) || document.activeElement === document.body) before?.focus();
+    };
+  }, []);
   useEffect(() => {
     const made = new Quartet(theme.dark);
     setQuartet(made);
@@ -50,16 +61,19 @@ function Alternatives({ studio }) {
       keys: [String(i + 1)],
       does: `choose alternative ${i + 1}`,
       group: GROUP,
-      act: () => desk.choose(i),
+      act: () => {
+        desk.choose(i);
+        document.getElementById(`alternative-${i}`)?.focus(); // where Enter accepts, and arrows go from joint to joint
+      },
     })),
     { keys: ["Enter"], does: "accept the one that is chosen", group: GROUP, act: accept },
     { keys: ["Escape"], does: "back to the viewer", group: GROUP, act: () => desk.show(false) },
   ]);
   const searching = state === "searching";
-  return html`<section class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
+  return html`<section ref=${section} class="centre alternatives" data-testid="alternatives" data-state=${state} aria-label="Alternatives" aria-busy=${String(searching)}>
     <header class="row">
       <h2 class="grow">${heading(state, found.length)}</h2>
-      <p class="hint" role="status">${words}</p>
+      <p class="hint" role="status">${searching && words && getting ? `${getting}; then it begins, and all else works meanwhile.` : words}</p>
       ${searching && html`<button class="button" onClick=${() => desk.stop()}>Cancel</button>`}
       <button class="button quiet icon" aria-label="Back to the viewer" title="Back to the viewer (Esc)" onClick=${() => desk.show(false)}>
         ${icon("close")}
@@ -70,18 +84,33 @@ function Alternatives({ studio }) {
       ${Array.from({ length: state === "found" ? found.length : COUNT }, (_, i) =>
         found[i]
           ? html`<${Alternative} key=${i} desk=${desk} quartet=${quartet} index=${i} chosen=${chosen === i} account=${found[i].account} motion=${found[i].motion} />`
-          : html`<div class="alternative card waiting" key=${i}>
-              <div class="window">${searching && html`<span class="hint">looking…</span>`}</div>
-            </div>`,
+          : html`<${Waiting} key=${i} ends=${searching ? desk.ends : {}} begun=${!words} />`,
       )}
     </div>
+    <p class="hint chosen-words">${said(found[chosen]?.account)}</p>
     <footer class="row">
-      ${quartet && html`<${Play} quartet=${quartet} />`}
+      ${quartet && html`<${Play} quartet=${quartet} ready=${found.length > 0} />`}
       <button class="button primary" data-testid="accept" disabled=${!found[chosen]} title="Put it onto the line of time (Enter)" onClick=${accept}>
         ${icon("check")} Accept ${found.length > 1 ? chosen + 1 : ""}
       </button>
     </footer>
   </section>`;
+}
+
+/** What stands below each, for where there is no room below them. @param {any} account */
+function said(account) {
+  return account ? [account.usual, account.sure, ...account.beyond].filter(Boolean).join("; ") : "";
+}
+
+/** The place of one that is yet to be found: both its ends, pale. @param {any} props */
+function Waiting({ ends, begun }) {
+  const places = [ends.a, ends.b].filter(Boolean);
+  return html`<div class="alternative card waiting">
+    <div class="window">
+      ${places.length > 0 && html`<div>${places.map(({ key, frame }) => html`<img src=${thumbnail(key, frame, 128)} alt="" />`)}</div>
+        <span class="hint">${begun ? "looking…" : "waiting…"}</span>`}
+    </div>
+  </div>`;
 }
 
 /** @param {string} state @param {number} count */
@@ -170,17 +199,18 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
   </div>`;
 }
 
-/** @param {{quartet: Quartet}} props */
-function Play({ quartet }) {
+/** @param {{quartet: Quartet, ready: boolean}} props */
+function Play({ quartet, ready }) {
   const { player } = quartet;
   const playing = useChange(player, () => player.playing);
   const line = useRef(/** @type {any} */ (null));
   useEffect(() => {
-    const update = () => (line.current.value = String(player.time / Math.max(player.motion.end, 1e-9)));
+    const update = () => (line.current.value = String(player.motion.end ? player.time / player.motion.end : 0));
+    update();
     player.addEventListener("change", update);
     return () => player.removeEventListener("change", update);
   }, [quartet]);
-  return html`<button class="button icon" data-testid="play-alternatives" aria-label=${playing ? "Pause all" : "Play all"} title="Play, pause (space)" onClick=${() => player.toggle()}>
+  return html`<button class="button icon" data-testid="play-alternatives" disabled=${!ready} aria-label=${playing ? "Pause all" : "Play all"} title="Play, pause (space)" onClick=${() => player.toggle()}>
       ${icon(playing ? "pause" : "play")}
     </button>
     <input
@@ -191,9 +221,11 @@ function Play({ quartet }) {
       max="1"
       step="any"
       aria-label="Time of all alternatives"
+      disabled=${!ready}
       onInput=${(/** @type {any} */ event) => {
+        const share = Number(event.target.value); // before pausing, which puts the line back
         player.pause();
-        player.seek(Number(event.target.value) * player.motion.end);
+        player.seek(share * player.motion.end);
       }}
     />`;
 }

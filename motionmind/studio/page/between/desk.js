@@ -130,7 +130,7 @@ export class Desk extends EventTarget {
     const job = this.#latest;
     if (!job || job === this.seen) return;
     this.seen = job;
-    this.words = job.state === "waiting" ? this.#reason() : "";
+    this.words = job.state === "waiting" ? "It waits until the engine is free." : "";
     if (job.state === "failed") {
       this.#fail(job.words);
       return;
@@ -158,12 +158,6 @@ export class Desk extends EventTarget {
       this.found = [...this.found, { account, motion }];
       this.#changed();
     }
-  }
-
-  /** Why the search has not begun yet. */
-  #reason() {
-    const first = [...this.studio.store.jobs.values()].some(({ kind, state }) => kind === "getting ready" && state === "running");
-    return first ? "It begins when the studio is ready, which takes half a minute, once." : "It waits until the engine is free.";
   }
 
   /** The job that searches, as it was told of last. */

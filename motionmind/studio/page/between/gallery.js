@@ -49,7 +49,7 @@ export function Gallery({ studio }) {
 async function greet(studio, gallery) {
   const first = [gallery.own, ...gallery.corpora.flatMap((/** @type {any} */ one) => [one.postures, one.clips])].flat()[0];
   if (!first || studio.viewer.motion || studio.store.state.piece.blocks.length > 0) return;
-  const motion = await movement(studio.api, first.key);
+  const [motion] = await Promise.all([movement(studio.api, first.key), studio.pictured()]);
   if (!studio.viewer.motion) studio.viewer.show(motion, { title: first.title });
 }
 

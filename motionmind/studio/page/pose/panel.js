@@ -51,7 +51,7 @@ export function Panel({ studio }) {
 function Start({ studio }) {
   const editor = editorOf(studio);
   const postures = useGallery(studio);
-  const open = (/** @type {string} */ key, frame = 0) => studio.act(() => editor.open(key, frame));
+  const open = (/** @type {string} */ key, frame = 0, title = "") => studio.act(() => editor.open(key, frame, title));
   const drop = (/** @type {DragEvent} */ event) => {
     event.preventDefault();
     const given = event.dataTransfer?.getData("application/x-motionmind-posture");
@@ -65,7 +65,7 @@ function Start({ studio }) {
       <h3>Start from</h3>
       <select
         data-testid="pose-from"
-        value=${editor.key}
+        value=${postures.some(({ of }) => of.some(({ key }) => key === editor.key)) ? editor.key : ""}
         onChange=${(/** @type {any} */ event) => event.target.value && open(event.target.value)}
       >
         <option value="">${editor.title || "a posture"}</option>
@@ -77,7 +77,7 @@ function Start({ studio }) {
     </label>
     ${
       moment &&
-      html`<button class="button" data-testid="pose-moment" onClick=${() => open(moment.key, moment.frame)}>
+      html`<button class="button" data-testid="pose-moment" onClick=${() => open(moment.key, moment.frame, momentName(studio))}>
         Pose the moment that is shown
       </button>`
     }
@@ -156,7 +156,12 @@ function toFloor(editor) {
 async function start(studio) {
   const { moment } = studio.viewer;
   const from = moment ?? listed(await studio.api.get("/api/gallery"))[0]?.of[0];
-  if (from) await editorOf(studio).open(from.key, from.frame ?? 0);
+  if (from) await editorOf(studio).open(from.key, from.frame ?? 0, moment ? momentName(studio) : "");
+}
+
+/** What the moment that is shown is called where it is the piece's; "" leaves it to its movement's title. @param {any} studio */
+function momentName({ viewer, store }) {
+  return viewer.isHome ? `${store.state.title || "the piece"} at ${viewer.player.time.toFixed(1)} s` : "";
 }
 
 /** The postures that there are, in groups. @param {any} studio */

@@ -68,13 +68,14 @@ export class Editor extends EventTarget {
     );
   }
 
-  /** Open a frame of a movement. @param {string} key @param {number} frame */
-  async open(key, frame = 0) {
+  /** Open a frame of a movement. @param {string} key @param {number} frame @param {string} name the movement's title if "" */
+  async open(key, frame = 0, name = "") {
     const [told, source] = await Promise.all([
       this.studio.api.post("/api/pose/open", { key, frame }),
       movement(this.studio.api, key),
     ]);
-    const { joints, handles, title, mirrors } = told;
+    const { joints, handles, mirrors } = told;
+    const title = name || told.title;
     const shown = told.rotations.length ? { rotations: told.rotations, root: told.root } : this.posture;
     Object.assign(this, { key, title, joints, handles, mirrors, selected: handles[0]?.on ?? "", dragged: "", words: "" });
     Object.assign(this, { past: [], future: [], began: null, released: new Set(), motion: new Posed(source, shown) });

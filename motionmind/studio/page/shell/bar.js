@@ -1,6 +1,7 @@
 /** The bar above everything: the piece's title, undo and redo, paper, keys, and whether the studio is there. */
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
+import { preparing } from "../store.js";
 import { useChange, useKeys } from "./hooks.js";
 import { icon } from "./icons.js";
 import { shownKeys } from "./keys.js";
@@ -18,6 +19,8 @@ export function Bar({ studio }) {
     { keys: ["Ctrl+z"], does: "undo", act: undo },
     { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },
     { keys: ["d"], does: "dark paper, or light", act: () => viewer.theme.toggle() },
+    { keys: ["p"], does: "to the panels", act: () => focus(".rail [aria-selected=true]") },
+    { keys: ["t"], does: "to the time line", act: () => focus(".timeline .stretches [tabindex='0']") },
     { keys: ["?"], does: "these keys", act: () => setSheet(true) },
   ]);
   return html`<header class="bar">
@@ -45,9 +48,14 @@ export function Bar({ studio }) {
   </header>`;
 }
 
+/** Let what is found first have the keys. @param {string} selector */
+function focus(selector) {
+  /** @type {HTMLElement | null} */ (document.querySelector(selector))?.focus();
+}
+
 /** How far the studio is that gets ready for its first search. @param {{store: any}} props */
 function Readiness({ store }) {
-  const job = useChange(store, () => [...store.jobs.values()].find(({ kind, state }) => kind === "getting ready" && state === "running"));
+  const job = useChange(store, () => preparing(store));
   return (
     job &&
     html`<span class="hint readiness" role="status">${job.words}

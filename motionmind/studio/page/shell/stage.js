@@ -99,9 +99,11 @@ function Scrub({ viewer, moving }) {
   const { player } = viewer;
   const line = useRef(/** @type {any} */ (null));
   const clock = useRef(/** @type {any} */ (null));
+  const made = useRef(/** @type {any} */ (null));
   useEffect(() => {
     const update = () => {
       const { start, end } = player.motion;
+      made.current.hidden = !viewer.motion?.insertedAt(player.time);
       const span = Math.max(end - start, 1e-9);
       line.current.value = String((player.time - start) / span);
       const words = `${(player.time - start).toFixed(1)} of ${(end - start).toFixed(1)} s`;
@@ -118,9 +120,11 @@ function Scrub({ viewer, moving }) {
   }, []);
   const seek = (/** @type {any} */ event) => {
     const { start, end } = player.motion;
+    const share = Number(event.target.value); // before pausing, which puts the line back to where the player is
     if (player.playing) player.pause();
-    player.seek(start + Number(event.target.value) * (end - start));
+    player.seek(start + share * (end - start));
   };
   return html`<input ref=${line} type="range" min="0" max="1" step="any" aria-label="Time" data-testid="scrub" disabled=${!moving} onInput=${seek} />
+    <span ref=${made} class="made" title="The engine made this moment: it is not as recorded" data-testid="made" hidden>inserted</span>
     <span ref=${clock} class="hint numbers clock"></span>`;
 }

@@ -159,9 +159,14 @@ export class Actions {
     }
   }
 
+  /** Show an insertion's alternative `by` places on: at the playhead if it is in it, or else in its middle. */
   flip(by) {
     const { seam } = this.item ?? {};
-    return seam && this.edit(flip(seam, by));
+    const change = seam && flip(seam, by);
+    if (!change) return undefined;
+    const { at, seconds } = seam;
+    if (this.time <= at || this.time >= at + seconds) this.seek(at + seconds / 2);
+    return this.edit(change);
   }
 
   lock() {

@@ -6,6 +6,9 @@ import { inSight, nameOf, selectionOf, shown } from "./items.js";
 import { clock } from "./scale.js";
 
 const LEAST = 28; // pixels of a held posture, which takes no time
+const APART = 100; // pixels from one picture of a stretch to the next, at least
+const NAMED = 52; // pixels before a stretch's name
+const PICTURES = 16; // of a stretch, at most
 const ROOM = 300; // pixels beside what is in sight that are there already
 
 /** A word and a sign for each state of a seam; its pattern is in timeline.css. */
@@ -31,6 +34,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
       const change = mine?.kind === "trim" ? trimmed(block, mine, does.times(block)) : null;
       const held = block.first === block.last;
       const width = held ? LEAST : (change?.seconds ?? block.seconds) * sight.scale;
+      const strip = held || block.missing ? [] : pictures(block, sight.scale);
       const left = (block.at + (change?.later ?? 0)) * sight.scale - (held ? LEAST / 2 : 0);
       const classes = ["stretch", held && "held", block.mirrored && "mirrored", block.missing && "missing", mine?.kind === "move" && "moving"];
       return html`<div
@@ -52,7 +56,8 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
         }}
       >
         ${width > 18 && !block.missing && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
-        ${width > 70 && html`<span class="name cut">${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
+        ${strip.map(({ x, frame }) => html`<img key=${x} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
+        ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAMED}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
         ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
       </div>`;
     })}
@@ -124,6 +129,14 @@ export function Wishes({ piece, sight, thumbnail }) {
       </div>`;
     })}
   </div>`;
+}
+
+/** Where else than at its beginning a stretch is pictured; twice as often when it is twice as wide, so that all others stay. */
+function pictures({ first, last, seconds }, scale) {
+  const wide = seconds * scale;
+  const count = Math.min(2 ** Math.floor(Math.log2(wide / APART)), PICTURES, last - first);
+  const later = Array.from({ length: Math.max(Math.ceil(count) - 1, 0) }, (_, i) => (i + 1) / count);
+  return later.map((share) => ({ x: share * wide, frame: first + Math.round(share * (last - first)) }));
 }
 
 /** The numbers of those items that are in sight, or nearly. */

@@ -101,7 +101,7 @@ function usePlayed(studio, movements, { parts }) {
     if (parts.length === 0) return undefined;
     let stale = false;
     const shown = async () => {
-      await movements.load(parts[0].key);
+      await Promise.all([movements.load(parts[0].key), studio.pictured()]);
       if (stale) return;
       const composed = new Composed(parts, movements, studio.store.state.title ?? "");
       setJoints(composed.joints);

@@ -70,7 +70,7 @@ function OfSeam({ does, seam, sheet }) {
   const any = alternatives.length > 0;
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
-      <b>${any ? `Insertion, ${clock(seam.seconds)} s` : "Seam"}</b>${" "}
+      <b>${state === "inserted" ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
       <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : words}</span>
     </p>
     ${any &&

@@ -82,6 +82,7 @@ export function Panel({ studio }) {
       <button class="button" data-testid="beside" aria-pressed=${view.beside} title="Show the original and the variation beside each other"
         onClick=${view.toggle}>Beside</button>
     </div>
+    ${!proposal && !error && html`<p class="hint" role="status">The piece is being laid out on the attractor…</p>`}
     ${error && html`<p class="said error" role="alert" data-testid="vary-error">${error}</p>`}
     ${shown && html`<${Order} studio=${studio} varying=${varying} shown=${shown} isPiece=${isPiece} view=${view} />`}
     <${Details} varying=${varying} />
@@ -105,7 +106,7 @@ function Order({ studio, varying, shown, isPiece, view }) {
     </div>
     ${selected &&
     !varying.keeps(selected) &&
-    html`<button class="button" data-testid="keep-selected" onClick=${() => varying.stay(selected)}>Keep the stretch selected on the time line</button>`}
+    html`<button class="button" data-testid="keep-selected" title="Keep the stretch that is selected on the time line where it is" onClick=${() => varying.stay(selected)}>Keep the selected stretch</button>`}
     <${Tiles} piece=${shown} kept=${proposal?.kept ?? []} locked=${locked}
       onKeep=${(/** @type {string} */ id) => varying.keep(id)} onPlay=${(/** @type {any} */ block) => view.look(block.at)} />
     <p class="hint">Keep what pleases: it stays where it is, and the rest is varied anew.</p>
@@ -166,7 +167,7 @@ function useView(studio, varying, piece) {
     );
     if (varying.proposal !== proposal) return; // another was asked for meanwhile
     const { viewer } = studio;
-    const title = both ? "The piece, and its variation" : "The variation";
+    const title = both ? "Piece, variation" : "The variation";
     viewer.show(both ? original : own, { time, beside: both ? own : undefined, title, look: !looking });
   };
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
