@@ -4,13 +4,13 @@
 the square root of 2. Seen along a few directions it is never more; so a k-d tree of what is seen there names the
 founders of clusters that may be near (Bentley, "Multidimensional binary search trees used for associative searching",
 CACM 18:509, 1975), and these are compared, until no other can be nearer. Where postures differ in all their joints
-there are ever more that may be; no more than the last of LOOKED_AT are compared, and the nearest of all may then be
+there are ever more that may be; no more than LOOKED_AT are compared, and the nearest of all may then be
 missed. In corpora of some thousand postures none is.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,15 +19,13 @@ from motionmind.body.limbs import parts_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
-from motionmind.geometry.distances import squared_distance
+from motionmind.geometry.distances import squared_distance, squared_turn
 from motionmind.jit import jit
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
+from motionmind.learned.neighbours import node_bounds
 
 ALIKE = 0.2  # radians a joint (root mean square) within which postures of a part are in one cluster
 DIRECTIONS = 6  # in which postures are seen by a tree; it finds little in more
-LOOKED_AT = 8, 32  # founders that are compared with a posture, those that look nearest: the first, then all
+LOOKED_AT = 32  # founders that are compared with a posture at most, those that look nearest
 BLOCK = 2048  # postures that are compared at a time
 SHOWN = 4096  # postures that show the directions
 SLACK = 1e-6  # of rounding, in squared distances
@@ -61,45 +59,57 @@ def clusters_of(skeleton: Skeleton, orientations: Floats, workshop: Workshop | N
 def clusters(orientations: Floats, within: float, workshop: Workshop | None = None) -> Ints:
     """Return the clusters [N] of one part's orientations [N, m, 4]; founders are more than `within` apart, squared."""
     seen = _seen(orientations, workshop or Workshop())
-    forest, founders = _Forest(seen), np.zeros(0, dtype=np.int64)
+    forest: list[_Tree] = []
+    founders = np.zeros(0, dtype=np.int64)
     for start in range(0, len(orientations), BLOCK):
-        here = np.arange(start, min(start + BLOCK, len(orientations)))
-        far = here
-        for tree, own in forest.trees:
-            least, _ = _nearest(tree, own, orientations, seen, far, within)
-            far = far[least > within]
+        far = np.arange(start, min(start + BLOCK, len(orientations)))
+        for tree in forest:
+            far = far[_nearest(tree, orientations, seen, far, within)[0] > within]
         founding = _found(np.ascontiguousarray(orientations[far]), np.ascontiguousarray(seen[far]), within)
-        forest.plant(far[founding])
+        _plant(forest, far[founding], seen)
         founders = np.concatenate([founders, far[founding]])
-    tree = _tree(seen[founders])
+    tree = _grow(founders, seen)
     out = np.empty(len(orientations), dtype=np.int64)
     for start in range(0, len(orientations), BLOCK):
         here = np.arange(start, min(start + BLOCK, len(orientations)))
-        out[here] = _nearest(tree, founders, orientations, seen, here)[1]
+        out[here] = _nearest(tree, orientations, seen, here)[1]
     return out
 
 
-class _Forest:
-    """Trees of founders: each new one joins those before it that are no larger, so there are few, and each founder is
-    in few of those that are made."""
+class _Tree(NamedTuple):
+    """A k-d tree of K founders, by what is seen of them.
 
-    def __init__(self, seen: Floats) -> None:
-        self._seen = seen
-        self.trees: list[tuple[cKDTree, Ints]] = []
+    Attributes:
+        founders: postures by number, in the order in which they founded clusters [K].
+        order: their places in it, leaf after leaf [K].
+        points: what is seen of them, in the order of the leaves [K, d].
+        bounds: first place in that order of each node, and the one after its last (`neighbours.node_bounds`) [D, 2].
+        boxes: least and greatest of what is seen in each node [D, 2, d].
+    """
 
-    def plant(self, founders: Ints) -> None:
-        """Add founders [n], postures by number."""
-        if not len(founders):
-            return
-        while self.trees and len(self.trees[-1][1]) <= len(founders):
-            founders = np.concatenate([self.trees.pop()[1], founders])
-        self.trees.append((_tree(self._seen[founders]), founders))
+    founders: Ints
+    order: Ints
+    points: Floats
+    bounds: Int32s
+    boxes: Floats
 
 
-def _tree(points: Floats) -> cKDTree:
-    from scipy.spatial import cKDTree  # slow to import
+def _plant(forest: list[_Tree], founders: Ints, seen: Floats) -> None:
+    """Add founders [n], postures by number, to a forest: they join the trees before them that are no larger, so there
+    are few trees, and each founder is in few of those that are made."""
+    if not len(founders):
+        return
+    while forest and len(forest[-1].founders) <= len(founders):
+        founders = np.concatenate([forest.pop().founders, founders])
+    forest.append(_grow(founders, seen))
 
-    return cKDTree(points)
+
+def _grow(founders: Ints, seen: Floats) -> _Tree:
+    """Return the tree of founders [K], postures by number, of all of which [N, d] is seen."""
+    bounds, points = node_bounds(len(founders)), seen[founders]
+    order, boxes = np.arange(len(founders)), np.empty((len(bounds), 2, points.shape[1]))
+    _halve(points, bounds, order, boxes)
+    return _Tree(founders, order, points[order], bounds, boxes)
 
 
 def _seen(orientations: Floats, workshop: Workshop) -> Floats:
@@ -108,10 +118,8 @@ def _seen(orientations: Floats, workshop: Workshop) -> Floats:
     shown = _points(orientations[:: max(len(orientations) // SHOWN, 1)])
     middle = shown.mean(axis=0)
     directions = np.linalg.eigh((shown - middle).T @ (shown - middle))[1][:, ::-1][:, :DIRECTIONS]
-    seen = workshop.empty((len(orientations), directions.shape[1]))
-    for start in range(0, len(orientations), BLOCK):
-        here = slice(start, start + BLOCK)
-        seen[here] = (_points(orientations[here]) - middle) @ directions
+    seen: Floats = workshop.empty((len(orientations), directions.shape[1]))
+    _look_along(orientations, middle, np.ascontiguousarray(directions), seen)
     return seen
 
 
@@ -121,42 +129,150 @@ def _points(orientations: Floats) -> Floats:
 
 
 def _nearest(
-    tree: cKDTree, founders: Ints, orientations: Floats, seen: Floats, postures: Ints, enough: float = -1.0
+    tree: _Tree, orientations: Floats, seen: Floats, postures: Ints, enough: float = -1.0
 ) -> tuple[Floats, Ints]:
     """Return the least squared distance of each of n postures to a founder [n], and the first such founder's place [n].
 
     Args:
-        tree: of what is seen of the founders.
-        founders: postures by number [K].
+        tree: of the founders.
         orientations: of all postures [N, m, 4].
         seen: of all postures [N, d].
         postures: by number [n].
         enough: a squared distance that is near enough: of those whose least is more, only that is sure.
     """
     least, place = np.full(len(postures), np.inf), np.zeros(len(postures), dtype=np.int64)
-    left, known = np.arange(len(postures)), 0
-    looked_at = LOOKED_AT if enough < 0.0 else (1, *LOOKED_AT)  # mostly the one that looks nearest is near enough
-    for count in (min(most, len(founders)) for most in looked_at):
-        if len(left) and count > known:
-            bound, near = tree.query(seen[postures[left]], k=np.arange(known + 1, count + 1))
-            _compare(orientations, postures[left], founders, near, least, place, left)
-            sought = least[left] if enough < 0.0 else enough
-            more = bound[:, -1] ** 2 <= sought * (1.0 + SLACK) + SLACK
-            left, known = left[more & (least[left] > enough)], count
+    _search(*tree, orientations, seen, postures, enough, LOOKED_AT, least, place)
     return least, place
 
 
 @jit
-def _compare(
-    orientations: Floats, postures: Ints, founders: Ints, near: Ints, least: Floats, place: Ints, rows: Ints
-) -> None:
-    """Write to `rows` of `least` and `place` what is the least of the distances to the founders `near` [n, k]."""
+def _look_along(orientations: Floats, middle: Floats, directions: Floats, out: Floats) -> None:
+    """Write `_points` less their middle [9 m], along directions [9 m, d]: [N, d]."""
+    row, root = np.empty(9), np.sqrt(2.0)
+    for n in range(len(orientations)):
+        out[n] = 0.0
+        for joint in range(orientations.shape[1]):
+            x, y, z, w = orientations[n, joint]
+            row[0], row[1], row[2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+            row[3], row[4], row[5] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+            row[6], row[7], row[8] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+            for k in range(9):
+                off = row[k] / root - middle[9 * joint + k]
+                for d in range(DIRECTIONS):
+                    out[n, d] += off * directions[9 * joint + k, d]
+
+
+@jit
+def _halve(points: Floats, bounds: Int32s, order: Ints, boxes: Floats) -> None:
+    """Order points [K, d] so that a node's children halve it where it is widest; write the nodes' boxes [D, 2, d]."""
+    for node in range(len(bounds)):
+        start, stop = bounds[node]
+        widest, width = 0, -1.0
+        for d in range(points.shape[1]):
+            low, high = np.inf, -np.inf
+            for k in range(start, stop):
+                low, high = min(low, points[order[k], d]), max(high, points[order[k], d])
+            boxes[node, 0, d], boxes[node, 1, d] = low, high
+            if high - low > width:
+                widest, width = d, high - low
+        if 2 * node + 2 < len(bounds):
+            keys = np.empty(stop - start)
+            for k in range(start, stop):
+                keys[k - start] = points[order[k], widest]
+            order[start:stop] = order[start:stop][np.argsort(keys)]
+
+
+@jit
+def _search(
+    founders: Ints,
+    order: Ints,
+    points: Floats,
+    bounds: Int32s,
+    boxes: Floats,
+    orientations: Floats,
+    seen: Floats,
+    postures: Ints,
+    enough: float,
+    most: int,
+    least: Floats,
+    place: Ints,
+) -> int:
+    """Write the least distances of postures, and the first founder each is of (`_nearest`); return how many founders
+    were compared. Those that look nearest are compared, `most` at most, until no other can be nearer."""
+    compared, near, at = 0, np.empty(most), np.empty(most, np.int64)
+    nodes, gaps = np.empty(64, np.int64), np.empty(64)  # twice as many as there are levels
     for i in range(len(postures)):
-        row = rows[i]
-        for k in near[i]:
-            distance = squared_distance(orientations[postures[i]], orientations[founders[k]])
-            if distance < least[row] or (distance == least[row] and k < place[row]):
-                least[row], place[row] = distance, k
+        here, own = seen[postures[i]], orientations[postures[i]]
+        count, first, size = 0, -1, 1
+        limit = np.inf if enough < 0.0 else enough * (1.0 + SLACK) + SLACK
+        nodes[0], gaps[0] = 0, 0.0
+        while size:
+            size -= 1
+            node = nodes[size]
+            if gaps[size] > limit:
+                continue
+            if 2 * node + 2 < len(bounds):
+                one, other = _gap(boxes[2 * node + 1], here), _gap(boxes[2 * node + 2], here)
+                nearer = 2 * node + 1 if one <= other else 2 * node + 2  # looked at first, so last on the pile
+                nodes[size], gaps[size] = 4 * node + 3 - nearer, max(one, other)
+                nodes[size + 1], gaps[size + 1] = nearer, min(one, other)
+                size += 2
+                continue
+            for k in range(bounds[node, 0], bounds[node, 1]):
+                off = 0.0
+                for d in range(DIRECTIONS):
+                    off += (here[d] - points[k, d]) ** 2
+                if off <= limit:
+                    count = _insert(near, at, count, off, order[k])
+                    if count == most:
+                        limit = min(limit, near[most - 1])
+            if count and at[0] != first:
+                first = at[0]
+                compared += 1
+                limit = min(limit, squared_distance(own, orientations[founders[first]]) * (1.0 + SLACK) + SLACK)
+        for k in range(count):
+            if near[k] > least[i] * (1.0 + SLACK) + SLACK or least[i] <= enough:
+                break
+            compared += 1
+            distance = _distance_within(own, orientations[founders[at[k]]], least[i])
+            if distance < least[i] or (distance == least[i] and at[k] < place[i]):
+                least[i], place[i] = distance, at[k]
+    return compared
+
+
+@jit
+def _distance_within(a: Floats, b: Floats, most: float) -> float:
+    """Return `squared_distance` of postures [m, 4], or less, but more than `most`, where it is more."""
+    total = 0.0
+    for j in range(len(a)):
+        total += squared_turn(a[j], b[j])
+        if total > most:
+            break
+    return total
+
+
+@jit
+def _gap(box: Floats, point: Floats) -> float:
+    """Return the squared distance of a point [d] from a box [2, d]."""
+    total = 0.0
+    for d in range(DIRECTIONS):
+        off = max(box[0, d] - point[d], point[d] - box[1, d], 0.0)
+        total += off * off
+    return total
+
+
+@jit
+def _insert(near: Floats, at: Ints, count: int, off: float, founder: int) -> int:
+    """Insert a founder at a squared distance among the nearest, in order; return their number, of which the farthest
+    falls out where there is no place for more."""
+    k = min(count, len(near) - 1)
+    if k < count and off >= near[k]:
+        return count
+    while k > 0 and near[k - 1] > off:
+        near[k], at[k] = near[k - 1], at[k - 1]
+        k -= 1
+    near[k], at[k] = off, founder
+    return min(count + 1, len(near))
 
 
 @jit
