@@ -159,34 +159,39 @@ def node_bounds(count: int) -> Int32s:
 
 @jit
 def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii: Floats) -> None:
-    """Grow the tree of a part that moments show [N, m, 4]: write its order [N], and its nodes' centres and radii."""
+    """Grow the tree of a part that moments show [N, m, 4]: write its order [N], and its nodes' centres and radii.
+
+    What they show is put in that order, too: so memory is read as it lies.
+    """
     order[:] = np.arange(len(order))
     keys, joints = np.empty(len(order)), shown.shape[1]
     for node in range(len(bounds)):
         start, stop = bounds[node]
-        stride = max(1, (stop - start) // SAMPLE)
-        _centre(shown, order[start:stop:stride], centres[node])
+        own = shown[start:stop]
+        sample = own[:: max(1, (stop - start) // SAMPLE)]
+        _centre(sample, centres[node])
         radius = 0.0
-        for k in range(start, stop):
-            radius = max(radius, squared_distance(shown[order[k]], centres[node]))
+        for k in range(len(own)):
+            radius = max(radius, squared_distance(own[k], centres[node]))
         radii[node] = np.sqrt(radius / joints) + _SLACK
         if 2 * node + 2 < len(bounds):
-            one = _farthest(shown, order[start:stop:stride], centres[node])
-            other = _farthest(shown, order[start:stop:stride], shown[one])
-            for k in range(start, stop):
-                here = shown[order[k]]
-                keys[k] = squared_distance(here, shown[one]) - squared_distance(here, shown[other])
-            order[start:stop] = order[start:stop][np.argsort(keys[start:stop], kind="mergesort")]
+            one = sample[_farthest(sample, centres[node])]
+            other = sample[_farthest(sample, one)]
+            for k in range(len(own)):
+                keys[k] = squared_distance(own[k], one) - squared_distance(own[k], other)
+            sorted_by_key = np.argsort(keys[: len(own)], kind="mergesort")
+            order[start:stop] = order[start:stop][sorted_by_key]
+            own[:] = own[sorted_by_key]
 
 
 @jit
-def _centre(shown: Singles, moments: Int32s, out: Singles) -> None:
-    """Write the normalised means of joints' orientations in some moments, of the first one's sign [m, 4]."""
-    first = shown[moments[0]]
+def _centre(shown: Singles, out: Singles) -> None:
+    """Write the normalised means of joints' orientations [n, m, 4], of the first one's sign [m, 4]."""
+    first = shown[0]
     for j in range(len(out)):
         mean = np.zeros(4)
-        for moment in moments:
-            one = shown[moment, j]
+        for k in range(len(shown)):
+            one = shown[k, j]
             cosine = one[0] * first[j, 0] + one[1] * first[j, 1] + one[2] * first[j, 2] + one[3] * first[j, 3]
             for c in range(4):
                 mean[c] += one[c] if cosine >= 0.0 else -one[c]
@@ -196,14 +201,14 @@ def _centre(shown: Singles, moments: Int32s, out: Singles) -> None:
 
 
 @jit
-def _farthest(shown: Singles, moments: Int32s, posture: Singles) -> int:
-    """Return which of some moments is farthest from a posture of the part [m, 4]."""
-    far, farthest = -1.0, moments[0]
-    for moment in moments:
-        away = squared_distance(shown[moment], posture)
+def _farthest(shown: Singles, posture: Singles) -> int:
+    """Return which of some moments [n, m, 4] is farthest from a posture of the part [m, 4]."""
+    far, farthest = -1.0, 0
+    for k in range(len(shown)):
+        away = squared_distance(shown[k], posture)
         if away > far:
-            far, farthest = away, moment
-    return int(farthest)
+            far, farthest = away, k
+    return farthest
 
 
 @jit

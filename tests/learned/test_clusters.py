@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionmind._typing import Floats, Ints
+from motionmind.executors.workshop import Workshop
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.distances import squared_distance
 from motionmind.learned import clusters
@@ -64,3 +65,19 @@ def test_of_many_that_all_differ_few_are_compared(monkeypatch: pytest.MonkeyPatc
         found = clusters.clusters(orientations, 4 * ALIKE**2)
         assert found.max() > 0.9 * count
         assert compared[-1] <= 2 * 33 * count
+
+
+@given(seed=st.integers(0, 2**32 - 1), most=st.integers(1, 9), enough=st.sampled_from([-1.0, 0.3, 2.0]))
+def test_those_that_look_nearest_are_compared_and_no_others(seed: int, most: int, enough: float) -> None:
+    orientations = rot.exp(np.random.default_rng(seed).normal(0.0, 0.7, (150, 3, 3)))
+    seen, founders, postures = clusters._seen(orientations, Workshop()), np.arange(0, 150, 2), np.arange(150)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(clusters, "LOOKED_AT", most)
+        least, place = clusters._nearest(clusters._grow(founders, seen), orientations, seen, postures, enough)
+    for posture in postures:
+        looks = np.sum((seen[founders] - seen[posture]) ** 2, axis=1)
+        compared = np.argsort(looks)[:most]
+        distances = [squared_distance(orientations[posture], orientations[founders[k]]) for k in compared]
+        if enough < 0.0:
+            assert (least[posture], place[posture]) == (min(distances), compared[np.argmin(distances)])
+        assert (least[posture] > enough) == (min(distances) > enough)
