@@ -33,12 +33,15 @@ def within_limits(
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
-    degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given]), joints), [len(rotations)])
+    degrees = anatomy.degrees(np.concatenate([rotations, given]), joints)
+    degrees, shown = degrees[: len(rotations)], degrees[len(rotations) :]
     least, most = anatomy.limits
     clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
     beyond = np.any(clipped != degrees, axis=-1) & ~loose
     if joints is not None:
-        beyond &= np.isin(np.arange(len(skeleton)), joints)
+        others = np.ones(len(skeleton), dtype=np.bool_)
+        others[np.asarray(joints, dtype=np.intp)] = False
+        beyond &= ~others
     frames = np.flatnonzero(beyond.any(axis=1))
     if len(frames) == 0:
         return rotations

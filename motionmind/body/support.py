@@ -11,6 +11,7 @@ and sit, and an insect has six limbs to stand on. Lengths are of a person as tal
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ def size_of(skeleton: Skeleton) -> float:
 
     A body that is a single point counts as one as large.
     """
-    return (_extent(skeleton) / _extent(human23())) or 1.0
+    return (_extent(skeleton) / _extent_of_person()) or 1.0
 
 
 def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:
@@ -160,6 +161,11 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
         return float("nan")
     heights = places[..., 1].min(axis=1)
     return float((heights - np.linspace(heights[0], heights[-1], len(heights))).max())
+
+
+@cache
+def _extent_of_person() -> float:
+    return _extent(human23())
 
 
 def _extent(skeleton: Skeleton) -> float:

@@ -43,7 +43,7 @@ def _product(a: Floats, b: Floats, of_a: float = 1.0, of_b: float = 1.0) -> Floa
     """Return the product [..., 4] of many rotations whose vector parts are of these signs: -1 inverts."""
     from motionmind.geometry import many  # numba is slow to import
 
-    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    shape = a.shape[:-1] if a.shape == b.shape else np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     out = np.empty((*shape, 4))
     many.multiply(_rows(a, shape), _rows(b, shape), of_a, of_b, out.reshape(-1, 4))
     return out

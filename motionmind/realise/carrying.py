@@ -24,7 +24,7 @@ from motionmind.realise.departures import departure, fade_at_ends
 from motionmind.realise.feet import Foot, bend_legs, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.knees import cover, smoothed
-from motionmind.realise.least_squares import solve
+from motionmind.realise.least_squares import joined, solve
 from motionmind.realise.root_rows import (
     hurry_rows,
     knee_rows,
@@ -151,7 +151,7 @@ def carry(
         steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += prior_rows(root, bearing, fps)
         steady += standing_rows(shape, bearing, floor, freedom)
-        steady += flight_rows(flights, mass, standing, gravity, fps)
+        steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
         for _ in range(ROUNDS[1]):
             rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
             legs = legs_to_places(skeleton, own.places, shape, bearing, floor, start, feet)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -54,7 +55,13 @@ class Foot(NamedTuple):
         """Return the lengths of thigh and shank, metres."""
         _, knee, end = self.chain(skeleton)
         shank = skeleton.offsets[end] if end < len(skeleton) else skeleton.tips[end - len(skeleton)]
-        return float(np.linalg.norm(skeleton.offsets[knee])), float(np.linalg.norm(shank))
+        return _length(*skeleton.offsets[knee].tolist()), _length(*shank.tolist())
+
+
+@lru_cache(maxsize=64)
+def _length(x: float, y: float, z: float) -> float:
+    """Return the length of a bone, metres, from its end in the frame of its beginning."""
+    return float(np.linalg.norm([x, y, z]))
 
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
@@ -75,7 +82,9 @@ def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
         joints: the joint that each point belongs to [P] (`contact_points`).
         count: number of joints; after them come the joints' tips.
     """
-    out = np.isin(joints, foot.joints)
+    out = np.zeros(len(joints), dtype=np.bool_)
+    for joint in foot.joints:
+        out |= joints == joint
     if not foot.joints:
         out[count + foot.leg[-1]] = True
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
@@ -44,12 +45,22 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
         The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
         joint between its two longest neighbouring bones.
     """
+    numbers, legs = _find_legs(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes())
+    return [*numbers], [([*leg], knee) for leg, knee in legs]
+
+
+@lru_cache(maxsize=64)
+def _find_legs(
+    names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: bytes
+) -> tuple[list[int], list[tuple[list[int], int]]]:
+    """Return what `find_legs` does, of a skeleton's fields: its bones as the bytes of their arrays [J, 3]."""
+    skeleton = Skeleton("", names, parents, *(np.frombuffer(bones).reshape(-1, 3) for bones in (offsets, tips)))
     numbers, out, above = [], [], stem_of(skeleton)[-1]
-    lengths, tips = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
+    lengths, ends = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
     for number, limb in enumerate(limbs_of(skeleton)):
-        if skeleton.parents[limb[0]] != above or len(limb) < 2:
+        if parents[limb[0]] != above or len(limb) < 2:
             continue
-        bones = [*lengths[limb[1:]].tolist(), float(tips[limb[-1]])]
+        bones = [*lengths[limb[1:]].tolist(), float(ends[limb[-1]])]
         pairs = [min(pair) for pair in pairwise(bones)]
         if max(pairs) > 0.0:
             numbers.append(number)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -176,15 +177,15 @@ def _mean_between(
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
-    with ThreadPoolExecutor(threads) as pool:
-        each = pool.map if threads > 1 else map
+    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+        each = map if pool is None else pool.map
         distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> tuple[Chosen, Floats, float, float]:
             part = parts[number]
             if trees is None:
                 chosen = all_of(carriage, number)
-                own = np.concatenate([of_parts[number] for of_parts in distances])
+                own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
                 here = _taken(shown, np.asarray(chosen.moments), part)
@@ -207,7 +208,8 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = SIZES[2] * mine[1] + shared[numbers[0], numbers[1]]
+                    weights = SIZES[2] * mine[1]
+                    weights += shared[numbers[0], numbers[1]]
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
@@ -323,6 +325,19 @@ def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
 
 
 @jit
+def _spread(near: Floats, middle: Floats) -> float:
+    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
+    greater has the same sign with all."""
+    farthest = 0.0
+    for t in range(near.shape[1]):
+        far = 0.0
+        for c in range(4):
+            far += (near[c, t] - middle[c]) ** 2
+        farthest = max(farthest, far)
+    return float(np.sqrt(farthest)) + 1e-6
+
+
+@jit
 def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: Floats) -> Floats:
     """Return weighted means [S, m, 4] of m joints' orientations, in the hemisphere of `about`.
 
@@ -335,29 +350,37 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
-    out, count = about.copy(), len(about)
-    # Side by side for all means, which are then added to at once. A weight of 0 changes no sum.
-    counted = np.empty((weights.shape[1], count))
-    for i in range(len(counted)):
+    out, count, moments = about.copy(), len(about), weights.shape[1]
+    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
+    counted = np.zeros((moments + -moments % 4, count))
+    for i in range(moments):
         for t in range(count):
             counted[i, t] = weights[t, i] if weights[t, i] >= 1e-6 else 0.0
-    near, sums, signed = np.empty((4, count)), np.empty((4, count)), np.empty(count)
+    near, sums, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
         near[:] = about[:, j].T
+        middle = about[count // 2, j]
+        alike = _spread(near, middle)
         sums[:] = 0.0
-        for i in range(len(counted)):
-            x, y, z, w = orientations[i, joints[j]]
-            for t in range(count):
-                cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
-                signed[t] = -counted[i, t] if cosine < 0.0 else counted[i, t]
-            for t in range(count):
-                sums[0, t] += signed[t] * x
-            for t in range(count):
-                sums[1, t] += signed[t] * y
-            for t in range(count):
-                sums[2, t] += signed[t] * z
-            for t in range(count):
-                sums[3, t] += signed[t] * w
+        for first in range(0, len(counted), 4):
+            added, mixed = counted[first : first + 4], False
+            for k in range(4):
+                x, y, z, w = orientations[min(first + k, moments - 1), joints[j]]
+                cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
+                sign = -1.0 if cosine < -alike else 1.0
+                shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
+                mixed = mixed or abs(cosine) <= alike
+            if mixed:
+                for k in range(4):
+                    x, y, z, w = shown[:, k]
+                    for t in range(count):
+                        cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
+                        signed[k, t] = -added[k, t] if cosine < 0.0 else added[k, t]
+                added = signed
+            for c in range(4):
+                a, b, d, e = shown[c]
+                for t in range(count):
+                    sums[c, t] = sums[c, t] + added[0, t] * a + added[1, t] * b + added[2, t] * d + added[3, t] * e
         for t in range(count):
             x, y, z, w = sums[:, t]
             length = np.sqrt(x * x + y * y + z * z + w * w)

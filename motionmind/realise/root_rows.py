@@ -18,7 +18,7 @@ from motionmind.realise.bearing import Bearing, Shape
 from motionmind.realise.departures import SETTLES
 from motionmind.realise.feet import Foot
 from motionmind.realise.knees import bend_of
-from motionmind.realise.least_squares import Rows, difference_rows, position_rows
+from motionmind.realise.least_squares import Rows, difference_rows
 from motionmind.realise.legs import SOFT
 
 HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
@@ -229,7 +229,7 @@ def legs_to_places(
         hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
         own = end - hip
         leg = own - root
-        leg[:, [0, 2]] += bearing.targets[:, number]
+        leg[:, ::2] += bearing.targets[:, number]
         leg[:, 1] += floor - shape.low[:, number]
         out.append((own, leg))
     return out
@@ -237,4 +237,6 @@ def legs_to_places(
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
     """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    return position_rows(np.arange(len(targets)), np.eye(3)[axis], targets, weights)
+    coefficients = np.zeros((len(targets), 9))
+    coefficients[:, axis] = 1.0
+    return Rows(np.arange(len(targets)), coefficients, targets, weights)

@@ -96,4 +96,5 @@ def likelihood(*terms: Floats) -> Floats:
         terms: squared distances in units of a variance [..., N] each.
     """
     exponent = 0.5 * sum(terms[1:], start=terms[0])
-    return np.asarray(np.exp(exponent.min(axis=-1, keepdims=True) - exponent))
+    np.subtract(exponent.min(axis=-1, keepdims=True), exponent, out=exponent)
+    return np.asarray(np.exp(exponent, out=exponent))
