@@ -75,16 +75,17 @@ def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> lis
 
     At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
     """
-    rows, last = [], len(prior) - 3
+    last = len(prior) - 3
+    bends, first = -(fps**2) * np.diff(mass, 2, axis=0), np.array([*range(last + 1), 0, last])
+    coefficients, targets, weights = np.zeros((3, last + 3, 9)), np.empty((3, last + 3)), np.empty((3, last + 3))
+    leaves, arrives = np.array([-(fps**2), fps**2, 0.0]), np.array([0.0, -(fps**2), fps**2])
     for axis, share in enumerate((1.0, vertical, 1.0)):
-        weights = np.full(last + 1, share * PUSH**-2.0)
-        bends = -(fps**2) * np.diff(mass[:, axis], 2)
-        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), bends, weights))
-        for first, shares in ((0, (-(fps**2), fps**2, 0.0)), (last, (0.0, -(fps**2), fps**2))):
-            leaves = prior[first : first + 3, axis] @ np.array(shares)
-            row = difference_rows(axis, shares, np.array([leaves]), weights[:1])
-            rows.append(row._replace(first=np.array([first])))
-    return rows
+        of_axis = coefficients[axis, :, axis::3]
+        of_axis[:-2], of_axis[-2], of_axis[-1] = (fps**2, -2.0 * fps**2, fps**2), leaves, arrives
+        targets[axis, :-2] = bends[:, axis]
+        targets[axis, -2:] = prior[:3, axis] @ leaves, prior[last:, axis] @ arrives
+        weights[axis] = share * PUSH**-2.0
+    return [Rows(first, *of_axis) for of_axis in zip(coefficients, targets, weights, strict=True)]
 
 
 def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:
@@ -94,7 +95,8 @@ def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats
     for number in range(shape.low.shape[1]):
         load = bearing.loads[:, number]
         rows.append(_axis_rows(1, floor - shape.low[:, number], load * height))
-        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], load * PLACE**-2.0) for axis in (0, 2)]
+        firmly = load * PLACE**-2.0
+        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], firmly) for axis in (0, 2)]
     for part in np.flatnonzero(np.isfinite(shape.low_others[0])):
         rows.append(_axis_rows(1, floor - shape.low_others[:, part], bearing.others[:, part] * RIGID**-2.0))
     # Where nothing bears, or hardly, the lowest point is near the floor.
