@@ -87,7 +87,9 @@ def shift_weight(
         shift = solve(rows + small, shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
-    most = None if fastest is None else np.maximum(QUICK * fastest, HURRIES * _fastest_turns(rotations, fps))[legs]
+    most = None
+    if fastest is not None:
+        most = np.maximum(QUICK * fastest[legs], HURRIES * _fastest_turns(rotations[:, legs], fps))
     for share in LESS:
         off = -share * size * np.repeat(shift[:, None], len(feet), axis=1)
         bent = bend_legs(skeleton, posed, feet, off, np.full(off.shape[:2], SOFT))

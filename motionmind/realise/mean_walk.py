@@ -28,10 +28,10 @@ from motionmind.realise.walks import (
     SIZES,
     TRAVELS_WITHIN,
     TURNS_WITHIN,
-    likelihood,
     squared_differences,
     squared_distances,
     variance_at_ends,
+    write_likelihood,
 )
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
@@ -194,11 +194,6 @@ def _mean_between(
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
-        # Limbs share what walks of larger parts say.
-        shared = {
-            (one, other): SIZES[0] * known[one][1] + SIZES[1] * known[other][1]
-            for one, other in ({numbers[:-1] for numbers in groups} if trees is None else ())
-        }
 
         def move(number: int) -> float:
             mine = known[number] if number in known else walk(number)
@@ -208,8 +203,7 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = SIZES[2] * mine[1]
-                    weights += shared[numbers[0], numbers[1]]
+                    weights = _mixed(*(marginals for _, marginals, *_ in walks))
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
@@ -251,11 +245,12 @@ def _part_marginals(
     """
     near = np.ones((len(times), len(chosen.weights)))
     if len(off) > len(ends):
-        near[2:-2:2] = likelihood(off[len(ends) :] / FOLLOWS_WITHIN**2)
+        write_likelihood(near[2:-2:2], off[len(ends) :] / FOLLOWS_WITHIN**2)
     nearest = np.sqrt(off[: len(ends)].min(axis=1))
     known, left_out = None if rates is None else rates(chosen.moments), 0.0
     for k, stop in enumerate(ends):
-        near[-k] = likelihood(off[k] / variance_at_ends(off[k]), *_rate_terms(part, known, stop))
+        variance = variance_at_ends(float(nearest[k]))
+        write_likelihood(near[-k], off[k] / variance, *_rate_terms(part, known, stop))
         if chosen.near is not None:
             mass = chosen.weights @ near[-k]
             near[-k] *= chosen.near[k]
@@ -311,6 +306,16 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
         terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
         terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
     return terms
+
+
+@jit
+def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
+    """Return how likely moments are in walks of all three sizes together [S + 1, N], from those of each."""
+    out = np.empty_like(limb)
+    for t in range(len(out)):
+        for i in range(out.shape[1]):
+            out[t, i] = SIZES[2] * limb[t, i] + (SIZES[0] * whole[t, i] + SIZES[1] * half[t, i])
+    return out
 
 
 @jit
