@@ -115,7 +115,9 @@ def contact_points(
 def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
     """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
     [P] that each point belongs to."""
-    ankles, heels = ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
+    ankles, heels = (
+        ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
+    )
     own = np.arange(len(skeleton))
     joints = np.concatenate([own, own, np.array(ankles, dtype=np.int64)])
     points = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
@@ -133,7 +135,9 @@ def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
 
 
 @lru_cache(maxsize=64)
-def _heel_points(anatomy: Anatomy, is_own: bool, height: float) -> tuple[tuple[int, ...], tuple[tuple[float, ...], ...]]:
+def _heel_points(
+    anatomy: Anatomy, is_own: bool, height: float
+) -> tuple[tuple[int, ...], tuple[tuple[float, ...], ...]]:
     """Return the ankles of a body with an anatomy, one a side, and the heels' places in their frames, metres: none
     without legs. A body that is not the anatomy's own has some height, metres."""
     if anatomy.leg is None:

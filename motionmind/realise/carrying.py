@@ -155,8 +155,8 @@ def carry(
         for _ in range(ROUNDS[1]):
             rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
             legs = legs_to_places(skeleton, own.places, shape, bearing, floor, start, feet)
-            rows += reach_rows(skeleton, legs, bearing, start, feet, fps)
-            rows += knee_rows(skeleton, legs, bearing, start, feet, freedom)
+            rows.append(reach_rows(skeleton, legs, bearing, start, feet, fps))
+            rows.append(knee_rows(skeleton, legs, bearing, start, feet, freedom))
             if balances:
                 points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor

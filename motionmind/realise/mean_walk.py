@@ -269,10 +269,10 @@ def _steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
         chosen: the moments, and the corpus's steps between them.
         near: how likely walks begin in each moment [n].
     """
+    if near[chosen.begins].max(initial=0.0) > HARDLY:
+        return chosen.begins, chosen.ends, chosen.shares
     leads = np.zeros(len(near), dtype=np.bool_)
     leads[chosen.begins] = True
-    if near[leads].max(initial=0.0) > HARDLY:
-        return chosen.begins, chosen.ends, chosen.shares
     ends = np.flatnonzero(~leads)
     begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])

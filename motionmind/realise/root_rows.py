@@ -113,49 +113,53 @@ def sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
 
 def reach_rows(
     skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
+    legs: tuple[Floats, Floats],
     bearing: Bearing,
     root: Floats,
     feet: list[Foot],
     fps: float,
-) -> list[Rows]:
+) -> Rows:
     """Return rows that bring the root [N, 3] near enough to feet that stand farther than their legs reach.
 
     A leg may be as long as the movement has it; leaning elsewhere, not quite straight.
 
     Args:
         skeleton: the body.
-        legs: each leg in the movement, and as long as it must be, as `legs_to_places` returns them.
+        legs: those in the movement, and as long as they must be, as `legs_to_places` returns them.
         bearing: what bears it.
         root: positions of the root [N, 3], metres.
         feet: its feet.
         fps: frames a second.
     """
-    every = np.arange(len(root))
-    return [
-        Rows(every, *_reach_rows(*legs[number], bearing.targets, bearing.stands, number, root, length, SETTLES * fps))
-        for number, length in enumerate(foot.length(skeleton) for foot in feet)
-    ]
+    lengths, every = np.array([foot.length(skeleton) for foot in feet]), np.arange(len(root))
+    return Rows(
+        np.concatenate([every[:0], *[every] * len(feet)]),
+        *_reach_rows(*legs, bearing.targets, bearing.stands, root, lengths, SETTLES * fps),
+    )
 
 
 @jit
 def _reach_rows(
-    own: Floats, leg: Floats, targets: Floats, stands: Bools, foot: int, root: Floats, length: float, settles: float
+    own: Floats, legs: Floats, targets: Floats, stands: Bools, root: Floats, lengths: Floats, settles: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg is of some length, metres.
+    """Return the coefficients [feet N, 9], targets and weights of rows, foot by foot, of legs of such lengths, metres.
 
-    In the first and the last frames, which it `settles` in, a row has less weight.
+    In the first and the last frames, which they settle in, rows have less weight.
     """
     count = len(root)
-    coefficients, aims, weights = np.zeros((count, 9)), np.zeros(count), np.zeros(count)
-    for t in range(count):
-        x, z = targets[t, foot, 0] - root[t, 0], targets[t, foot, 1] - root[t, 2]
-        bent = SOFT * min((x * x + z * z) / LEANS**2, 1.0)
-        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
-        longest = length * max(min(was / length, 1.0 - bent), 1.0 - SOFT)
-        if far > longest + 1e-6 and stands[t, foot]:
-            aims[t] = _write_along(leg[t], far, 1.0, root[t], coefficients[t]) + far - longest
-            weights[t] = (min(min(t, count - 1 - t) / settles, 1.0) / REACH) ** 2
+    rows = len(legs) * count
+    coefficients, aims, weights = np.zeros((rows, 9)), np.zeros(rows), np.zeros(rows)
+    for foot in range(len(legs)):
+        length = lengths[foot]
+        for t in range(count):
+            row = foot * count + t
+            x, z = targets[t, foot, 0] - root[t, 0], targets[t, foot, 1] - root[t, 2]
+            bent = SOFT * min((x * x + z * z) / LEANS**2, 1.0)
+            was, far = length_of(vector(own[foot, t])), length_of(vector(legs[foot, t]))
+            longest = length * max(min(was / length, 1.0 - bent), 1.0 - SOFT)
+            if far > longest + 1e-6 and stands[t, foot]:
+                aims[row] = _write_along(legs[foot, t], far, 1.0, root[t], coefficients[row]) + far - longest
+                weights[row] = (min(min(t, count - 1 - t) / settles, 1.0) / REACH) ** 2
     return coefficients, aims, weights
 
 
@@ -172,37 +176,41 @@ def _write_along(leg: Floats, far: float, times: float, root: Floats, coefficien
 
 def knee_rows(
     skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
+    legs: tuple[Floats, Floats],
     bearing: Bearing,
     root: Floats,
     feet: list[Foot],
     freedom: Floats,
-) -> list[Rows]:
+) -> Rows:
     """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `reach_rows`.
 
     A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
     then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
     """
-    every = np.arange(len(root))
-    return [
-        Rows(every, *_knee_rows(*legs[number], bearing.loads, number, root, freedom, *foot.bones(skeleton)))
-        for number, foot in enumerate(feet)
-    ]
+    bones, every = np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2), np.arange(len(root))
+    return Rows(
+        np.concatenate([every[:0], *[every] * len(feet)]), *_knee_rows(*legs, bearing.loads, root, freedom, bones)
+    )
 
 
 @jit
 def _knee_rows(
-    own: Floats, leg: Floats, loads: Floats, foot: int, root: Floats, freedom: Floats, thigh: float, shank: float
+    own: Floats, legs: Floats, loads: Floats, root: Floats, freedom: Floats, bones: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg has bones of these lengths."""
+    """Return the coefficients [feet N, 9], targets and weights of rows, foot by foot, of legs with bones of these
+    lengths [feet, 2], metres."""
     count = len(root)
-    coefficients, aims, weights = np.zeros((count, 9)), np.empty(count), np.empty(count)
-    for t in range(count):
-        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
-        bend = max(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
-        lever = far / (thigh * shank * np.sin(bend))  # radians that the knee bends a metre of the leg's length
-        aims[t] = _write_along(leg[t], far, lever, root[t], coefficients[t]) + lever * (far - was)
-        weights[t] = loads[t, foot] * (1.0 - freedom[t]) * KNEE**-2.0
+    rows = len(legs) * count
+    coefficients, aims, weights = np.zeros((rows, 9)), np.empty(rows), np.empty(rows)
+    for foot in range(len(legs)):
+        thigh, shank = bones[foot]
+        for t in range(count):
+            row = foot * count + t
+            was, far = length_of(vector(own[foot, t])), length_of(vector(legs[foot, t]))
+            bend = max(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
+            lever = far / (thigh * shank * np.sin(bend))  # radians that the knee bends a metre of the leg's length
+            aims[row] = _write_along(legs[foot, t], far, lever, root[t], coefficients[row]) + lever * (far - was)
+            weights[row] = loads[t, foot] * (1.0 - freedom[t]) * KNEE**-2.0
     return coefficients, aims, weights
 
 
@@ -214,8 +222,8 @@ def legs_to_places(
     floor: Floats,
     root: Floats,
     feet: list[Foot],
-) -> list[tuple[Floats, Floats]]:
-    """Return each leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place.
+) -> tuple[Floats, Floats]:
+    """Return the legs from hip to end [feet, N, 3], metres, in the movement, and where their feet have their places.
 
     Args:
         skeleton: the body.
@@ -226,15 +234,14 @@ def legs_to_places(
         root: positions of the root [N, 3], metres.
         feet: its feet.
     """
-    out = []
+    own = np.empty((len(feet), *root.shape))
     for number, foot in enumerate(feet):
-        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
-        own = end - hip
-        leg = own - root
-        leg[:, ::2] += bearing.targets[:, number]
-        leg[:, 1] += floor - shape.low[:, number]
-        out.append((own, leg))
-    return out
+        hip, _, end = foot.chain(skeleton)
+        np.subtract(places[:, end], places[:, hip], out=own[number])
+    legs = own - root
+    legs[..., ::2] += bearing.targets.swapaxes(0, 1)
+    legs[..., 1] += floor - shape.low.T
+    return own, legs
 
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
