@@ -137,7 +137,8 @@ def _turns(a: Floats, b: Floats) -> Floats:
 
 
 def _predecessors(some: Moves, among: Ints) -> Ints:
-    """Return which of some moves, of these numbers, precedes each in its clip [m], in the same direction of time; -1 for none of them.
+    """Return which of some moves, those of these numbers, precedes each in its clip [m], in the same direction of time;
+    -1 for none of them.
 
     Moves are in the order of their clips; those backward in time follow on the ones after them.
     """
