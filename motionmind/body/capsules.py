@@ -76,7 +76,7 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        first, second = positions[..., self.points[:, 0], :], positions[..., self.points[:, 1], :]
+        first, second = (positions.take(of, axis=-2) for of in self.points.T)
         return np.asarray(first[..., None, :] + self.shares[..., None] * (second - first)[..., None, :])
 
     def pairs(self) -> Ints:

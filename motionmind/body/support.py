@@ -22,6 +22,7 @@ from motionmind.body.contact import contact_points, limb_heights
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -178,7 +179,7 @@ def _speeds(places: Floats, fps: float) -> Floats:
         return np.zeros(places.shape[:2])
     frames = np.arange(len(places))
     before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(places) - 1)
-    moved = np.linalg.norm(places[after] - places[before], axis=-1)
+    moved = rot.norm(places[after] - places[before])
     return np.asarray(moved * fps / (after - before)[:, None])
 
 

@@ -28,6 +28,7 @@ from motionmind.realise.least_squares import joined, solve
 from motionmind.realise.root_rows import (
     hurry_rows,
     knee_rows,
+    legs_of,
     legs_to_places,
     prior_rows,
     reach_rows,
@@ -136,7 +137,8 @@ def carry(
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
-    own = pose(skeleton, plain)
+    own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
+    legs = legs_of(skeleton, own.places, feet)
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     touches = bearing.touching(shape)
     balances = "balance" not in without and bool(mass.any())
@@ -154,9 +156,11 @@ def carry(
         steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
         for _ in range(ROUNDS[1]):
             rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
-            legs = legs_to_places(skeleton, own.places, shape, bearing, floor, start, feet)
-            rows.append(reach_rows(skeleton, legs, bearing, start, feet, fps))
-            rows.append(knee_rows(skeleton, legs, bearing, start, feet, freedom))
+            reaching = legs_to_places(legs, shape, bearing, floor, start)
+            rows += [
+                reach_rows(reaching, bearing, start, bones, fps),
+                knee_rows(reaching, bearing, start, bones, freedom),
+            ]
             if balances:
                 points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor

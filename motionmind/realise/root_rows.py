@@ -7,6 +7,8 @@ ballet.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
@@ -111,31 +113,20 @@ def sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
     return _axis_rows(1, np.where(sunk, height, 0.0), np.where(sunk, RIGID**-2.0, 0.0))
 
 
-def reach_rows(
-    skeleton: Skeleton,
-    legs: tuple[Floats, Floats],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    fps: float,
-) -> Rows:
+def reach_rows(legs: tuple[Floats, Floats], bearing: Bearing, root: Floats, bones: Floats, fps: float) -> Rows:
     """Return rows that bring the root [N, 3] near enough to feet that stand farther than their legs reach.
 
     A leg may be as long as the movement has it; leaning elsewhere, not quite straight.
 
     Args:
-        skeleton: the body.
         legs: those in the movement, and as long as they must be, as `legs_to_places` returns them.
         bearing: what bears it.
         root: positions of the root [N, 3], metres.
-        feet: its feet.
+        bones: lengths of the legs' thighs and shanks [feet, 2], metres.
         fps: frames a second.
     """
-    lengths, every = np.array([foot.length(skeleton) for foot in feet]), np.arange(len(root))
-    return Rows(
-        np.concatenate([every[:0], *[every] * len(feet)]),
-        *_reach_rows(*legs, bearing.targets, bearing.stands, root, lengths, SETTLES * fps),
-    )
+    lengths, every = bones.sum(axis=1), np.tile(np.arange(len(root)), len(bones))
+    return Rows(every, *_reach_rows(*legs, bearing.targets, bearing.stands, root, lengths, SETTLES * fps))
 
 
 @jit
@@ -174,23 +165,14 @@ def _write_along(leg: Floats, far: float, times: float, root: Floats, coefficien
     return total
 
 
-def knee_rows(
-    skeleton: Skeleton,
-    legs: tuple[Floats, Floats],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    freedom: Floats,
-) -> Rows:
+def knee_rows(legs: tuple[Floats, Floats], bearing: Bearing, root: Floats, bones: Floats, freedom: Floats) -> Rows:
     """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `reach_rows`.
 
     A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
     then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
     """
-    bones, every = np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2), np.arange(len(root))
-    return Rows(
-        np.concatenate([every[:0], *[every] * len(feet)]), *_knee_rows(*legs, bearing.loads, root, freedom, bones)
-    )
+    every = np.tile(np.arange(len(root)), len(bones))
+    return Rows(every, *_knee_rows(*legs, bearing.loads, root, freedom, bones))
 
 
 @jit
@@ -214,30 +196,25 @@ def _knee_rows(
     return coefficients, aims, weights
 
 
-def legs_to_places(
-    skeleton: Skeleton,
-    places: Floats,
-    shape: Shape,
-    bearing: Bearing,
-    floor: Floats,
-    root: Floats,
-    feet: list[Foot],
-) -> tuple[Floats, Floats]:
+def legs_of(skeleton: Skeleton, places: Floats, feet: list[Foot]) -> Floats:
+    """Return legs from hip to end [feet, N, 3], metres, from places of joints and tips [N, 2 J, 3]."""
+    out = np.empty((len(feet), len(places), 3))
+    for number, foot in enumerate(feet):
+        hip, _, end = foot.chain(skeleton)
+        np.subtract(places[:, end], places[:, hip], out=out[number])
+    return out
+
+
+def legs_to_places(own: Floats, shape: Shape, bearing: Bearing, floor: Floats, root: Floats) -> tuple[Floats, Floats]:
     """Return the legs from hip to end [feet, N, 3], metres, in the movement, and where their feet have their places.
 
     Args:
-        skeleton: the body.
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+        own: the legs in the movement.
         shape: the body.
         bearing: what bears it.
         floor: height of the floor [N], metres.
         root: positions of the root [N, 3], metres.
-        feet: its feet.
     """
-    own = np.empty((len(feet), *root.shape))
-    for number, foot in enumerate(feet):
-        hip, _, end = foot.chain(skeleton)
-        np.subtract(places[:, end], places[:, hip], out=own[number])
     legs = own - root
     legs[..., ::2] += bearing.targets.swapaxes(0, 1)
     legs[..., 1] += floor - shape.low.T
@@ -246,6 +223,12 @@ def legs_to_places(
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
     """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    coefficients = np.zeros((len(targets), 9))
+    return Rows(*_one_coordinate(axis, len(targets)), targets, weights)
+
+
+@lru_cache(maxsize=64)
+def _one_coordinate(axis: int, count: int) -> tuple[Ints, Floats]:
+    """Return what rows for one coordinate in so many frames begin with [count], and their coefficients [count, 9]."""
+    coefficients = np.zeros((count, 9))
     coefficients[:, axis] = 1.0
-    return Rows(np.arange(len(targets)), coefficients, targets, weights)
+    return np.arange(count), coefficients
