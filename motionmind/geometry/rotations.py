@@ -225,10 +225,10 @@ def from_euler(order: str, angles: Floats) -> Floats:
     """
     axes = np.array([np.eye(3)["xyz".index(letter)] for letter in order.lower()])
     if len(axes) and angles.size >= len(axes) * _MANY:
-        from motionmind.geometry.many import turns
+        from motionmind.geometry import many
 
         half, out = 0.5 * angles, np.empty((*angles.shape[:-1], 4))
-        turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
+        many.turns(_rows(np.sin(half)), _rows(np.cos(half)), axes, out.reshape(-1, 4))
         return out
     turns = [from_axis_angle(axis, angles[..., i]) for i, axis in enumerate(axes)]
     return reduce(mul, turns) if turns else np.tile(IDENTITY, (*angles.shape[:-1], 1))
