@@ -81,7 +81,7 @@ def in_part(carriage: Carriage, number: int, ends: Floats) -> Floats:
     near, out = np.ones((STEPS + 1, len(weights))), []
     for k in range(2):
         few = off[k, chosen.moments]
-        variance = variance_at_ends(few)
+        variance = variance_at_ends(float(np.sqrt(few.min())))
         near[-k] = np.exp(0.5 * (few.min() - off[k]) / variance)
         seen = np.zeros(len(weights), dtype=bool)
         seen[chosen.moments[chosen.near[k]]] = True

@@ -76,7 +76,7 @@ class Capsules(NamedTuple):
 
     def place(self, positions: Floats) -> Floats:
         """Return the ends [..., C, 2, 3], metres, from the `positions_and_tips` [..., 2 J, 3] of the skeleton."""
-        first, second = positions[..., self.points[:, 0], :], positions[..., self.points[:, 1], :]
+        first, second = (positions.take(of, axis=-2) for of in self.points.T)
         return np.asarray(first[..., None, :] + self.shares[..., None] * (second - first)[..., None, :])
 
     def pairs(self) -> Ints:
@@ -84,11 +84,11 @@ class Capsules(NamedTuple):
 
         They are a leg and the other; an arm and the other; forearms and hands with trunk, head and legs.
         """
-        return np.array(_pairs(self.names), dtype=np.int64).reshape(-1, 2)
+        return _pairs(self.names).copy()
 
 
 @lru_cache(maxsize=4)
-def _pairs(names: tuple[str, ...]) -> list[tuple[int, int]]:
+def _pairs(names: tuple[str, ...]) -> Ints:
     """Return the pairs of `Capsules.pairs`, by the capsules' names."""
     legs, arms = (
         [[number for number, name in enumerate(names) if name in _sided(side, parts)] for side in SIDES]
@@ -97,22 +97,29 @@ def _pairs(names: tuple[str, ...]) -> list[tuple[int, int]]:
     lower = [number for number, name in enumerate(names) if name.endswith(("forearm", "hand"))]
     rest = [number for number, name in enumerate(names) if name in _MIDDLE or name.endswith(LEG)]
     chosen = [(one, other) for limbs in (legs, arms) for one in limbs[0] for other in limbs[1]]
-    return chosen + [(one, other) for one in lower for other in rest]
+    chosen += [(one, other) for one in lower for other in rest]
+    return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
 
 def capsules_of(skeleton: Skeleton) -> Capsules:
     """Return the capsules of a body; none if it is no person."""
-    if not set(human23().names) <= set(skeleton.names):
+    return _capsules_of(skeleton.names, skeleton.parents, skeleton.height)
+
+
+@lru_cache(maxsize=16)
+def _capsules_of(names: tuple[str, ...], parents: tuple[int, ...], height: float) -> Capsules:
+    """Return the capsules of a body of these joints and of some height, metres."""
+    if not set(human23().names) <= set(names):
         return Capsules((), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
     shapes = {f"{side}_{part}": (f"{side}_", shape) for side in SIDES for part, shape in _SIDED.items()}
     shapes |= {part: ("", shape) for part, shape in _MIDDLE.items()}
-    points, size = [], skeleton.height / human23().height
+    points, size = [], height / human23().height
     for prefix, shape in shapes.values():
-        start, end = skeleton.index(prefix + shape.start), skeleton.index(prefix + shape.end.removesuffix("_tip"))
+        start, end = names.index(prefix + shape.start), names.index(prefix + shape.end.removesuffix("_tip"))
         if shape.end.endswith("_tip"):
-            while len(below := skeleton.children(end)) == 1:
-                end = below[0]
-            end += len(skeleton)
+            while parents.count(end) == 1:
+                end = parents.index(end)
+            end += len(names)
         points.append([start, end])
     return Capsules(
         tuple(shapes),

@@ -12,6 +12,7 @@ Movement is given as in `Motion`: local rotations [..., J, 4] and root positions
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -114,10 +115,12 @@ def contact_points(
 def _points(skeleton: Skeleton, rotations: Floats, root: Floats, anatomy: Anatomy | None) -> tuple[Floats, Indices]:
     """Return the places [..., P, 3] of all joints, all tips and, given an anatomy with legs, both heels; and the joint
     [P] that each point belongs to."""
-    joints, points = np.tile(np.arange(len(skeleton)), 2), skeleton.tips
-    if anatomy is not None and (heels := _heels(skeleton, anatomy)):
-        joints = np.append(joints, [heel.ankle for heel in heels])
-        points = np.concatenate([points, [heel.place for heel in heels]])
+    ankles, heels = (
+        ((), ()) if anatomy is None else _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
+    )
+    own = np.arange(len(skeleton))
+    joints = np.concatenate([own, own, np.array(ankles, dtype=np.int64)])
+    points = np.concatenate([skeleton.tips, heels]) if ankles else skeleton.tips
     return skeleton.positions_with(rotations, root, joints[len(skeleton) :], points), joints
 
 
@@ -126,18 +129,25 @@ def heels_of(skeleton: Skeleton) -> dict[str, Heel]:
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return {}
-    return {f"{side}_heel": heel for side, heel in zip(SIDES, _heels(skeleton, anatomy), strict=False)}
+    ankles, places = _heel_points(anatomy, skeleton is anatomy.skeleton, skeleton.height)
+    heels = (Heel(ankle, np.array(place)) for ankle, place in zip(ankles, places, strict=True))
+    return {f"{side}_heel": heel for side, heel in zip(SIDES, heels, strict=False)}
 
 
-def _heels(skeleton: Skeleton, anatomy: Anatomy) -> list[Heel]:
-    """Return the heels of a body with an anatomy: one a side, none without legs."""
+@lru_cache(maxsize=64)
+def _heel_points(
+    anatomy: Anatomy, is_own: bool, height: float
+) -> tuple[tuple[int, ...], tuple[tuple[float, ...], ...]]:
+    """Return the ankles of a body with an anatomy, one a side, and the heels' places in their frames, metres: none
+    without legs. A body that is not the anatomy's own has some height, metres."""
     if anatomy.leg is None:
-        return []
+        return (), ()
     place = np.array(anatomy.leg.heel)
-    if skeleton is not anatomy.skeleton:  # given in the anatomy's own proportions
-        place = place * skeleton.height / anatomy.skeleton.height
+    if not is_own:  # given in the anatomy's own proportions
+        place = place * height / anatomy.skeleton.height
     places = place, place * np.array([-1.0, 1.0, 1.0])
-    return [Heel(anatomy.named(anatomy.leg.ankle, side), place) for side, place in zip(SIDES, places, strict=True)]
+    ankles = (anatomy.named(anatomy.leg.ankle, side) for side in SIDES)
+    return tuple(ankles), tuple(tuple(place.tolist()) for place in places)
 
 
 # --- the floor --------------------------------------------------------------------------------------------------------

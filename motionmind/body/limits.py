@@ -33,18 +33,20 @@ def within_limits(
     anatomy = anatomy_of(skeleton)
     if anatomy is None:
         return rotations
-    degrees, shown = np.split(anatomy.degrees(np.concatenate([rotations, given]), joints), [len(rotations)])
-    least, most = anatomy.limits
-    clipped = np.clip(degrees, np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0)))
-    beyond = np.any(clipped != degrees, axis=-1) & ~loose
-    if joints is not None:
-        beyond &= np.isin(np.arange(len(skeleton)), joints)
+    wanted = np.arange(len(skeleton)) if joints is None else np.array(joints, dtype=np.intp)
+    degrees = anatomy.degrees(np.concatenate([rotations, given]), joints)[:, wanted]
+    degrees, shown = degrees[: len(rotations)], degrees[len(rotations) :]
+    least, most = (limits[wanted] for limits in anatomy.limits)
+    least, most = np.minimum(least, shown.min(axis=0)), np.maximum(most, shown.max(axis=0))
+    beyond = ((degrees < least) | (degrees > most)).any(axis=-1) & ~loose[wanted]
     frames = np.flatnonzero(beyond.any(axis=1))
     if len(frames) == 0:
         return rotations
-    named = {name: clipped[frames, joint] for joint, name in enumerate(anatomy.skeleton.names)}
+    clipped, clips = np.zeros((len(frames), len(skeleton), 3)), np.zeros((len(frames), len(skeleton)), dtype=np.bool_)
+    clipped[:, wanted], clips[:, wanted] = np.clip(degrees[frames], least, most), beyond[frames]
+    named = {name: clipped[:, joint] for joint, name in enumerate(anatomy.skeleton.names)}
     out = rotations.copy()
-    out[frames] = np.where(beyond[frames, :, None], anatomy.rotations(named), rotations[frames])
+    out[frames] = np.where(clips[..., None], anatomy.rotations(named), rotations[frames])
     return out
 
 

@@ -11,6 +11,7 @@ and sit, and an insect has six limbs to stand on. Lengths are of a person as tal
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from motionmind.body.contact import contact_points, limb_heights
 from motionmind.body.human import human23
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
+from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 
 NEAR = 0.05  # metres above the body's lowest point within which a limb can bear
@@ -93,7 +95,7 @@ def size_of(skeleton: Skeleton) -> float:
 
     A body that is a single point counts as one as large.
     """
-    return (_extent(skeleton) / _extent(human23())) or 1.0
+    return (_extent(skeleton) / _extent_of_person()) or 1.0
 
 
 def centre_of_mass(skeleton: Skeleton, rotations: Floats, root: Floats) -> Floats | None:
@@ -162,6 +164,11 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
     return float((heights - np.linspace(heights[0], heights[-1], len(heights))).max())
 
 
+@cache
+def _extent_of_person() -> float:
+    return _extent(human23())
+
+
 def _extent(skeleton: Skeleton) -> float:
     return float(np.ptp(skeleton.rest, axis=0).max())
 
@@ -172,7 +179,7 @@ def _speeds(places: Floats, fps: float) -> Floats:
         return np.zeros(places.shape[:2])
     frames = np.arange(len(places))
     before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, len(places) - 1)
-    moved = np.linalg.norm(places[after] - places[before], axis=-1)
+    moved = rot.norm(places[after] - places[before])
     return np.asarray(moved * fps / (after - before)[:, None])
 
 

@@ -72,6 +72,12 @@ def product(a: Rotation, b: Rotation) -> Rotation:
 
 
 @jit
+def inverse(q: Rotation) -> Rotation:
+    """Return the inverse of a rotation."""
+    return -q[0], -q[1], -q[2], q[3]
+
+
+@jit
 def turned(q: Rotation, v: Vector) -> Vector:
     """Return a vector turned by a rotation."""
     u = q[0], q[1], q[2]

@@ -10,6 +10,8 @@ Constants were chosen on ballet, and looked at on recordings.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats
@@ -53,13 +55,19 @@ def balance_rows(
     lever = np.maximum(height, 0.1)[1:-1] / gravity * fps**2
     pressure = centre.copy()
     pressure[1:-1] -= lever[:, None] * np.diff(centre, 2, axis=0)
-    since = np.minimum(np.arange(len(centre)) / (SWAYS * fps), 1.0)
-    fades = 1.0 - since * since * (3.0 - 2.0 * since)
+    fades = _fades(len(centre), fps)
     rows, frames = [], np.arange(len(lever))
     for point, share, room in ((pressure, lever, ROOM), (centre, 0.0 * lever, overhang)):
         nearest = nearest_in_support(points, touches, point)
         rows += [Rows(frames, *row) for row in _rows_towards(nearest, point, own, share, fades, room)]
     return rows
+
+
+@lru_cache(maxsize=64)
+def _fades(count: int, fps: float) -> Floats:
+    """Return how far a body is yet from having left the first frame, in so many frames [count], from 1 to 0."""
+    since = np.minimum(np.arange(count) / (SWAYS * fps), 1.0)
+    return np.asarray(1.0 - since * since * (3.0 - 2.0 * since))
 
 
 @jit

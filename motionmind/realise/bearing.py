@@ -11,6 +11,7 @@ from motionmind.body.contact import contact_points
 from motionmind.body.limbs import limb_of_points, limbs_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
+from motionmind.jit import jit
 from motionmind.realise.feet import Foot, foot_points, track_of
 from motionmind.realise.footfalls import Stance, find_stances, standing_costs
 
@@ -74,12 +75,31 @@ def points_of_feet(skeleton: Skeleton, joints: Indices, feet: list[Foot]) -> Boo
     return np.stack(own) if own else np.zeros((0, len(joints)), dtype=np.bool_)
 
 
+@jit
 def lowest(places: Floats, parts: Bools) -> Floats:
-    """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points."""
+    """Return the height of the lowest point of each part [N, parts], metres; infinite for a part without points.
+
+    Args:
+        places: of the body's points [N, P, 3], metres.
+        parts: which of them are each part's [parts, P].
+    """
     out = np.full((len(places), len(parts)), np.inf)
-    for number, points in enumerate(parts):
-        out[:, number] = places[:, points, 1].min(axis=1, initial=np.inf)
+    for t in range(len(places)):
+        for part in range(len(parts)):
+            for point in range(parts.shape[1]):
+                if parts[part, point]:
+                    out[t, part] = min(out[t, part], places[t, point, 1])
     return out
+
+
+@jit
+def _mark_touching(places: Floats, parts: Bools, low: Floats, bears: Bools, out: Bools) -> None:
+    """Mark points of parts that bear [N, parts], about as low as the lowest of them [N, parts]: `out` [N, P]."""
+    for t in range(len(places)):
+        for part in range(len(parts)):
+            for point in range(parts.shape[1]):
+                if bears[t, part] and parts[part, point]:
+                    out[t, point] = places[t, point, 1] < low[t, part] + TOUCHES
 
 
 class Bearing(NamedTuple):
@@ -120,11 +140,8 @@ class Bearing(NamedTuple):
         still = self.stands.copy()
         still[1:] &= self.stands[:-1]
         still[:-1] &= self.stands[1:]
-        parts = [(shape.feet, shape.low, still), (shape.others, shape.low_others, self.others > MOSTLY)]
-        for points_of_parts, low, bears in parts:
-            for number, points in enumerate(points_of_parts):
-                near = shape.places[:, points, 1] < low[:, number, None] + TOUCHES
-                out[:, points] = near & bears[:, number, None]
+        _mark_touching(shape.places, shape.feet, shape.low, still, out)
+        _mark_touching(shape.places, shape.others, shape.low_others, self.others > MOSTLY, out)
         return out
 
 

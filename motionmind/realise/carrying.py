@@ -24,10 +24,11 @@ from motionmind.realise.departures import departure, fade_at_ends
 from motionmind.realise.feet import Foot, bend_legs, pose, softness
 from motionmind.realise.flight import HOVERS, SURELY, find_flights, flight_rows, flying_frames, leg_freedom
 from motionmind.realise.knees import cover, smoothed
-from motionmind.realise.least_squares import solve
+from motionmind.realise.least_squares import joined, solve
 from motionmind.realise.root_rows import (
     hurry_rows,
     knee_rows,
+    legs_of,
     legs_to_places,
     prior_rows,
     reach_rows,
@@ -136,7 +137,8 @@ def carry(
     fixed = np.zeros(count, dtype=np.bool_)
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
-    own = pose(skeleton, plain)
+    own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
+    legs = legs_of(skeleton, own.places, feet)
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     touches = bearing.touching(shape)
     balances = "balance" not in without and bool(mass.any())
@@ -151,12 +153,14 @@ def carry(
         steady = smooth_rows(root, mass, fps, 1e-4 if "bounce" in without else 1.0)
         steady += prior_rows(root, bearing, fps)
         steady += standing_rows(shape, bearing, floor, freedom)
-        steady += flight_rows(flights, mass, standing, gravity, fps)
+        steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
         for _ in range(ROUNDS[1]):
             rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
-            legs = legs_to_places(skeleton, own.places, shape, bearing, floor, start, feet)
-            rows += reach_rows(skeleton, legs, bearing, start, feet, fps)
-            rows += knee_rows(skeleton, legs, bearing, start, feet, freedom)
+            reaching = legs_to_places(legs, shape, bearing, floor, start)
+            rows += [
+                reach_rows(reaching, bearing, start, bones, fps),
+                knee_rows(reaching, bearing, start, bones, freedom),
+            ]
             if balances:
                 points, centre, level = _points_on_floor(shape, bearing, start), start + mass, [0, 2]
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor

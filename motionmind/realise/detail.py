@@ -48,17 +48,17 @@ def likest_moves(moves: Moves, orientations: Floats, poses: Floats, among: Ints 
         among: numbers of the moves to choose from, rising [m] (`moves_near`); None for all.
     """
     poses = np.ascontiguousarray(poses)
+    some = moves if among is None else moves.take(among)
     if among is None:
         among, begins, ends = np.arange(len(moves)), moves.begins, moves.ends
         shown = orientations[:, : poses.shape[1]]
     else:
-        some = moves.take(among)
         postures, which = np.unique([some.begins, some.ends], return_inverse=True)
         begins, ends = which.reshape(2, -1)
         shown = orientations[postures, : poses.shape[1]]
     distances = _squared_distances(np.ascontiguousarray(shown), poses) / poses.shape[1]
     cost = distances[:-1, begins] + distances[1:, ends]
-    before = _predecessors(moves, among)
+    before = _predecessors(some, among)
     total, came_from = cost[0], []
     for step in cost[1:]:
         least = int(total.argmin())
@@ -136,12 +136,12 @@ def _turns(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(rot.angle(a, b) ** 2, axis=-1)))
 
 
-def _predecessors(moves: Moves, among: Ints) -> Ints:
-    """Return which of some moves precedes each in its clip [m], in the same direction of time; -1 for none of them.
+def _predecessors(some: Moves, among: Ints) -> Ints:
+    """Return which of some moves, those of these numbers, precedes each in its clip [m], in the same direction of time;
+    -1 for none of them.
 
     Moves are in the order of their clips; those backward in time follow on the ones after them.
     """
-    some = moves.take(among)
     begins, ends = some.begins, some.ends
     before = among + np.where(ends > begins, -1, 1)
     place = np.minimum(np.searchsorted(among, before), len(among) - 1)

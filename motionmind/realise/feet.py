@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from motionmind._typing import Bools, Floats, Indices
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.realise.knees import SHIFTS, bend_of, distance_of, keep_detail, slow_down, smoothed
-from motionmind.realise.legs import SOFT, find_hinge, find_legs, reach, stretched
+from motionmind.realise.legs import SOFT, find_hinge, find_legs, stretched, usual_hinge, write_bent
 
 GRIP = 0.015  # metres above the lower end of a foot at which the other's hold on the floor has fallen to 1/e
 LOOSE = 0.15  # of a leg's length, as `legs.SOFT`, of one that swings
@@ -54,7 +55,13 @@ class Foot(NamedTuple):
         """Return the lengths of thigh and shank, metres."""
         _, knee, end = self.chain(skeleton)
         shank = skeleton.offsets[end] if end < len(skeleton) else skeleton.tips[end - len(skeleton)]
-        return float(np.linalg.norm(skeleton.offsets[knee])), float(np.linalg.norm(shank))
+        return _length(*skeleton.offsets[knee].tolist()), _length(*shank.tolist())
+
+
+@lru_cache(maxsize=64)
+def _length(x: float, y: float, z: float) -> float:
+    """Return the length of a bone, metres, from its end in the frame of its beginning."""
+    return float(np.linalg.norm([x, y, z]))
 
 
 def find_free_feet(skeleton: Skeleton, fixed: Bools) -> list[Foot]:
@@ -75,7 +82,9 @@ def foot_points(foot: Foot, joints: Indices, count: int) -> Bools:
         joints: the joint that each point belongs to [P] (`contact_points`).
         count: number of joints; after them come the joints' tips.
     """
-    out = np.isin(joints, foot.joints)
+    out = np.zeros(len(joints), dtype=np.bool_)
+    for joint in foot.joints:
+        out |= joints == joint
     if not foot.joints:
         out[count + foot.leg[-1]] = True
     return out
@@ -259,11 +268,10 @@ def bend_legs(skeleton: Skeleton, posed: Posed, feet: list[Foot], off: Floats, s
     if not feet:
         return out
     chains, hinges = np.array([foot.chain(skeleton) for foot in feet]), [foot.hinge for foot in feet]
-    (hips, knees, ends), hinge = chains.T, None if hinges[0] is None else np.array(hinges)
-    thigh, shank = reach(turned[:, hips], places[:, chains], places[:, ends] + off, hinge, soft)
-    thigh, shank = rot.mul(thigh, turned[:, hips]), rot.mul(shank, turned[:, knees])
-    out[:, hips] = rot.inv_mul(turned[:, np.array(skeleton.parents)[hips]], thigh)
-    out[:, knees] = rot.inv_mul(thigh, shank)
-    joints = ends < len(skeleton)
-    out[:, ends[joints]] = rot.inv_mul(shank[:, joints], turned[:, ends[joints]])
+    hips, hinge = chains[:, 0], None if hinges[0] is None else np.array(hinges)
+    usual = usual_hinge(turned[:, hips], places[:, chains], hinge)
+    above = np.array([skeleton.parents[hip] for hip in hips.tolist()])
+    write_bent(out, turned, places, chains, above, np.ascontiguousarray(off), usual, np.ascontiguousarray(soft))
+    if not np.isfinite(out[:, hips]).all():
+        raise ValueError("a leg, or the way to its place, has no direction")
     return out

@@ -8,12 +8,13 @@ foot: that a leg which is all but straight kept it exactly would be seen in its 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.jit import either
+from motionmind.jit import either, jit
 from motionmind.realise.least_squares import bending_diagonals, solve_diagonals
 
 _Lengths = TypeVar("_Lengths", Floats, float)
@@ -102,11 +103,19 @@ def _around(values: Floats, fps: float) -> Floats:
 def smoothed(values: Floats, seconds: float, fps: float) -> Floats:
     """Return means [N] of values around each, within so many seconds; the first and the last value stay."""
     width = min(max(round(seconds * fps), 1), len(values) - 1)
-    weights = np.hanning(2 * width + 3)[1:-1]
     # Mirrored through its ends, so that these stay.
     before, after = 2.0 * values[0] - values[width:0:-1], 2.0 * values[-1] - values[-2 : -width - 2 : -1]
     around = np.concatenate([before, values, after])
-    return np.asarray(np.convolve(around, weights / weights.sum(), "valid"))
+    return np.asarray(np.convolve(around, bell(width), "valid"))
+
+
+@lru_cache(maxsize=64)
+def bell(width: int) -> Floats:
+    """Return smooth weights [2 width + 1], greatest in the middle, that add up to 1."""
+    weights = np.hanning(2 * width + 3)[1:-1]
+    out: Floats = weights / weights.sum()
+    out.setflags(write=False)
+    return out
 
 
 def cover(need: Floats, fps: float) -> Floats:
@@ -114,10 +123,10 @@ def cover(need: Floats, fps: float) -> Floats:
     if not need.any():
         return need
     width = max(1, round(0.5 * LIFTS * fps))
-    window = np.hanning(2 * width + 3)[1:-1]
     # The mean over a window of each frame's greatest need within a window: none of those is less than the need here.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, 2 * width, mode="edge"), 2 * width + 1).max(axis=1)
-    return np.convolve(around, window / window.sum(), "valid")
+    wide = np.concatenate([np.full(2 * width, need[0]), need, np.full(2 * width, need[-1])])
+    around = np.lib.stride_tricks.sliding_window_view(wide, 2 * width + 1).max(axis=1)
+    return np.convolve(around, bell(width), "valid")
 
 
 def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Floats:
@@ -126,12 +135,19 @@ def _towards(wanted: Floats, values: Floats, where: Bools, most: float) -> Float
     return np.asarray(np.clip(wanted, np.minimum(lowest, highest), np.maximum(lowest, highest)))
 
 
+@jit
 def _below(values: Floats, where: Bools, most: float) -> Floats:
     """Return the highest curve [N] that changes by at most `most` a frame and is not above the values [N] `where`."""
-    slope = most * np.arange(len(values))
-    known = np.where(where, values, np.inf)
-    ahead = np.minimum.accumulate(known - slope) + slope
-    return np.asarray(np.minimum(ahead, np.minimum.accumulate((known + slope)[::-1])[::-1] - slope))
+    out, last = np.empty(len(values)), len(values) - 1
+    least = np.inf
+    for t in range(last + 1):
+        least = min(least, values[t] - most * t if where[t] else np.inf)
+        out[t] = least + most * t
+    least = np.inf
+    for t in range(last, -1, -1):
+        least = min(least, values[t] + most * t if where[t] else np.inf)
+        out[t] = min(out[t], least - most * t)
+    return out
 
 
 def _above(values: Floats, where: Bools, most: float) -> Floats:

@@ -19,7 +19,7 @@ from motionmind.body.support import centre_of_mass, find_bearers, size_of
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, balance_rows, is_beyond, walks
 from motionmind.realise.feet import QUICK, bend_legs, find_free_feet, pose
-from motionmind.realise.least_squares import difference_rows, position_rows, solve
+from motionmind.realise.least_squares import difference_rows, joined, position_rows, solve
 from motionmind.realise.legs import SOFT, find_legs
 
 PUSH = 2.0  # metres a second squared by which the hips are accelerated beside the movement
@@ -77,6 +77,7 @@ def shift_weight(
         small.append(position_rows(np.arange(len(root)), np.eye(3)[axis], none, none + SHIFTS**-2.0))
         bends = (fps**2, -2.0 * fps**2, fps**2)
         small.append(difference_rows(axis, bends, none[1:-1], none[1:-1] + PUSH**-2.0))
+    small = [joined(small)]
     for _ in range(ROUNDS):
         now = mass + shift[:, [0, 2]]
         rows = [
@@ -86,7 +87,9 @@ def shift_weight(
         shift = solve(rows + small, shift, given)
     shift[given] = 0.0
     legs, posed = [joint for foot in feet for joint in foot.leg], pose(skeleton, rotations)
-    most = None if fastest is None else np.maximum(QUICK * fastest, HURRIES * _fastest_turns(rotations, fps))[legs]
+    most = None
+    if fastest is not None:
+        most = np.maximum(QUICK * fastest[legs], HURRIES * _fastest_turns(rotations[:, legs], fps))
     for share in LESS:
         off = -share * size * np.repeat(shift[:, None], len(feet), axis=1)
         bent = bend_legs(skeleton, posed, feet, off, np.full(off.shape[:2], SOFT))

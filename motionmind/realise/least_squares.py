@@ -53,6 +53,11 @@ def difference_rows(axis: int, shares: tuple[float, float, float], targets: Floa
     return Rows(np.arange(len(targets)), coefficients, targets, weights)
 
 
+def joined(rows: list[Rows]) -> Rows:
+    """Return rows one after another, as one."""
+    return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
+
+
 def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
     """Return the trajectory [N, 3] whose weighted sum of squares over all rows is least.
 
@@ -61,13 +66,13 @@ def solve(rows: list[Rows], start: Floats, fixed: Bools) -> Floats:
         start: a trajectory with the right places at the fixed frames [N, 3].
         fixed: frames that do not change [N].
     """
-    joined = Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
-    diagonals, right = _normal_equations(*joined, np.ascontiguousarray(start))
+    matrix, right = _normal_equations(*joined(rows), np.ascontiguousarray(start))
     keep = np.repeat(fixed, 3)
     # A change of 0 at the fixed frames: their own equations outweigh all others.
-    diagonals[0, keep] = 1e12 * max(diagonals[0].max(), 1.0)
+    matrix[keep, 0] = 1e12 * max(matrix[:, 0].max(), 1.0)
     right[keep] = 0.0
-    change = solve_diagonals(diagonals, right).reshape(-1, 3)
+    solve_rows(matrix, right)
+    change = right.reshape(-1, 3)
     change[fixed] = 0.0
     return np.asarray(start + change)
 
@@ -134,12 +139,13 @@ def substitute(matrix: Floats, right: Floats) -> None:
 def _normal_equations(
     first: Ints, coefficients: Floats, targets: Floats, weights: Floats, start: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the normal equations of a change from `start` [N, 3]: lower diagonals [9, 3 N], right side [3 N]."""
+    """Return the normal equations of a change from `start` [N, 3]: a matrix as `solve_rows` takes it [3 N, 9], and the
+    right side [3 N]."""
     flat = start.ravel()
     count = len(flat)
-    diagonals, right = np.zeros((_BAND, count)), np.zeros(count)
+    matrix, right = np.zeros((count, _BAND)), np.zeros(count)
     for i in range(count):
-        diagonals[0, i] = 1e-9
+        matrix[i, 0] = 1e-9
     for r in range(len(first)):
         if weights[r] == 0.0:
             continue
@@ -155,5 +161,5 @@ def _normal_equations(
             right[at + k] += weighted * missing
             for m in range(k + 1):
                 if coefficients[r, m] != 0.0:
-                    diagonals[k - m, at + m] += weighted * coefficients[r, m]
-    return diagonals, right
+                    matrix[at + k, k - m] += weighted * coefficients[r, m]
+    return matrix, right

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
-from motionmind._typing import Floats
+from motionmind._typing import Floats, Ints
 from motionmind.body.anatomy_file import anatomy_of
 from motionmind.body.limbs import limbs_of, stem_of
 from motionmind.body.skeleton import Skeleton
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.single import (
+    Rotation,
+    Vector,
     about,
     between,
     cross,
     dot,
+    inverse,
     length,
     minus,
     plus,
@@ -44,12 +48,22 @@ def find_legs(skeleton: Skeleton) -> tuple[list[int], list[tuple[list[int], int]
         The legs' numbers in `limbs_of`; and for each leg its joints, outward, and the place among them of its knee, the
         joint between its two longest neighbouring bones.
     """
+    numbers, legs = _find_legs(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes())
+    return [*numbers], [([*leg], knee) for leg, knee in legs]
+
+
+@lru_cache(maxsize=64)
+def _find_legs(
+    names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: bytes
+) -> tuple[list[int], list[tuple[list[int], int]]]:
+    """Return what `find_legs` does, of a skeleton's fields: its bones as the bytes of their arrays [J, 3]."""
+    skeleton = Skeleton("", names, parents, *(np.frombuffer(bones).reshape(-1, 3) for bones in (offsets, tips)))
     numbers, out, above = [], [], stem_of(skeleton)[-1]
-    lengths, tips = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
+    lengths, ends = rot.norm(skeleton.offsets), rot.norm(skeleton.tips)
     for number, limb in enumerate(limbs_of(skeleton)):
-        if skeleton.parents[limb[0]] != above or len(limb) < 2:
+        if parents[limb[0]] != above or len(limb) < 2:
             continue
-        bones = [*lengths[limb[1:]].tolist(), float(tips[limb[-1]])]
+        bones = [*lengths[limb[1:]].tolist(), float(ends[limb[-1]])]
         pairs = [min(pair) for pair in pairwise(bones)]
         if max(pairs) > 0.0:
             numbers.append(number)
@@ -112,7 +126,7 @@ def reach(
     Raises:
         ValueError: a leg or its target has no direction.
     """
-    shape, usual = target.shape[:-1], _usual_hinge(hip, leg, hinge)
+    shape, usual = target.shape[:-1], usual_hinge(hip, leg, hinge)
     thigh, shank = np.empty((2, *shape, 4))
     _reach(
         np.ascontiguousarray(hip).reshape(-1, 4),
@@ -128,7 +142,7 @@ def reach(
     return thigh, shank
 
 
-def _usual_hinge(hip: Floats, leg: Floats, usual: Floats | None) -> Floats:
+def usual_hinge(hip: Floats, leg: Floats, usual: Floats | None) -> Floats:
     """Return unit axes [..., 3] in the hip's frame about which knees bend where legs are all but straight.
 
     They are those given [..., 3] or, if there are none, those of other frames. Arguments are as for `reach`.
@@ -151,18 +165,55 @@ def _reach(
 ) -> None:
     """Write what `reach` returns [N, 4], each: `usual` hinges [N, 3] are unit vectors in the hips' frames."""
     for n in range(len(leg)):
-        start, middle, end = vector(leg[n, 0]), vector(leg[n, 1]), vector(leg[n, 2])
-        thigh, shank, whole, aim = minus(middle, start), minus(end, middle), minus(end, start), vector(target[n])
-        aim = minus(aim, start)
-        size = HINGE * (length(thigh) * length(shank))
-        axis = unit(plus(cross(thigh, shank), turned(rotation(hip[n]), vector(usual[n])), size))
-        # Components along the axis do not change; across it, the bones and their angle form a triangle.
-        along, further = dot(thigh, axis), dot(shank, axis)
-        across, beyond = np.sqrt(dot(thigh, thigh) - along**2), np.sqrt(dot(shank, shank) - further**2)
-        least, twice = (along + further) ** 2 + across**2 + beyond**2, 2.0 * across * beyond
-        now, wanted = length(whole), length(aim)
-        far = stretched(now, wanted, np.sqrt(least + twice), soft[n])
-        was = np.arccos(min(max((now**2 - least) / twice, -1.0), 1.0))
-        bend = about(axis, np.arccos(min(max((far**2 - least) / twice, -1.0), 1.0)) - was)
-        turn = between(plus(thigh, turned(bend, shank), 1.0), aim)
-        thighs[n], shanks[n] = turn, product(turn, bend)
+        places = vector(leg[n, 0]), vector(leg[n, 1]), vector(leg[n, 2])
+        thighs[n], shanks[n] = _turns(rotation(hip[n]), places, vector(target[n]), vector(usual[n]), soft[n])
+
+
+@jit
+def _turns(
+    hip: Rotation, places: tuple[Vector, Vector, Vector], target: Vector, usual: Vector, soft: float
+) -> tuple[Rotation, Rotation]:
+    """Return what `reach` does, of one leg."""
+    start, middle, end = places
+    thigh, shank, whole, aim = minus(middle, start), minus(end, middle), minus(end, start), minus(target, start)
+    size = HINGE * (length(thigh) * length(shank))
+    axis = unit(plus(cross(thigh, shank), turned(hip, usual), size))
+    # Components along the axis do not change; across it, the bones and their angle form a triangle.
+    along, further = dot(thigh, axis), dot(shank, axis)
+    across, beyond = np.sqrt(dot(thigh, thigh) - along**2), np.sqrt(dot(shank, shank) - further**2)
+    least, twice = (along + further) ** 2 + across**2 + beyond**2, 2.0 * across * beyond
+    now, wanted = length(whole), length(aim)
+    far = stretched(now, wanted, np.sqrt(least + twice), soft)
+    was = np.arccos(min(max((now**2 - least) / twice, -1.0), 1.0))
+    bend = about(axis, np.arccos(min(max((far**2 - least) / twice, -1.0), 1.0)) - was)
+    turn = between(plus(thigh, turned(bend, shank), 1.0), aim)
+    return turn, product(turn, bend)
+
+
+@jit
+def write_bent(
+    out: Floats, world: Floats, places: Floats, chains: Ints, above: Ints, off: Floats, usual: Floats, soft: Floats
+) -> None:
+    """Write local rotations of legs whose ends are brought to other places, as `reach` does; feet keep orientations.
+
+    Args:
+        out: local rotations [N, J, 4], to be changed.
+        world: orientations of the joints in the world [N, J, 4].
+        places: of joints and tips [N, 2 J, 3], metres.
+        chains: hip, knee and end of each leg [legs, 3], by their places.
+        above: the joints that the hips hang from [legs].
+        off: how far each end is to be from its place [N, legs, 3], metres.
+        usual: unit axes in the hips' frames about which straight knees bend [legs, 3].
+        soft: as for `reach` [N, legs].
+    """
+    for t in range(len(out)):
+        for leg in range(len(chains)):
+            hip, knee, end = chains[leg]
+            points = vector(places[t, hip]), vector(places[t, knee]), vector(places[t, end])
+            aim = plus(points[2], vector(off[t, leg]), 1.0)
+            thigh, shank = _turns(rotation(world[t, hip]), points, aim, vector(usual[leg]), soft[t, leg])
+            thigh, shank = product(thigh, rotation(world[t, hip])), product(shank, rotation(world[t, knee]))
+            out[t, hip] = product(inverse(rotation(world[t, above[leg]])), thigh)
+            out[t, knee] = product(inverse(thigh), shank)
+            if end < world.shape[1]:
+                out[t, end] = product(inverse(shank), rotation(world[t, end]))

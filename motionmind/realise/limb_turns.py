@@ -85,6 +85,28 @@ def planes_between(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, 
     return sides
 
 
+@jit
+def is_any_deeper(ends: Floats, radii: Floats, pairs: Ints, allowed: Floats) -> bool:
+    """Return whether a pair of capsules is deeper in each other than allowed, by LEAST or more.
+
+    Args:
+        ends: of the capsules' axes [N, C, 2, 3], metres.
+        radii: at both ends [C, 2], metres.
+        pairs: numbers of capsules [P, 2].
+        allowed: how deep each pair may be in each other [N, P], metres, at least 0.
+    """
+    middles, spans = np.empty((len(radii), 3)), np.empty(len(radii))
+    for t in range(len(ends)):
+        _enclose(ends[t], radii, middles, spans)
+        for p in range(len(pairs)):
+            i, j = pairs[p]
+            if _apart(middles[i], middles[j]) <= spans[i] + spans[j]:
+                gap, s, u = nearest_points(ends[t, i], ends[t, j])
+                if radius_at(radii[i], s) + radius_at(radii[j], u) - gap > allowed[t, p] + LEAST:
+                    return True
+    return False
+
+
 def least_turns(
     placed: Placed, limbs: Limbs, radii: Floats, pairs: Ints, allowed: Floats, sides: Floats
 ) -> tuple[Floats, Floats]:

@@ -25,7 +25,7 @@ from motionmind.geometry import rotations as rot
 from motionmind.jit import jit
 from motionmind.realise.least_squares import solve_rows
 from motionmind.realise.legs import find_legs, reach
-from motionmind.realise.limb_turns import LEAST, Limbs, Placed, least_turns, planes_between, turn
+from motionmind.realise.limb_turns import LEAST, Limbs, Placed, is_any_deeper, least_turns, planes_between, turn
 
 ROUNDS = 18  # corrections, each of what those before it have left
 GENTLE = 6  # of them in which limbs are to turn as far as they have to
@@ -66,15 +66,16 @@ def keep_limbs_apart(
         return rotations
     places = skeleton.positions_and_tips(rotations, np.zeros(3))
     ends = np.ascontiguousarray(capsules.place(places))
-    depths, directions = pair_depths(ends, capsules.radii, pairs)
     frames, fps = np.arange(len(rotations)), 1.0 / (times[1] - times[0])
-    held = np.unique(np.concatenate([np.floor(given + 1e-6), np.ceil(given - 1e-6)])).astype(np.int64)
+    held = np.array(sorted({*np.floor(given + 1e-6).tolist(), *np.ceil(given - 1e-6).tolist()}), dtype=np.int64)
     before = np.clip(np.searchsorted(held, frames, side="right") - 1, 0, len(held) - 2)
     share = ((frames - held[before]) / np.diff(held)[before])[:, None]
-    allowed = (1.0 - share) * depths[held[before]] + share * depths[held[before + 1]]
+    deep, _ = pair_depths(ends[held], capsules.radii, pairs)
+    allowed = (1.0 - share) * deep[before] + share * deep[before + 1]
     allowed = np.maximum(allowed, np.maximum(usual, TOUCHES))
-    if not np.any(depths > allowed + LEAST):
+    if not is_any_deeper(ends, capsules.radii, pairs, allowed):
         return rotations
+    depths, directions = pair_depths(ends, capsules.radii, pairs)
     limbs = _limbs_of(skeleton, capsules)
     still = np.zeros((len(rotations), 4))
     if root is not None:
@@ -169,12 +170,14 @@ def _lift_feet(
     sunk = np.maximum(floor[:, None] - limb_heights(skeleton, rotations, root)[:, numbers], 0.0)
     sunk[frozen] = 0.0
     out = rotations.copy()
+    if sunk.max(initial=0.0) <= LEAST:
+        return out
+    world, places = skeleton.global_rotations(rotations), skeleton.positions(rotations, root)
     for (leg, bends), depth in zip(legs, sunk.T, strict=True):
         if depth.max() <= LEAST or fixed[leg].any():
             continue
         lift = _eased(depth, frozen, max(1, round(LIFTS * fps)))
         hip, knee, ankle = leg[bends - 1 : bends + 2]
-        world, places = skeleton.global_rotations(rotations), skeleton.positions(rotations, root)
         target = places[:, ankle] + lift[:, None] * np.array([0.0, 1.0, 0.0])
         thigh, shank = reach(world[:, hip], places[:, [hip, knee, ankle]], target)
         thigh, shank = rot.mul(thigh, world[:, hip]), rot.mul(shank, world[:, knee])

@@ -63,9 +63,9 @@ def _forward_messages(
         for m in range(len(begins)):
             came[ends[m]] += shares[m] * out[t - 1, begins[m]]
         whole = anywhere * _pool(came, clusters, pooled)
-        shared = over * pooled[0]
+        shared = over * pooled[0] + whole
         for i in range(len(came)):
-            out[t, i] = near[t, i] * (STRAIGHT_ON * came[i] + weights[i] * (shared[clusters[i]] + whole))
+            out[t, i] = near[t, i] * (STRAIGHT_ON * came[i] + weights[i] * shared[clusters[i]])
         _scale(out[t])
     return out
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -27,10 +28,10 @@ from motionmind.realise.walks import (
     SIZES,
     TRAVELS_WITHIN,
     TURNS_WITHIN,
-    likelihood,
     squared_differences,
     squared_distances,
     variance_at_ends,
+    write_likelihood,
 )
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
@@ -176,15 +177,15 @@ def _mean_between(
     # Parts do not depend on each other, and compiled loops run side by side. What larger parts share is kept, what
     # belongs to a limb alone is not: of a large corpus it is large.
     threads = min(THREADS, 1 + len(carriage.weights) // BUSY)
-    with ThreadPoolExecutor(threads) as pool:
-        each = pool.map if threads > 1 else map
+    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+        each = map if pool is None else pool.map
         distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
 
         def walk(number: int) -> tuple[Chosen, Floats, float, float]:
             part = parts[number]
             if trees is None:
                 chosen = all_of(carriage, number)
-                own = np.concatenate([of_parts[number] for of_parts in distances])
+                own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
             else:
                 chosen = choose(trees, number, carriage, orientations, path, len(times) - 1)
                 here = _taken(shown, np.asarray(chosen.moments), part)
@@ -193,11 +194,6 @@ def _mean_between(
             return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
-        # Limbs share what walks of larger parts say.
-        shared = {
-            (one, other): SIZES[0] * known[one][1] + SIZES[1] * known[other][1]
-            for one, other in ({numbers[:-1] for numbers in groups} if trees is None else ())
-        }
 
         def move(number: int) -> float:
             mine = known[number] if number in known else walk(number)
@@ -207,7 +203,7 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = SIZES[2] * mine[1] + shared[numbers[0], numbers[1]]
+                    weights = _mixed(*(marginals for _, marginals, *_ in walks))
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
                     weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
@@ -249,11 +245,12 @@ def _part_marginals(
     """
     near = np.ones((len(times), len(chosen.weights)))
     if len(off) > len(ends):
-        near[2:-2:2] = likelihood(off[len(ends) :] / FOLLOWS_WITHIN**2)
+        write_likelihood(near[2:-2:2], off[len(ends) :] / FOLLOWS_WITHIN**2)
     nearest = np.sqrt(off[: len(ends)].min(axis=1))
     known, left_out = None if rates is None else rates(chosen.moments), 0.0
     for k, stop in enumerate(ends):
-        near[-k] = likelihood(off[k] / variance_at_ends(off[k]), *_rate_terms(part, known, stop))
+        variance = variance_at_ends(float(nearest[k]))
+        write_likelihood(near[-k], off[k] / variance, *_rate_terms(part, known, stop))
         if chosen.near is not None:
             mass = chosen.weights @ near[-k]
             near[-k] *= chosen.near[k]
@@ -272,10 +269,10 @@ def _steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
         chosen: the moments, and the corpus's steps between them.
         near: how likely walks begin in each moment [n].
     """
+    if near[chosen.begins].max(initial=0.0) > HARDLY:
+        return chosen.begins, chosen.ends, chosen.shares
     leads = np.zeros(len(near), dtype=np.bool_)
     leads[chosen.begins] = True
-    if near[leads].max(initial=0.0) > HARDLY:
-        return chosen.begins, chosen.ends, chosen.shares
     ends = np.flatnonzero(~leads)
     begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
@@ -312,6 +309,16 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
 
 
 @jit
+def _mixed(whole: Floats, half: Floats, limb: Floats) -> Floats:
+    """Return how likely moments are in walks of all three sizes together [S + 1, N], from those of each."""
+    out = np.empty_like(limb)
+    for t in range(len(out)):
+        for i in range(out.shape[1]):
+            out[t, i] = SIZES[2] * limb[t, i] + (SIZES[0] * whole[t, i] + SIZES[1] * half[t, i])
+    return out
+
+
+@jit
 def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
     """Return the orientations of some joints in some moments [n, m, 4], of all [N, L, 4]."""
     out = np.empty((len(moments), len(joints), 4))
@@ -320,6 +327,19 @@ def _taken(shown: Floats, moments: Ints, joints: Ints) -> Floats:
             for c in range(4):
                 out[i, j, c] = shown[moments[i], joints[j], c]
     return out
+
+
+@jit
+def _spread(near: Floats, middle: Floats) -> float:
+    """Return how far orientations [4, S] are from one of them [4] at most, as vectors: a cosine with that one which is
+    greater has the same sign with all."""
+    farthest = 0.0
+    for t in range(near.shape[1]):
+        far = 0.0
+        for c in range(4):
+            far += (near[c, t] - middle[c]) ** 2
+        farthest = max(farthest, far)
+    return float(np.sqrt(farthest)) + 1e-6
 
 
 @jit
@@ -335,29 +355,37 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
         joints: the m of them.
         about: orientations that choose each quaternion's sign, and stand in for a mean of length 0 [S, m, 4].
     """
-    out, count = about.copy(), len(about)
-    # Side by side for all means, which are then added to at once. A weight of 0 changes no sum.
-    counted = np.empty((weights.shape[1], count))
-    for i in range(len(counted)):
+    out, count, moments = about.copy(), len(about), weights.shape[1]
+    # Side by side for all means, which are then added to at once, four moments at a time. A weight of 0 changes no sum.
+    counted = np.zeros((moments + -moments % 4, count))
+    for i in range(moments):
         for t in range(count):
             counted[i, t] = weights[t, i] if weights[t, i] >= 1e-6 else 0.0
-    near, sums, signed = np.empty((4, count)), np.empty((4, count)), np.empty(count)
+    near, sums, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
         near[:] = about[:, j].T
+        middle = about[count // 2, j]
+        alike = _spread(near, middle)
         sums[:] = 0.0
-        for i in range(len(counted)):
-            x, y, z, w = orientations[i, joints[j]]
-            for t in range(count):
-                cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
-                signed[t] = -counted[i, t] if cosine < 0.0 else counted[i, t]
-            for t in range(count):
-                sums[0, t] += signed[t] * x
-            for t in range(count):
-                sums[1, t] += signed[t] * y
-            for t in range(count):
-                sums[2, t] += signed[t] * z
-            for t in range(count):
-                sums[3, t] += signed[t] * w
+        for first in range(0, len(counted), 4):
+            added, mixed = counted[first : first + 4], False
+            for k in range(4):
+                x, y, z, w = orientations[min(first + k, moments - 1), joints[j]]
+                cosine = middle[0] * x + middle[1] * y + middle[2] * z + middle[3] * w
+                sign = -1.0 if cosine < -alike else 1.0
+                shown[0, k], shown[1, k], shown[2, k], shown[3, k] = sign * x, sign * y, sign * z, sign * w
+                mixed = mixed or abs(cosine) <= alike
+            if mixed:
+                for k in range(4):
+                    x, y, z, w = shown[:, k]
+                    for t in range(count):
+                        cosine = near[0, t] * x + near[1, t] * y + near[2, t] * z + near[3, t] * w
+                        signed[k, t] = -added[k, t] if cosine < 0.0 else added[k, t]
+                added = signed
+            for c in range(4):
+                a, b, d, e = shown[c]
+                for t in range(count):
+                    sums[c, t] = sums[c, t] + added[0, t] * a + added[1, t] * b + added[2, t] * d + added[3, t] * e
         for t in range(count):
             x, y, z, w = sums[:, t]
             length = np.sqrt(x * x + y * y + z * z + w * w)

@@ -27,6 +27,7 @@ from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
 from motionmind.realise.flight import FALLING
+from motionmind.realise.knees import bell
 from motionmind.realise.timeline import Timeline, stretch
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
@@ -111,8 +112,7 @@ def _slower(motion: Motion, most: Floats, moving: tuple[bool, bool]) -> Floats:
     slower[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)
-    weights = np.hanning(2 * reach + 3)[1:-1]
-    around = np.convolve(np.pad(around, reach, mode="edge"), weights / weights.sum(), "valid")
+    around = np.convolve(np.pad(around, reach, mode="edge"), bell(reach), "valid")
     return np.asarray(1.0 + free * (around - 1.0))
 
 

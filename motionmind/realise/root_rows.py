@@ -7,6 +7,8 @@ ballet.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
@@ -18,7 +20,7 @@ from motionmind.realise.bearing import Bearing, Shape
 from motionmind.realise.departures import SETTLES
 from motionmind.realise.feet import Foot
 from motionmind.realise.knees import bend_of
-from motionmind.realise.least_squares import Rows, difference_rows, position_rows
+from motionmind.realise.least_squares import Rows, difference_rows
 from motionmind.realise.legs import SOFT
 
 HEIGHT = 0.01, 0.2  # metres that a standing leg gives or takes, and where it may bend for a jump
@@ -75,16 +77,17 @@ def smooth_rows(prior: Floats, mass: Floats, fps: float, vertical: float) -> lis
 
     At the ends the root is to move as on the trajectory that feet have it on by themselves [N, 3].
     """
-    rows, last = [], len(prior) - 3
+    last = len(prior) - 3
+    bends, first = -(fps**2) * np.diff(mass, 2, axis=0), np.array([*range(last + 1), 0, last])
+    coefficients, targets, weights = np.zeros((3, last + 3, 9)), np.empty((3, last + 3)), np.empty((3, last + 3))
+    leaves, arrives = np.array([-(fps**2), fps**2, 0.0]), np.array([0.0, -(fps**2), fps**2])
     for axis, share in enumerate((1.0, vertical, 1.0)):
-        weights = np.full(last + 1, share * PUSH**-2.0)
-        bends = -(fps**2) * np.diff(mass[:, axis], 2)
-        rows.append(difference_rows(axis, (fps**2, -2.0 * fps**2, fps**2), bends, weights))
-        for first, shares in ((0, (-(fps**2), fps**2, 0.0)), (last, (0.0, -(fps**2), fps**2))):
-            leaves = prior[first : first + 3, axis] @ np.array(shares)
-            row = difference_rows(axis, shares, np.array([leaves]), weights[:1])
-            rows.append(row._replace(first=np.array([first])))
-    return rows
+        of_axis = coefficients[axis, :, axis::3]
+        of_axis[:-2], of_axis[-2], of_axis[-1] = (fps**2, -2.0 * fps**2, fps**2), leaves, arrives
+        targets[axis, :-2] = bends[:, axis]
+        targets[axis, -2:] = prior[:3, axis] @ leaves, prior[last:, axis] @ arrives
+        weights[axis] = share * PUSH**-2.0
+    return [Rows(first, *of_axis) for of_axis in zip(coefficients, targets, weights, strict=True)]
 
 
 def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats) -> list[Rows]:
@@ -94,7 +97,8 @@ def standing_rows(shape: Shape, bearing: Bearing, floor: Floats, freedom: Floats
     for number in range(shape.low.shape[1]):
         load = bearing.loads[:, number]
         rows.append(_axis_rows(1, floor - shape.low[:, number], load * height))
-        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], load * PLACE**-2.0) for axis in (0, 2)]
+        firmly = load * PLACE**-2.0
+        rows += [_axis_rows(axis, bearing.targets[:, number, axis // 2], firmly) for axis in (0, 2)]
     for part in np.flatnonzero(np.isfinite(shape.low_others[0])):
         rows.append(_axis_rows(1, floor - shape.low_others[:, part], bearing.others[:, part] * RIGID**-2.0))
     # Where nothing bears, or hardly, the lowest point is near the floor.
@@ -109,51 +113,44 @@ def sunk_rows(shape: Shape, floor: Floats, root: Floats) -> Rows:
     return _axis_rows(1, np.where(sunk, height, 0.0), np.where(sunk, RIGID**-2.0, 0.0))
 
 
-def reach_rows(
-    skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    fps: float,
-) -> list[Rows]:
+def reach_rows(legs: tuple[Floats, Floats], bearing: Bearing, root: Floats, bones: Floats, fps: float) -> Rows:
     """Return rows that bring the root [N, 3] near enough to feet that stand farther than their legs reach.
 
     A leg may be as long as the movement has it; leaning elsewhere, not quite straight.
 
     Args:
-        skeleton: the body.
-        legs: each leg in the movement, and as long as it must be, as `legs_to_places` returns them.
+        legs: those in the movement, and as long as they must be, as `legs_to_places` returns them.
         bearing: what bears it.
         root: positions of the root [N, 3], metres.
-        feet: its feet.
+        bones: lengths of the legs' thighs and shanks [feet, 2], metres.
         fps: frames a second.
     """
-    every = np.arange(len(root))
-    return [
-        Rows(every, *_reach_rows(*legs[number], bearing.targets, bearing.stands, number, root, length, SETTLES * fps))
-        for number, length in enumerate(foot.length(skeleton) for foot in feet)
-    ]
+    lengths, every = bones.sum(axis=1), np.tile(np.arange(len(root)), len(bones))
+    return Rows(every, *_reach_rows(*legs, bearing.targets, bearing.stands, root, lengths, SETTLES * fps))
 
 
 @jit
 def _reach_rows(
-    own: Floats, leg: Floats, targets: Floats, stands: Bools, foot: int, root: Floats, length: float, settles: float
+    own: Floats, legs: Floats, targets: Floats, stands: Bools, root: Floats, lengths: Floats, settles: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg is of some length, metres.
+    """Return the coefficients [feet N, 9], targets and weights of rows, foot by foot, of legs of such lengths, metres.
 
-    In the first and the last frames, which it `settles` in, a row has less weight.
+    In the first and the last frames, which they settle in, rows have less weight.
     """
     count = len(root)
-    coefficients, aims, weights = np.zeros((count, 9)), np.zeros(count), np.zeros(count)
-    for t in range(count):
-        x, z = targets[t, foot, 0] - root[t, 0], targets[t, foot, 1] - root[t, 2]
-        bent = SOFT * min((x * x + z * z) / LEANS**2, 1.0)
-        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
-        longest = length * max(min(was / length, 1.0 - bent), 1.0 - SOFT)
-        if far > longest + 1e-6 and stands[t, foot]:
-            aims[t] = _write_along(leg[t], far, 1.0, root[t], coefficients[t]) + far - longest
-            weights[t] = (min(min(t, count - 1 - t) / settles, 1.0) / REACH) ** 2
+    rows = len(legs) * count
+    coefficients, aims, weights = np.zeros((rows, 9)), np.zeros(rows), np.zeros(rows)
+    for foot in range(len(legs)):
+        length = lengths[foot]
+        for t in range(count):
+            row = foot * count + t
+            x, z = targets[t, foot, 0] - root[t, 0], targets[t, foot, 1] - root[t, 2]
+            bent = SOFT * min((x * x + z * z) / LEANS**2, 1.0)
+            was, far = length_of(vector(own[foot, t])), length_of(vector(legs[foot, t]))
+            longest = length * max(min(was / length, 1.0 - bent), 1.0 - SOFT)
+            if far > longest + 1e-6 and stands[t, foot]:
+                aims[row] = _write_along(legs[foot, t], far, 1.0, root[t], coefficients[row]) + far - longest
+                weights[row] = (min(min(t, count - 1 - t) / settles, 1.0) / REACH) ** 2
     return coefficients, aims, weights
 
 
@@ -168,73 +165,70 @@ def _write_along(leg: Floats, far: float, times: float, root: Floats, coefficien
     return total
 
 
-def knee_rows(
-    skeleton: Skeleton,
-    legs: list[tuple[Floats, Floats]],
-    bearing: Bearing,
-    root: Floats,
-    feet: list[Foot],
-    freedom: Floats,
-) -> list[Rows]:
+def knee_rows(legs: tuple[Floats, Floats], bearing: Bearing, root: Floats, bones: Floats, freedom: Floats) -> Rows:
     """Return rows that let the knees of standing legs bend as the movement has them: arguments as for `reach_rows`.
 
     A leg that is all but straight bends its knee by much for a little of its length; the root goes along with it
     then, as a body goes over a leg that it stands on. Where the legs are free, for a flight, they bend for that.
     """
-    every = np.arange(len(root))
-    return [
-        Rows(every, *_knee_rows(*legs[number], bearing.loads, number, root, freedom, *foot.bones(skeleton)))
-        for number, foot in enumerate(feet)
-    ]
+    every = np.tile(np.arange(len(root)), len(bones))
+    return Rows(every, *_knee_rows(*legs, bearing.loads, root, freedom, bones))
 
 
 @jit
 def _knee_rows(
-    own: Floats, leg: Floats, loads: Floats, foot: int, root: Floats, freedom: Floats, thigh: float, shank: float
+    own: Floats, legs: Floats, loads: Floats, root: Floats, freedom: Floats, bones: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the coefficients [N, 9], targets and weights of rows for a foot, whose leg has bones of these lengths."""
+    """Return the coefficients [feet N, 9], targets and weights of rows, foot by foot, of legs with bones of these
+    lengths [feet, 2], metres."""
     count = len(root)
-    coefficients, aims, weights = np.zeros((count, 9)), np.empty(count), np.empty(count)
-    for t in range(count):
-        was, far = length_of(vector(own[t])), length_of(vector(leg[t]))
-        bend = max(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
-        lever = far / (thigh * shank * np.sin(bend))  # radians that the knee bends a metre of the leg's length
-        aims[t] = _write_along(leg[t], far, lever, root[t], coefficients[t]) + lever * (far - was)
-        weights[t] = loads[t, foot] * (1.0 - freedom[t]) * KNEE**-2.0
+    rows = len(legs) * count
+    coefficients, aims, weights = np.zeros((rows, 9)), np.empty(rows), np.empty(rows)
+    for foot in range(len(legs)):
+        thigh, shank = bones[foot]
+        for t in range(count):
+            row = foot * count + t
+            was, far = length_of(vector(own[foot, t])), length_of(vector(legs[foot, t]))
+            bend = max(0.5 * (bend_of(was, thigh, shank) + bend_of(far, thigh, shank)), STRAIGHT)
+            lever = far / (thigh * shank * np.sin(bend))  # radians that the knee bends a metre of the leg's length
+            aims[row] = _write_along(legs[foot, t], far, lever, root[t], coefficients[row]) + lever * (far - was)
+            weights[row] = loads[t, foot] * (1.0 - freedom[t]) * KNEE**-2.0
     return coefficients, aims, weights
 
 
-def legs_to_places(
-    skeleton: Skeleton,
-    places: Floats,
-    shape: Shape,
-    bearing: Bearing,
-    floor: Floats,
-    root: Floats,
-    feet: list[Foot],
-) -> list[tuple[Floats, Floats]]:
-    """Return each leg from its hip to its end [N, 3], metres, in the movement, and where its foot has its place.
+def legs_of(skeleton: Skeleton, places: Floats, feet: list[Foot]) -> Floats:
+    """Return legs from hip to end [feet, N, 3], metres, from places of joints and tips [N, 2 J, 3]."""
+    out = np.empty((len(feet), len(places), 3))
+    for number, foot in enumerate(feet):
+        hip, _, end = foot.chain(skeleton)
+        np.subtract(places[:, end], places[:, hip], out=out[number])
+    return out
+
+
+def legs_to_places(own: Floats, shape: Shape, bearing: Bearing, floor: Floats, root: Floats) -> tuple[Floats, Floats]:
+    """Return the legs from hip to end [feet, N, 3], metres, in the movement, and where their feet have their places.
 
     Args:
-        skeleton: the body.
-        places: of joints and tips relative to the root [N, 2 J, 3], metres.
+        own: the legs in the movement.
         shape: the body.
         bearing: what bears it.
         floor: height of the floor [N], metres.
         root: positions of the root [N, 3], metres.
-        feet: its feet.
     """
-    out = []
-    for number, foot in enumerate(feet):
-        hip, end = (places[:, joint] for joint in foot.chain(skeleton)[::2])
-        own = end - hip
-        leg = own - root
-        leg[:, [0, 2]] += bearing.targets[:, number]
-        leg[:, 1] += floor - shape.low[:, number]
-        out.append((own, leg))
-    return out
+    legs = own - root
+    legs[..., ::2] += bearing.targets.swapaxes(0, 1)
+    legs[..., 1] += floor - shape.low.T
+    return own, legs
 
 
 def _axis_rows(axis: int, targets: Floats, weights: Floats) -> Rows:
     """Return rows for one coordinate of a trajectory in all its frames: targets [N], weights [N]."""
-    return position_rows(np.arange(len(targets)), np.eye(3)[axis], targets, weights)
+    return Rows(*_one_coordinate(axis, len(targets)), targets, weights)
+
+
+@lru_cache(maxsize=64)
+def _one_coordinate(axis: int, count: int) -> tuple[Ints, Floats]:
+    """Return what rows for one coordinate in so many frames begin with [count], and their coefficients [count, 9]."""
+    coefficients = np.zeros((count, 9))
+    coefficients[:, axis] = 1.0
+    return np.arange(count), coefficients

@@ -79,21 +79,23 @@ def squared_differences(rates: Floats, rate: Floats) -> Floats:
     return out / len(rate)
 
 
-def variance_at_ends(squared_distances: Floats) -> float:
+def variance_at_ends(nearest: float) -> float:
     """Return the variance of a walk's end about the given posture, radians^2.
 
     Args:
-        squared_distances: of the corpus's moments from the posture [N], radians^2 a joint.
+        nearest: distance of the corpus's nearest moment from the posture, radians a joint.
     """
-    nearest = float(np.sqrt(squared_distances.min()))
-    return float(np.clip(OF_NEAREST * nearest, *ENDS_WITHIN)) ** 2
+    least, most = ENDS_WITHIN
+    return min(max(OF_NEAREST * nearest, least), most) ** 2
 
 
-def likelihood(*terms: Floats) -> Floats:
-    """Return exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [..., N].
+def write_likelihood(out: Floats, *terms: Floats) -> None:
+    """Write exp(-sum of terms / 2) for each of the corpus's moments, over that of the likeliest [..., N].
 
     Args:
+        out: where to.
         terms: squared distances in units of a variance [..., N] each.
     """
-    exponent = 0.5 * sum(terms[1:], start=terms[0])
-    return np.asarray(np.exp(exponent.min(axis=-1, keepdims=True) - exponent))
+    np.multiply(0.5, sum(terms[1:], start=terms[0]), out=out)
+    np.subtract(out.min(axis=-1, keepdims=True), out, out=out)
+    np.exp(out, out=out)

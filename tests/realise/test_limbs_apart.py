@@ -12,7 +12,7 @@ from motionmind.body.contact import lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Posture
 from motionmind.geometry import rotations as rot
-from motionmind.realise.limb_turns import LEAST, Placed, least_turns
+from motionmind.realise.limb_turns import LEAST, Placed, is_any_deeper, least_turns
 from motionmind.realise.limbs_apart import _give_way, _limbs_of, keep_limbs_apart
 from motionmind.tween.engine import Engine
 
@@ -227,3 +227,20 @@ def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
         left.append(legs_depth(body, engine.tween(a, b, without=["limbs"]).motion.rotations).max() - own)
     assert max(left) > 0.03
     assert max(kept) < 0.03
+
+
+def test_any_pair_that_is_deeper_than_allowed_is_seen() -> None:
+    capsules = capsules_of(BODY)
+    pairs = capsules.pairs()
+    rng = np.random.default_rng(0)
+    rotations = rot.exp(0.7 * rng.normal(size=(40, len(BODY), 3)))
+    ends = np.ascontiguousarray(capsules.place(BODY.positions_and_tips(rotations, np.zeros(3))))
+    depths, _ = pair_depths(ends, capsules.radii, pairs)
+    deepest = np.sort(depths.max(axis=0))
+    assert deepest[-1] > 0.02
+    assert deepest[0] < 0.0
+    for off in (-1e-9, 1e-9):
+        for frame, pair in np.argwhere(depths > LEAST)[::7]:
+            allowed = np.full(depths.shape, 1.0)
+            allowed[frame, pair] = depths[frame, pair] - LEAST + off
+            assert is_any_deeper(ends, capsules.radii, pairs, allowed) == (off < 0.0)

@@ -173,6 +173,18 @@ def test_the_mean_of_rotations_about_one_axis_whatever_their_signs(signs: tuple[
     np.testing.assert_array_equal(none, about)
 
 
+def test_the_mean_of_rotations_takes_each_in_the_hemisphere_of_what_it_is_about() -> None:
+    rng = np.random.default_rng(3)
+    q, weights = rot.normalise(rng.normal(size=(23, 2, 4))), rng.uniform(size=(6, 23))  # no multiple of four moments
+    weights[weights < 0.2] = 1e-7  # too little to count
+    for spread in (0.01, 0.5, 5.0):  # the wider, the more rotations have one sign here and the other there
+        about = rot.normalise(np.array([0.1, 0.2, 0.3, 0.9]) + spread * rng.normal(size=(6, 2, 4)))
+        cosines = np.einsum("tjc,ijc->tij", about, q)
+        counted = np.where(weights < 1e-6, 0.0, weights)[..., None] * np.sign(cosines)
+        expected = rot.normalise(np.einsum("tij,ijc->tjc", counted, q))
+        np.testing.assert_allclose(mean_rotations(weights, q, np.arange(2), about), expected, atol=1e-12)
+
+
 def test_parts_are_as_far_from_postures_as_their_joints_are_in_the_mean() -> None:
     rng = np.random.default_rng(5)
     shown, postures = rot.normalise(rng.normal(size=(7, 3, 4))), rot.normalise(rng.normal(size=(2, 3, 4)))
