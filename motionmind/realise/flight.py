@@ -111,7 +111,8 @@ def _time_of_fall(
     Args:
         standing: height of the centre of mass on the floor, from the frame in the air back [N], metres.
         mass: its height in the air, metres.
-        rate: its velocity there, metres a second, upward; None for the top of the flight, if there is time for it.
+        rate: its velocity there, metres a second, upward; None for the top of the flight, or as near it as there is
+            time for, and as lets it come off the floor in a whole frame.
         longest: how many frames it may take.
         gravity: metres a second squared.
         fps: frames a second.
@@ -132,7 +133,11 @@ def _time_of_fall(
     either = [max(first - 1, 1), first]
     rates = (mass - standing[either]) / seconds[either] - 0.5 * gravity * seconds[either]
     nearest = int(np.abs(rates - rate).argmin())
-    return either[nearest], float(rates[nearest])
+    if (
+        abs(rates[nearest] - rate) > gravity / fps
+    ):  # so near the floor, or on a posture so much higher, no fall is whole
+        return first, rate
+    return int(either[nearest]), float(rates[nearest])
 
 
 def flying_frames(flights: list[Flight], hovering: tuple[bool, bool], count: int) -> Bools:
@@ -211,7 +216,7 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
     out, fall = root.copy(), np.zeros(len(root))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
     for start, stop in runs_of(_without_gaps(up & (fall > FALLING), up & (fall > -FALLING), round(PAUSES * fps))):
-        if stop - start < 2:  # a kink, and no fall
+        if stop - start < 2 or fall[start:stop].mean() < FALLING:  # a kink, or trembling, and no fall
             continue
         seconds = np.arange(stop - start + 2) / fps
         line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))

@@ -87,7 +87,7 @@ def planes_between(inside: Bools, directions: Floats, pairs: Ints, owner: Ints, 
 
 @jit
 def is_any_deeper(ends: Floats, radii: Floats, pairs: Ints, allowed: Floats) -> bool:
-    """Return whether a pair of capsules is deeper in each other than allowed, by LEAST or more.
+    """Return whether a pair of capsules is deeper in each other than allowed, by more than LEAST.
 
     Args:
         ends: of the capsules' axes [N, C, 2, 3], metres.

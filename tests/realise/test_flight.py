@@ -140,6 +140,20 @@ def test_a_fall_goes_on_where_legs_are_drawn_up_and_ends_where_something_pushes(
         assert (fell[14, 1] == bumpy[14, 1]) != goes_on
 
 
+def test_a_body_that_trembles_off_the_floor_does_not_fall() -> None:
+    """Somebody holds it up for a second, and it is shaken by millimetres: accelerations of gravity and more."""
+    rng = np.random.default_rng(0)
+    for fps, shakes in ((30.0, 2e-3), (60.0, 5e-4), (120.0, 1e-4)):
+        frames = int(2.0 * fps)
+        rotations = np.tile(rot.IDENTITY, (frames, len(BODY), 1))
+        root = stand(BODY, rotations, np.zeros((frames, 3)), np.zeros(frames))
+        up = np.clip(np.minimum(np.arange(frames), np.arange(frames)[::-1]) / (0.5 * fps), 0.0, 1.0)
+        root[:, 1] += 0.3 * up + shakes * rng.normal(size=frames) * (up > 0.5)
+        given = np.zeros(frames, dtype=np.bool_)
+        given[[0, -1]] = True
+        assert np.abs(fall_freely(BODY, rotations, root, given, fps) - root).max() < 0.03
+
+
 def test_a_body_that_is_up_for_another_reason_does_not_fall() -> None:
     """It hangs, or its floor is lower than it was said to be: nothing falls there."""
     rotations, root, given = leap()
