@@ -39,7 +39,7 @@ def limbs_of(skeleton: Skeleton) -> list[list[int]]:
 
     On a person these are the legs, the arms, and neck with head.
     """
-    return [[*limb] for limb in _limbs_of(tuple(map(int, skeleton.parents)))]
+    return [[*limb] for limb in _limbs_of(skeleton.parents)]
 
 
 @lru_cache(maxsize=64)

@@ -68,6 +68,8 @@ class Skeleton:
             raise SkeletonError(f"skeleton {self.name!r} has an offset that is not a finite number")
         offsets.setflags(write=False)
         tips.setflags(write=False)
+        object.__setattr__(self, "names", tuple(self.names))
+        object.__setattr__(self, "parents", tuple(map(int, self.parents)))
         object.__setattr__(self, "offsets", offsets)
         object.__setattr__(self, "tips", tips)
 

@@ -166,6 +166,7 @@ def standing_rise(skeleton: Skeleton, rotations: Floats, root: Floats) -> float:
 
 @cache
 def _extent_of_person() -> float:
+    """Return the greatest extent of human23 at rest, metres."""
     return _extent(human23())
 
 

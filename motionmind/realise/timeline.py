@@ -26,7 +26,7 @@ class Timeline(NamedTuple):
     usual_moves: int
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)
 def usual(transitions: Transitions) -> float:
     """Return the usual duration of the corpus's moves, seconds: the median; 1 for a corpus without moves."""
     return float(np.median(transitions.seconds)) if len(transitions.seconds) else 1.0

@@ -13,6 +13,7 @@ from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
+from motionmind.realise.legs import find_legs
 
 BODY = human23()
 
@@ -55,6 +56,13 @@ def test_forward_kinematics_is_a_product_of_matrices(skeleton: Skeleton) -> None
         np.testing.assert_allclose(
             fixed, joints[[5, 2, 5]] + (frames[[5, 2, 5]] @ points[..., None])[..., 0], atol=1e-13
         )
+
+
+def test_joints_may_be_given_in_lists_and_arrays() -> None:
+    same = Skeleton("human23", list(BODY.names), np.array(BODY.parents), BODY.offsets, BODY.tips)  # type: ignore[arg-type]
+    assert same == BODY
+    assert (same.names, same.parents) == (BODY.names, BODY.parents)
+    assert find_legs(same) == find_legs(BODY)
 
 
 @pytest.mark.parametrize("skeleton", [BODY, some_tree(3)], ids=["human23", "tree"])
