@@ -181,7 +181,8 @@ def _grow(shown: Singles, bounds: Int32s, order: Int32s, centres: Singles, radii
                 keys[k] = squared_distance(own[k], one) - squared_distance(own[k], other)
             sorted_by_key = np.argsort(keys[: len(own)], kind="mergesort")
             order[start:stop] = order[start:stop][sorted_by_key]
-            own[:] = own[sorted_by_key]
+            for j in range(joints):  # one by one: a copy of all may not fit into memory
+                own[:, j] = own[sorted_by_key, j]
 
 
 @jit
