@@ -90,12 +90,15 @@ function Rail({ name, open }) {
   </nav>`;
 }
 
+const LONGEST = 3000; // milliseconds that the body waits for the small pictures
+
 /** Wait until what is on the page now is painted. */
 function painted() {
   return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }
 
 async function start() {
+  const shown = Promise.race([pictured.then(painted), new Promise((done) => setTimeout(done, LONGEST))]);
   const open = new Open();
   const toasts = new Toasts();
   const keys = new Keys();
@@ -108,8 +111,8 @@ async function start() {
     toasts,
     keys,
     window: api.window,
-    /** Wait until the first small pictures are painted. @returns {Promise<unknown>} */
-    pictured: () => pictured.then(painted),
+    /** Wait until the first small pictures are painted, but not for long. @returns {Promise<unknown>} */
+    pictured: () => shown,
     open: (/** @type {string} */ panel) => open.set(panel),
     say: toasts.say.bind(toasts),
     /** Do something that may fail, and say in one line why it did. @param {() => Promise<any>} doing */

@@ -87,6 +87,12 @@ export function preparing(store) {
   return [...store.jobs.values()].find(({ kind, state }) => kind === "getting ready" && state === "running");
 }
 
+/** What searches wait for, in words; none once the rest is got ready beside them. @param {Store} store */
+export function awaited(store) {
+  const words = preparing(store)?.words;
+  return words?.startsWith("getting ready") ? words : undefined;
+}
+
 /**
  * What `pick` takes from the store; the view is made again when that changes.
  * @template T

@@ -2,7 +2,7 @@
 
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.js";
 import { thumbnail } from "../places.js";
-import { preparing } from "../store.js";
+import { awaited } from "../store.js";
 import { useChange, useKeys } from "../shell/hooks.js";
 import { icon } from "../shell/icons.js";
 import { deskOf } from "./desk.js";
@@ -32,7 +32,7 @@ function Alternatives({ studio }) {
   const found = useChange(desk, () => desk.found);
   const state = useChange(desk, () => desk.state);
   const words = useChange(desk, () => desk.words);
-  const getting = useChange(studio.store, () => preparing(studio.store)?.words);
+  const getting = useChange(studio.store, () => awaited(studio.store));
   const chosen = useChange(desk, () => desk.chosen);
   const dark = useChange(theme, () => theme.dark);
   const [quartet, setQuartet] = useState(/** @type {Quartet | null} */ (null));

@@ -26,9 +26,10 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
   const { blocks } = piece;
   const [first, stop] = seen(blocks, sight);
   const chosen = nameOf(selection);
-  const stops = chosen.startsWith("block") ? chosen : `block ${blocks[first]?.id}`;
+  const there = blocks.slice(first, stop);
+  const stops = there.some(({ id }) => chosen === `block ${id}`) ? chosen : `block ${there[0]?.id}`;
   return html`<div class="track stretches" role="listbox" aria-label="Stretches" aria-orientation="horizontal">
-    ${blocks.slice(first, stop).map((block, i) => {
+    ${there.map((block, i) => {
       const name = `block ${block.id}`;
       const mine = draft?.id === block.id ? draft : null;
       const change = mine?.kind === "trim" ? trimmed(block, mine, does.times(block)) : null;
@@ -56,7 +57,7 @@ export function Stretches({ does, piece, sight, draft, selection, thumbnail }) {
         }}
       >
         ${width > 18 && !block.missing && html`<img alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, block.first)} />`}
-        ${strip.map(({ x, frame }) => html`<img key=${x} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
+        ${strip.map(({ x, frame }) => html`<img key=${frame} class="later" alt="" loading="lazy" draggable=${false} src=${thumbnail(block.key, frame)} style=${{ left: `${x}px` }} />`)}
         ${width > 70 && html`<span class="name cut" style=${{ maxWidth: strip.length ? `${strip[0].x - NAMED}px` : "" }}>${block.missing ? "? " : ""}${block.mirrored ? "⇋ " : ""}${block.title}</span>`}
         ${!held && html`<i class="edge first" data-edge="first"></i><i class="edge last" data-edge="last"></i>`}
       </div>`;
@@ -71,7 +72,8 @@ export function Seams({ piece, sight, draft, selection, over }) {
   const [first, stop] = seen(piece.seams, sight);
   const chosen = nameOf(selection);
   const there = piece.seams.slice(first, stop).filter(shown);
-  const stops = chosen.startsWith("seam") ? chosen : there[0] && nameOf(selectionOf({ seam: there[0] }));
+  const names = there.map((seam) => nameOf(selectionOf({ seam })));
+  const stops = names.includes(chosen) ? chosen : names[0];
   return html`<div class="track seams" role="listbox" aria-label="Seams and insertions" aria-orientation="horizontal">
     ${there.map((seam) => {
       const name = nameOf(selectionOf({ seam }));
