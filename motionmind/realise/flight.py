@@ -215,9 +215,7 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         return root
     out, fall = root.copy(), np.zeros(len(root))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
-    for start, stop in runs_of(_without_gaps(up & (fall > FALLING), up & (fall > -FALLING), round(PAUSES * fps))):
-        if stop - start < 2 or fall[start:stop].mean() < FALLING:  # a kink, or trembling, and no fall
-            continue
+    for start, stop in _falls(fall, up, round(PAUSES * fps)):
         seconds = np.arange(stop - start + 2) / fps
         line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
         fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
@@ -225,10 +223,22 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
     return out
 
 
-def _without_gaps(flags: Bools, bridges: Bools, most: int) -> Bools:
-    """Return flags [N] with gaps of at most so many frames closed, where all of the gap `bridges` it [N]."""
-    out = flags.copy()
-    for start, stop in runs_of(~flags):
-        if start > 0 and stop < len(flags) and stop - start <= most and bridges[start:stop].all():
-            out[start:stop] = True
+def _falls(fall: Floats, up: Bools, pauses: int) -> list[tuple[int, int]]:
+    """Return the first frame of each fall, and the one after its last.
+
+    Args:
+        fall: downward acceleration of the mass, in gravities [N].
+        up: where the body is off the floor [N].
+        pauses: frames of a pause at most.
+    """
+    fast = up & (fall > FALLING)
+    whole = fast.copy()
+    for start, stop in runs_of(~fast):
+        if start > 0 and stop < len(fast) and stop - start <= pauses:
+            whole[start:stop] = np.all(up[start:stop] & (fall[start:stop] > -FALLING))
+    out = []
+    for start, stop in runs_of(whole):
+        # What trembles falls on the whole no faster than that: then pauses part it.
+        parts = [(0, stop - start)] if fall[start:stop].mean() > FALLING else runs_of(fast[start:stop])
+        out += [(start + first, start + last) for first, last in parts if last - first > 1]
     return out
