@@ -25,6 +25,7 @@ BEYOND = 99.5  # percentile of the dancers' own windows
 TOUCHING = 0.01  # metres: legs that are no deeper in each other touch
 REST = 0.5  # metres a second squared: level acceleration of a body at rest; weight is looked at up to CALM
 STILL_JOINT = 0.5  # rad/s: no joint's limit is less
+_ENOUGH = 30  # frames of which the greatest hundredth says something
 _FEW = 50  # windows; where clips have fewer of a length, whole clips count as well
 
 
@@ -40,6 +41,7 @@ class Seen(NamedTuple):
             less than REST in the frames before and after, too [T, 3], metres, else NaN; or empty.
         fall: vertical acceleration in frames in the air whose neighbours are in the air, too, m/s^2.
         skates: whether a foot skates [T - 1].
+        swings: whether a foot moves as fast as that, low or not [T - 1].
         airborne: whether the body is in the air [T].
         falls: whether it falls there, by more than half of gravity [T].
     """
@@ -50,6 +52,7 @@ class Seen(NamedTuple):
     lean: Floats
     fall: Floats
     skates: Bools
+    swings: Bools
     airborne: Bools
     falls: Bools
 
@@ -79,7 +82,8 @@ def see(motion: Motion) -> Seen:
         "legs": legs_depth(body, rotations),
     }
     joints = FPS * rot.angle(rotations[:-1], rotations[1:])
-    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, support.airborne, falls)
+    swings = foot_slides(body, rotations, root, np.inf).max(axis=1, initial=0.0) > FAR  # all are under such a floor
+    return Seen(greatest, joints, bounce, lean, fall, slides > FAR, swings, support.airborne, falls)
 
 
 class Limits(NamedTuple):
@@ -89,7 +93,7 @@ class Limits(NamedTuple):
         most: of each of `MEASURES`; that of the joints as a multiple of `joints`.
         joints: what each joint's greatest speed exceeds in one window of two hundred [J], rad/s.
         own: share of the dancers' windows that are beyond any of them.
-        leans: shares of the dancers' windows in which the mass is beyond each of `Dancers.lean` [3].
+        leans: shares of the dancers' windows in which the mass is beyond each of `Dancers.lean` [3]; NaN as there.
     """
 
     most: dict[str, float]
@@ -149,6 +153,7 @@ class Dancers:
         beyond = np.any([all_of[name][:count] > most[name] for name in MEASURES], axis=0)
         leans = [np.nan_to_num(seen.lean) > self.lean for seen in chosen if len(seen.lean)]
         out = greatest(leans, 0).mean(axis=0) if leans else np.zeros(3)
+        out[np.isnan(self.lean)] = np.nan
         return Limits(most, each, float(beyond.mean()), out)
 
     def worst(self, seen: Seen) -> dict[str, float]:
@@ -167,10 +172,11 @@ class Dancers:
     def lean(self) -> Floats:
         """The 99th percentiles of how far it is outside of what they stand on, as in `Seen` [3], metres.
 
-        NaN where they never are so.
+        NaN where they are so in too few frames to tell.
         """
         leans = np.concatenate([seen.lean for seen in self.seen])
-        return np.array([_percentile([those[np.isfinite(those)]]) for those in leans.T])
+        known = [those[np.isfinite(those)] for those in leans.T]
+        return np.array([_percentile([those] if len(those) >= _ENOUGH else []) for those in known])
 
     def far_pairs(self, count: int, seed: int) -> list[tuple[int, int]]:
         """Random pairs of postures."""

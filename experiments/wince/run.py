@@ -67,6 +67,7 @@ def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: 
                 bounces[maker].append(seen.bounce)
     own = {
         "own_skates": max(float(np.concatenate([seen.skates for seen in danced.seen]).mean()), 1e-6),
+        "own_swings": float(np.concatenate([seen.swings for seen in danced.seen]).mean()),
         "own_falls": _share_of_falls([seen.fall for seen in danced.seen]),
     }
     pooled = {maker: np.concatenate([*values, np.zeros(0)]) for maker, values in bounces.items()}
@@ -120,6 +121,7 @@ def _row(
         "crossed": 0,
         "rise": float("nan"),
         "skates": float("nan"),
+        "swings": float("nan"),
         "airborne": 0,
         "falls": 0,
     }
@@ -141,6 +143,7 @@ def _row(
         "crossed": int(seen.greatest["legs"].max() > CROSSED),
         "rise": standing_rise(motion.skeleton, motion.rotations, motion.root) if kind == "one leg" else float("nan"),
         "skates": float(seen.skates.mean()) if len(seen.skates) else 0.0,
+        "swings": float(seen.swings.mean()) if len(seen.swings) else 0.0,
         "airborne": len(seen.fall),
         "falls": int(_is_falling(seen.fall).sum()),
     }
@@ -171,14 +174,15 @@ def tell(rows: list[Row]) -> str:
         "pairs of": lambda r: r["by"],
         "made by": lambda r: r["maker"],
         "bounce over the dancers'": lambda r: f"{r['rows'][0]['bounce']:.2f}",
-        "leans": lambda r: _interval(r["rows"], "leans"),
-        "their own windows": lambda r: f"{_mean(r['rows'], 'own_leans'):.0%}",
-        "leans at rest": lambda r: _interval(r["rows"], "rests"),
-        "their own, at rest": lambda r: f"{_mean(r['rows'], 'own_rests'):.0%}",
-        "at rest for 0.1 s": lambda r: _interval(r["rows"], "stays"),
-        "their own, at rest for 0.1 s": lambda r: f"{_mean(r['rows'], 'own_stays'):.0%}",
+        "leans": lambda r: _leans(r["rows"], "leans"),
+        "their own windows": lambda r: _percent(_mean(r["rows"], "own_leans")),
+        "leans at rest": lambda r: _leans(r["rows"], "rests"),
+        "their own, at rest": lambda r: _percent(_mean(r["rows"], "own_rests")),
+        "at rest for 0.1 s": lambda r: _leans(r["rows"], "stays"),
+        "their own, at rest for 0.1 s": lambda r: _percent(_mean(r["rows"], "own_stays")),
         "legs over 3 cm": lambda r: _interval(r["rows"], "crossed"),
         "skates over the dancers'": lambda r: f"{_mean(r['rows'], 'skates') / r['rows'][0]['own_skates']:.2f}",
+        "of fast feet": lambda r: f"{_skates_of_swings(r['rows']):.2f}",
         "standing feet that rise": lambda r: _rises(r["one leg"]),
         "falls in the air": lambda r: _falls(r["rows"] + r["jump"]),
         "their own": lambda r: _percent(r["rows"][0]["own_falls"]),
@@ -250,6 +254,17 @@ def _interval(rows: list[Row], name: str) -> str:
     draws = np.random.default_rng(0).integers(len(values), size=(4000, len(values)))
     low, high = np.percentile(values[draws].mean(axis=1), [2.5, 97.5])
     return f"{values.mean():.0%} ({low:.0%} to {high:.0%})"
+
+
+def _leans(rows: list[Row], name: str) -> str:
+    """Return the share of movements that lean, with its interval; none where the dancers do not say what is usual."""
+    return _interval(rows, name) if np.isfinite(_mean(rows, f"own_{name}")) else "none"
+
+
+def _skates_of_swings(rows: list[Row]) -> float:
+    """Return how much of the time in which feet are fast they skate, over the dancers'."""
+    own = rows[0]["own_skates"] / rows[0]["own_swings"]
+    return _mean(rows, "skates") / max(_mean(rows, "swings"), 1e-9) / own
 
 
 def _rises(rows: list[Row]) -> str:
