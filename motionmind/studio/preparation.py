@@ -1,4 +1,4 @@
-"""What makes searches fast the first time, told of truthfully: how far it is, and how long it will take."""
+"""Preparation: how far it is with what makes searches fast the first time, and how long it will take, in words."""
 
 from __future__ import annotations
 

@@ -569,7 +569,7 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
     wait("!!window.motionmind")
     assert inner.evaluate("document.documentElement.scrollHeight") == 400
     inner.click("#play")
-    wait("motionmind.player.time > 0.0")
+    wait("motionmind.player.time > 0.0 && document.hasFocus()")
     tab.keyboard.press("Space")  # the clicked frame has the keys
     wait("!motionmind.player.playing")
     inner.evaluate("motionmind.player.seek(0.15)")
