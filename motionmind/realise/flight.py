@@ -129,13 +129,12 @@ def _time_of_fall(
     first = int(below[0]) + 1
     if not free:
         return first, rate
-    # It comes off the floor in a whole frame: with which of the two velocities nearest to that one?
+    # It is to come off the floor in a whole frame: of the two about that moment, in the one nearer to that velocity.
     either = [max(first - 1, 1), first]
     rates = (mass - standing[either]) / seconds[either] - 0.5 * gravity * seconds[either]
     nearest = int(np.abs(rates - rate).argmin())
-    if (
-        abs(rates[nearest] - rate) > gravity / fps
-    ):  # so near the floor, or on a posture so much higher, no fall is whole
+    # Too near the floor, or over a posture so much higher, it comes off in no whole frame.
+    if abs(rates[nearest] - rate) > gravity / fps:
         return first, rate
     return int(either[nearest]), float(rates[nearest])
 

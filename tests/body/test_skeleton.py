@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,7 +60,8 @@ def test_forward_kinematics_is_a_product_of_matrices(skeleton: Skeleton) -> None
 
 
 def test_joints_may_be_given_in_lists_and_arrays() -> None:
-    same = Skeleton("human23", list(BODY.names), np.array(BODY.parents), BODY.offsets, BODY.tips)  # type: ignore[arg-type]
+    fields: list[Any] = [list(BODY.names), np.array(BODY.parents), BODY.offsets, BODY.tips]
+    same = Skeleton("human23", *fields)
     assert same == BODY
     assert (same.names, same.parents) == (BODY.names, BODY.parents)
     assert find_legs(same) == find_legs(BODY)
