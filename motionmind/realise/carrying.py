@@ -235,7 +235,7 @@ def _with_detail(
     flies = cover(flying.astype(np.float64), fps)[:, None]
     moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
-    kept = reached + loads * (heights - reached)
+    kept = reached + np.maximum(loads, bearing.stands) * (heights - reached)
     if kept.size:
         sunk = np.maximum(floor[:, None] - kept, 0.0)
         kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]

@@ -83,8 +83,7 @@ def settled(
     skeleton, root = motion.skeleton, motion.root
     given = _given_frames(clock, stops, moving)
     rotations = keeper(clock, stops, fixed, wished, carriage, skeleton, without)(motion.rotations, root)
-    if standing_rise(skeleton, rotations, root) > SHOWS:
-        root = _with_its_legs(motion, rotations, given, fps)
+    root = _with_its_legs(motion, rotations, given, fps)
     if "balance" not in without:
         joints = fixed[: len(skeleton)]
         rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
