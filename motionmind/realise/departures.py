@@ -12,10 +12,10 @@ from motionmind.realise.least_squares import factorise, substitute
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
-RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
-LIFT = 0.1  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
-FLICKS = 11.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
+SLIDES = 1.2  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+RISES = 0.33  # share of a step in which it lifts the foot, and in which it lowers it
+LIFT = 0.105  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
+FLICKS = 12.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
 FAR = 0.3  # metres that a foot must go to be lifted so far
 
 
