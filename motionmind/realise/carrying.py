@@ -238,7 +238,8 @@ def _with_detail(
     kept = reached + np.maximum(loads, bearing.stands) * (heights - reached)
     if kept.size:
         sunk = np.maximum(floor[:, None] - kept, 0.0)
-        kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
+        lifted = np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
+        kept += np.where(bearing.stands, sunk, lifted)
     off = off.copy()
     off[..., 1] += kept - reached
     slips = plain.tracks - detailed.tracks - (moved - root)[:, None, [0, 2]]

@@ -283,10 +283,11 @@ def _hovering(stance: Stance, ends: Floats) -> Bools:
     surely = aloft > SURELY
     standing = np.maximum(clearance - aloft * leaps, 0.0) / np.maximum(1.0 - aloft, 1e-9)
     floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
-    taller, lower = ends - floor - standing, np.maximum(leaps - (ends - floor), 0.0)
+    taller, lower = ends - floor - standing, leaps - (ends - floor)
     stands = (1.0 - aloft) / SPREADS[0] * np.exp(-0.5 * (np.maximum(taller, 0.0) / SPREADS[0]) ** 2)
-    flies = aloft / SPREADS[1] * np.exp(-0.5 * (lower / SPREADS[1]) ** 2)
-    return np.asarray(surely | ((aloft > EVER) & (flies > stands)) | (taller > LEAPS))
+    flies = aloft / SPREADS[1] * np.exp(-0.5 * (np.maximum(lower, 0.0) / SPREADS[1]) ** 2)
+    as_high = (flies > stands) & (taller > np.abs(lower))  # what is far from both may be on a floor of its own
+    return np.asarray(surely | ((aloft > EVER) & as_high) | (taller > LEAPS))
 
 
 def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: Bools) -> Floats:

@@ -450,6 +450,30 @@ def test_an_end_a_little_higher_than_most_stand_shows_a_higher_floor() -> None:
     assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.3), slice(None)).min() > -1.0
 
 
+@pytest.mark.parametrize("high", [0.09, 0.11])
+def test_an_end_as_high_as_some_jump_low_is_in_the_air(high: float) -> None:
+    """Most stand so, but none of them so high."""
+    q, root, aloft = into_the_air(61, high)
+    falling = fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.1), slice(-2, None))
+    np.testing.assert_allclose(falling, -GRAVITY, rtol=0.15)
+    # Where walks of either kind are about as high, as many as stand stand.
+    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=high + 0.15), slice(None)).min() > -1.0
+
+
+def test_a_foot_stays_on_the_floor_until_it_takes_off_though_detail_stretches_it() -> None:
+    frames, leaves = 46, 38
+    q, root, aloft = into_the_air(frames, 0.25)
+    stretched, course = q.copy(), np.exp(-(((np.arange(frames) - leaves) / 1.5) ** 2))
+    course[[0, -1]] = 0.0
+    for side in ("left", "right"):
+        ankle = human23().index(f"{side}_ankle")
+        stretched[:, ankle] = rot.mul(stretched[:, ankle], rot.from_axis_angle([1.0, 0.0, 0.0], 1.2 * course))
+    assert lowest_height(human23(), stretched, root)[leaves] < -0.08
+    heights = lowest_height(human23(), *grounded(stretched, root, aloft=aloft, leap=0.25, plain=q))
+    assert heights[: leaves - 1].max() < 0.03
+    assert heights[leaves + 2] > 0.05
+
+
 def test_a_foot_that_wavers_into_the_floor_does_not_lift_the_body() -> None:
     frames = 61
     angles = {f"left_{joint}": (bend, 0.0, 0.0) for joint, bend in (("hip", -20.0), ("knee", 37.0), ("ankle", 0.0))}
