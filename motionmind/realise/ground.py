@@ -39,9 +39,8 @@ from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
-SPREADS = 0.03, 0.04  # metres, standard deviation: heights of walks that stand at a given posture, of those in the air
-LEAPS = 0.18  # metres above those that stand from which it is in the air, whatever walks do: of a short jump a corpus may
-# have no posture
+SPREADS = 0.03, 0.04  # metres, standard deviation: how high walks are that stand at a given posture, and that are aloft
+LEAPS = 0.18  # metres above those that stand from which it is in the air, though no walk is
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 
 
