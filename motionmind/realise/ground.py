@@ -201,6 +201,7 @@ def _set_down(
             known,
             stance.overhang,
             travels,
+            fastest,
             gravity,
             fps,
             without,
