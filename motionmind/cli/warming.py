@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from motionmind.search.problem import Problem
     from motionmind.tween.engine import Engine
 
-NOTICE = "compiling inner loops, once, which takes about half a minute (`motionmind warm` does it)"
+NOTICE = "compiling inner loops, once, which takes a minute or more (`motionmind warm` does it)"
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _SEARCHES = ("body/", "geometry/", "realise/", "search/")  # what a search needs, by folder
 _LATER = ("realise/sparse", "realise/steps", "search/pair_chain", "search/sample")  # of which it needs little
@@ -42,7 +42,7 @@ _BACK = 10  # by which processes that stand back are nicer than others
 def warm() -> None:
     """Compile the inner loops, so that no search or film has to wait for it.
 
-    The first search does what it needs of this on its own. It takes half a minute to a minute, once for each version of
+    The first search does what it needs of this on its own. It takes one or two minutes, once for each version of
     MotionMind and Python. What is compiled is kept in the user's cache directory, or in NUMBA_CACHE_DIR.
     """
     from motionmind.jit import compiled_names, is_all_compiled, place_of_code
