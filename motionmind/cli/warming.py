@@ -200,13 +200,18 @@ def search() -> None:
 
 
 def realise() -> None:
-    """Realise moves of the corpus, which no search has to find, and see how deep limbs are in each other."""
+    """Realise moves of the corpus, which no search has to find, see how deep limbs are in each other, and reach."""
     from motionmind.body.capsules import penetration
+    from motionmind.realise.legs import find_legs, reach
     from motionmind.tween.engine import Engine
 
     engine = Engine.load("ballet")
     _realise(engine, engine.carriage)
-    penetration(engine.corpus.skeleton, engine.corpus.rotations[:2])
+    skeleton, rotations = engine.corpus.skeleton, engine.corpus.rotations[:2]
+    penetration(skeleton, rotations)
+    leg = find_legs(skeleton)[1][0][0][:3]
+    places = skeleton.positions(rotations, engine.corpus.root[:2])[:, leg]
+    reach(skeleton.global_rotations(rotations)[:, leg[0]], places, places[:, 2])
 
 
 def seek() -> None:
