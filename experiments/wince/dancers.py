@@ -19,6 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import find_support, stands_alone
 from motionmind.geometry import rotations as rot
 from motionmind.realise.flight import FALLING
+from motionmind.realise.legs import find_legs
 
 MEASURES = ("root speed", "root acceleration", "slide", "joints", "legs")
 BEYOND = 99.5  # percentile of the dancers' own windows
@@ -200,7 +201,7 @@ class Dancers:
         alone = stands_alone(self.body, rotations, root)
         # In the air, too, one limb is the lowest; nothing stands on it.
         alone[[_is_airborne(posture) for posture in self.ends]] = -1
-        return {int(limb): np.flatnonzero(alone == limb) for limb in np.unique(alone) if limb >= 0}
+        return {limb: np.flatnonzero(alone == limb) for limb in find_legs(self.body)[0] if np.any(alone == limb)}
 
 
 @lru_cache(maxsize=2)

@@ -35,7 +35,7 @@ def jobs(setting: Setting) -> list[dict[str, Any]]:
     return [{"data": data, "by": one, "seed": 1} | counts for one in by]
 
 
-RECORDINGS = ("cmu-05", "indian", "cmu-16", "cmu-135")
+RECORDINGS = ("cmu-05", "indian", "cmu-16", "cmu-135", "bandai")  # no constant was chosen on the last
 
 
 def work(data: str | None, by: str, seed: int, pairs: int, one_leg: int, jumps: int) -> list[Row]:

@@ -89,6 +89,7 @@ def carry(
     known: Ends,
     overhang: float,
     travels: float,
+    fastest: Floats,
     gravity: float,
     fps: float,
     without: Collection[Correction],
@@ -106,6 +107,7 @@ def carry(
         known: what is known of its ends, and of its flights.
         overhang: how far beyond its support the centre of mass may be, metres.
         travels: how fast the body travels at most, metres a second; infinite for any speed.
+        fastest: speeds of the joints in the corpus [J], rad/s.
         gravity: metres a second squared.
         fps: frames a second.
         without: corrections to leave out.
@@ -138,7 +140,7 @@ def carry(
     fixed[[0, -1]] = True
     fixed[[1, -2]] |= known.moving
     own, bones = pose(skeleton, plain), np.array([foot.bones(skeleton) for foot in feet]).reshape(-1, 2)
-    legs = legs_of(skeleton, own.places, feet)
+    legs, knees = legs_of(skeleton, own.places, feet), [float(fastest[foot.leg[foot.knee]]) for foot in feet]
     start, off, posed = root, np.zeros((count, len(feet), 3)), plain
     touches = bearing.touching(shape)
     balances = "balance" not in without and bool(mass.any())
@@ -166,7 +168,7 @@ def carry(
                 weight = centre[:, level], mass[:, level], centre[:, 1] - floor
                 rows += balance_rows(points, touches, *weight, overhang, gravity, fps)
             start = solve(rows, start, fixed)
-        off = _departures(skeleton, shape, bearing, floor, start, feet, known.moving, fps)
+        off = _departures(skeleton, shape, bearing, floor, start, feet, knees, known.moving, fps)
         if number_of_round < ROUNDS[0] - 1:
             posed = bend_legs(skeleton, own, feet, off, softness(bearing.holds(fps)))
     detailed, falls = shape, np.zeros((count, 3))
@@ -183,17 +185,21 @@ def _departures(
     floor: Floats,
     root: Floats,
     feet: list[Foot],
+    knees: list[float],
     moving: tuple[bool, bool],
     fps: float,
 ) -> Floats:
-    """Return how far feet are to be from where rotations have them [N, feet, 3], metres, by the root's places."""
+    """Return how far feet are to be from where rotations have them [N, feet, 3], metres, by the root's places.
+
+    The corpus's knees bend by `knees` radians a second.
+    """
     out = np.empty((len(root), len(feet), 3))
     for number, foot in enumerate(feet):
         height = shape.low[:, number] + root[:, 1] - floor
         tracks = shape.tracks[:, number] + root[:, [0, 2]]
         places = shape.tracks[:, number] + bearing.targets[:, number]
         stances, leg = bearing.stances[number], foot.length(skeleton)
-        out[:, number] = departure(places, tracks, height, stances, leg, fps, moving)
+        out[:, number] = departure(places, tracks, height, stances, leg, knees[number], fps, moving)
     return out
 
 
@@ -235,10 +241,11 @@ def _with_detail(
     flies = cover(flying.astype(np.float64), fps)[:, None]
     moved = root + (1.0 - flies) * fades[:, None] * moves + flies * falls
     heights, reached = (shape.low + at[:, 1:2] + off[..., 1] for shape, at in ((plain, root), (detailed, moved)))
-    kept = reached + loads * (heights - reached)
+    kept = reached + np.maximum(loads, bearing.stands) * (heights - reached)
     if kept.size:
         sunk = np.maximum(floor[:, None] - kept, 0.0)
-        kept += np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
+        lifted = np.stack([cover(foot, fps) for foot in sunk.T], axis=1) * fades[:, None]
+        kept += np.where(bearing.stands, sunk, lifted)
     off = off.copy()
     off[..., 1] += kept - reached
     slips = plain.tracks - detailed.tracks - (moved - root)[:, None, [0, 2]]

@@ -12,10 +12,10 @@ from motionmind.realise.least_squares import factorise, substitute
 SETTLES = 0.3  # seconds in which a foot that hovers where it is given comes down to the floor
 FADES = 0.15  # seconds in which a foot that passes an end, with a velocity of its own, comes to its place
 BENDS = 0.25  # seconds in which a departure of a swinging foot from the movement's own track begins and ends
-SLIDES = 0.7  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
-RISES = 0.35  # share of a step in which it lifts the foot, and in which it lowers it
-LIFT = 0.1  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
-FLICKS = 11.0  # radians a second at which a step bends a knee at most, so that a quick one is lifted less
+SLIDES = 1.4  # seconds: how much a foot that is low in a step is kept from sliding, beside its smoothness
+RISES = 0.33  # share of a step in which it lifts the foot, and in which it lowers it
+LIFT = 0.105  # metres to which a step lifts a foot that the movement does not lift; chosen on cmu-05 and cmu-16
+FLICKS = 1.7, 12.0  # times as fast as the corpus's knees, and radians a second, at which a step bends a knee at most
 FAR = 0.3  # metres that a foot must go to be lifted so far
 
 
@@ -25,6 +25,7 @@ def departure(
     height: Floats,
     stances: list[Stance],
     leg: float,
+    knee: float,
     fps: float,
     moving: tuple[bool, bool],
 ) -> Floats:
@@ -40,6 +41,7 @@ def departure(
         height: of its lowest point above the floor [N], metres.
         stances: when it stands.
         leg: length of the leg, metres.
+        knee: how fast the corpus's bodies bend its knee, radians a second: a quick step is lifted the less.
         fps: frames a second.
         moving: whether the foot's velocity is given in the first and in the last frame.
     """
@@ -49,6 +51,7 @@ def departure(
         np.ascontiguousarray(height),
         np.array([(stance.start, stance.end) for stance in stances], dtype=np.int64).reshape(-1, 2),
         leg,
+        min(FLICKS[0] * knee, FLICKS[1]),
         fps,
         moving,
     )
@@ -57,9 +60,19 @@ def departure(
 
 @jit
 def _departure(
-    places: Floats, track: Floats, height: Floats, stances: Ints, leg: float, fps: float, moving: tuple[bool, bool]
+    places: Floats,
+    track: Floats,
+    height: Floats,
+    stances: Ints,
+    leg: float,
+    flicks: float,
+    fps: float,
+    moving: tuple[bool, bool],
 ) -> Floats:
-    """Return what `departure` does, but for its fading: `stances` are the first and the last frame of each [K, 2]."""
+    """Return what `departure` does, but for its fading: `stances` are the first and the last frame of each [K, 2].
+
+    A step bends a knee by so many radians a second at most.
+    """
     count, last = len(places), len(places) - 1
     wanted, stands, lift, slides = np.zeros((3, count)), np.zeros(count), np.zeros(count), np.zeros(last)
     at = track.copy()
@@ -80,7 +93,7 @@ def _departure(
         if end - begin < 2 or on_its_way or len(stances) == 0:
             continue
         far = np.sqrt((at[end, 0] - at[begin, 0]) ** 2 + (at[end, 1] - at[begin, 1]) ** 2)
-        highest = _lift(end - begin, far, leg, fps)
+        highest = _lift(end - begin, far, leg, flicks, fps)
         for t in range(begin, end + 1):
             lift[t] = highest * _eased(min(t - begin, end - t) / ((end - begin) * RISES))
         most = max(lift[begin : end + 1].max(), 1e-9)
@@ -105,7 +118,7 @@ def _eased(s: float) -> float:
 
 
 @jit
-def _lift(frames: int, far: float, leg: float, fps: float) -> float:
+def _lift(frames: int, far: float, leg: float, flicks: float, fps: float) -> float:
     """Return how far a step lifts a foot, metres.
 
     The shorter and the quicker a step, the less: by what a knee bends from straight in the time that it rises.
@@ -114,9 +127,10 @@ def _lift(frames: int, far: float, leg: float, fps: float) -> float:
         frames: that the step takes.
         far: how far it takes the foot, metres.
         leg: length of the leg, metres.
+        flicks: how fast its knee bends at most, radians a second.
         fps: frames a second.
     """
-    bend = min(FLICKS * RISES * frames / (1.5 * fps), np.pi)
+    bend = min(flicks * RISES * frames / (1.5 * fps), np.pi)
     return float(min(leg * (1.0 - np.cos(0.5 * bend)), LIFT) * min(far / FAR, 1.0))
 
 

@@ -39,8 +39,8 @@ from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
 from motionmind.realise.root import root_trajectory, stand
 
-TALLER = 0.12  # metres above how walks stand at a given posture from which it may be in the air, though most stand
-LEAPS = 0.18  # the same, from which it is, whatever walks do: of a short jump a corpus may have no posture
+SPREADS = 0.03, 0.04  # metres, standard deviation: how high walks are that stand at a given posture, and that are aloft
+LEAPS = 0.18  # metres above those that stand from which it is in the air, though no walk is
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 
 
@@ -201,6 +201,7 @@ def _set_down(
             known,
             stance.overhang,
             travels,
+            fastest,
             gravity,
             fps,
             without,
@@ -274,15 +275,18 @@ def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats 
 def _hovering(stance: Stance, ends: Floats) -> Bools:
     """Return whether the first and the last posture are in the air [2], from their lowest points' heights [2], metres.
 
-    They are where most walks are in the air; and where some are, and it is as high as these above the floor under the
-    other end: in the crouch of a jump much of a corpus stands. And they are where they are higher than any step.
+    They are where most walks are in the air; and where some are, and by its height above the floor under the other end
+    it is likelier one of these than one of those that stand: in the crouch of a jump much of a corpus stands. And they
+    are where they are higher than any step.
     """
     aloft, leaps, clearance = stance.aloft[[0, -1]], stance.leaps[[0, -1]], stance.clearance[[0, -1]]
     surely = aloft > SURELY
     standing = np.maximum(clearance - aloft * leaps, 0.0) / np.maximum(1.0 - aloft, 1e-9)
     floor = np.where(surely, np.minimum(ends, 0.0), np.maximum(np.minimum(ends, 0.0), ends - clearance))[::-1]
-    taller = ends - floor - standing
-    as_high = (taller > TALLER) & (taller > np.abs(ends - floor - leaps))
+    taller, lower = ends - floor - standing, leaps - (ends - floor)
+    stands = (1.0 - aloft) / SPREADS[0] * np.exp(-0.5 * (np.maximum(taller, 0.0) / SPREADS[0]) ** 2)
+    flies = aloft / SPREADS[1] * np.exp(-0.5 * (np.maximum(lower, 0.0) / SPREADS[1]) ** 2)
+    as_high = (flies > stands) & (taller > np.abs(lower))  # what is far from both may be on a floor of its own
     return np.asarray(surely | ((aloft > EVER) & as_high) | (taller > LEAPS))
 
 

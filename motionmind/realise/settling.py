@@ -14,10 +14,8 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
-from motionmind.body.support import standing_rise
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
-from motionmind.realise.feet import SHOWS
 from motionmind.realise.flight import fall_freely
 from motionmind.realise.knees import smoothed
 from motionmind.realise.leaning import shift_weight
@@ -83,7 +81,7 @@ def settled(
     skeleton, root = motion.skeleton, motion.root
     given = _given_frames(clock, stops, moving)
     rotations = keeper(clock, stops, fixed, wished, carriage, skeleton, without)(motion.rotations, root)
-    if standing_rise(skeleton, rotations, root) > SHOWS:
+    if rotations is not motion.rotations:
         root = _with_its_legs(motion, rotations, given, fps)
     if "balance" not in without:
         joints = fixed[: len(skeleton)]

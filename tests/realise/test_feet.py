@@ -19,7 +19,7 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.body.support import centre_of_mass, find_support
 from motionmind.geometry import rotations as rot
 from motionmind.realise.balance import GRAVITY, nearest_in_support
-from motionmind.realise.departures import LIFT, departure
+from motionmind.realise.departures import FLICKS, LIFT, departure
 from motionmind.realise.footfalls import (
     BRIEF,
     CROSSES,
@@ -144,6 +144,23 @@ def test_quick_steps_leave_the_floor_before_they_go_far() -> None:
     assert skating(human23(), *grounded(q, root)) < 0.25
 
 
+def test_a_quick_step_lifts_a_foot_no_higher_than_the_corpus_bends_its_knees() -> None:
+    frames, leaves, lands, leg = 41, 15, 25, 0.85
+    track = np.stack([np.interp(np.arange(frames), [leaves, lands], [0.0, 0.5]), np.zeros(frames)], axis=1)
+    stances = [
+        StandingFoot(0, leaves, track[0], np.zeros(2)),
+        StandingFoot(lands, frames - 1, track[-1], np.zeros(2)),
+    ]
+    highest = []
+    for knee in (2.0, 4.0, 6.0, 20.0):
+        off = departure(track, track, np.zeros(frames), stances, leg, knee, 30.0, (False, False))
+        highest.append(off[:, 1].max())
+        bend = FLICKS[0] * knee * (lands - leaves) / 30.0 / 2.0
+        assert highest[-1] < leg * (1.0 - np.cos(0.5 * bend))
+    assert np.all(np.diff(highest) > 0.0)
+    assert highest[-1] < 1.1 * LIFT
+
+
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_foot_that_is_given_in_the_air_steps_from_there(moving: bool) -> None:
     """But for one that is given on its way: that goes on as it comes."""
@@ -151,7 +168,7 @@ def test_a_foot_that_is_given_in_the_air_steps_from_there(moving: bool) -> None:
     track = np.stack([np.interp(np.arange(frames), [0.0, lands], [0.0, 0.8]), np.zeros(frames)], axis=1)
     height = np.interp(np.arange(frames), [0.0, lands], [0.03, 0.0])
     stance = StandingFoot(lands, frames - 1, track[-1], np.zeros(2))
-    off = departure(track, track, height, [stance], 0.85, 30.0, (moving, False))
+    off = departure(track, track, height, [stance], 0.85, 8.0, 30.0, (moving, False))
     high = (height + off[:, 1])[3 : lands - 3]
     assert np.all(high > 0.05) != moving
     np.testing.assert_array_equal(off[[0, -1]], 0.0)
@@ -448,6 +465,30 @@ def test_an_end_a_little_higher_than_most_stand_shows_a_higher_floor() -> None:
     """It is nearer to the height at which most stand than to that of the jumps."""
     q, root, aloft = into_the_air(61, 0.14)
     assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.3), slice(None)).min() > -1.0
+
+
+@pytest.mark.parametrize("high", [0.09, 0.11])
+def test_an_end_as_high_as_some_jump_low_is_in_the_air(high: float) -> None:
+    """Most stand so, but none of them so high."""
+    q, root, aloft = into_the_air(61, high)
+    falling = fall(*grounded(q, root, aloft=0.3 * aloft, leap=0.1), slice(-2, None))
+    np.testing.assert_allclose(falling, -GRAVITY, rtol=0.15)
+    # Where walks of either kind are about as high, as many as stand stand.
+    assert fall(*grounded(q, root, aloft=0.3 * aloft, leap=high + 0.15), slice(None)).min() > -1.0
+
+
+def test_a_foot_stays_on_the_floor_until_it_takes_off_though_detail_stretches_it() -> None:
+    frames, leaves = 46, 38
+    q, root, aloft = into_the_air(frames, 0.25)
+    stretched, course = q.copy(), np.exp(-(((np.arange(frames) - leaves) / 1.5) ** 2))
+    course[[0, -1]] = 0.0
+    for side in ("left", "right"):
+        ankle = human23().index(f"{side}_ankle")
+        stretched[:, ankle] = rot.mul(stretched[:, ankle], rot.from_axis_angle([1.0, 0.0, 0.0], 1.2 * course))
+    assert lowest_height(human23(), stretched, root)[leaves] < -0.08
+    heights = lowest_height(human23(), *grounded(stretched, root, aloft=aloft, leap=0.25, plain=q))
+    assert heights[: leaves - 1].max() < 0.03
+    assert heights[leaves + 2] > 0.05
 
 
 def test_a_foot_that_wavers_into_the_floor_does_not_lift_the_body() -> None:
