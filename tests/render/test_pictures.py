@@ -126,7 +126,7 @@ def test_a_tween_becomes_any_picture_at_once_or_later(suffix: str, run: Run, tmp
     if suffix in (".html", ".mp4"):
         assert len(at_once) == pytest.approx(len(later), rel=1e-3)
     elif suffix == ".svg":
-        number = rb"-?(?:\d+\.?\d*|\.\d+)"
+        number = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
         assert re.sub(number, b"#", at_once) == re.sub(number, b"#", later)
         ours, theirs = (np.array(re.findall(number, text), dtype=np.float64) for text in (at_once, later))
         np.testing.assert_allclose(ours, theirs, atol=5.0)  # of the fine units that paths are drawn in

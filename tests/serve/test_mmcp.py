@@ -156,7 +156,8 @@ def test_a_pose_of_one_arm_leaves_the_rest_to_the_movement(url: str) -> None:
     np.testing.assert_allclose(rotations_of(sample, arm)[40], asked, atol=EXACT)
     others = [name for name in human23().names if name not in arm]
     np.testing.assert_allclose(rotations_of(sample, others)[40], rotations_of(without, others)[40], atol=EXACT)
-    assert document["extensions"]["MMCP_motion"]["notes"] == []
+    # No note on the pose; one may compare the movement with the corpus, which it may exceed.
+    assert {note["code"] for note in document["extensions"]["MMCP_motion"]["notes"]} <= {"beyond_corpus"}
     assert len(certificates(document)[0]["stretches"]) == 2
 
 
