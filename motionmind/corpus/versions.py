@@ -154,9 +154,9 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
         is_new: whether only those who lock it use it, so that where there are no locks it is taken to be unused.
 
     Yields:
-        Whether it is locked; alone if nobody else has locked it, with others, or a new one, if the folder is still in
-        its place. Where there are no locks, a folder that has not changed for an hour is taken to be unused, and no
-        other is removed; and Windows, which has none on folders, removes no file that is open.
+        Whether it is locked, and still in its place; alone only if nobody else has locked it. Where there are no locks,
+        a folder that has not changed for an hour is taken to be unused, and no other is removed; and Windows, which has
+        none on folders, removes no file that is open.
     """
     unused = time.time() - folder.stat().st_mtime > _UNUSED
     if sys.platform == "win32":
@@ -166,7 +166,7 @@ def locked(folder: Path, *, alone: bool, is_new: bool = False) -> Iterator[bool]
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB if alone else fcntl.LOCK_SH)
-            locked = (alone and not is_new) or _is_in_place(folder, descriptor)
+            locked = _is_in_place(folder, descriptor)  # else it was removed since, and perhaps made anew
         except BlockingIOError:
             locked = False
         except OSError:

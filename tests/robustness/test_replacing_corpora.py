@@ -302,6 +302,25 @@ def test_a_version_that_another_writer_removed_and_made_anew_is_that_writers(
         assert (version, sorted(mine.iterdir())) == (mine / "2", [mine / "1", mine / "2"])
 
 
+def test_a_version_made_anew_under_the_number_of_one_that_was_to_go_stays(
+    mine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fcntl = pytest.importorskip("fcntl")
+    (mine / "1").mkdir(parents=True)
+    others, flock = ExitStack(), fcntl.flock
+
+    def interrupted(descriptor: int, operation: int) -> None:
+        monkeypatch.undo()
+        versions.remove_others(mine, lambda: None)  # it is another writer who removes the first, and who makes it anew
+        assert others.enter_context(versions.new_version(mine)) == mine / "1"
+        flock(descriptor, operation)
+
+    monkeypatch.setattr(fcntl, "flock", interrupted)
+    with others:
+        versions.remove_others(mine, lambda: None)
+        assert (mine / "1").is_dir()
+
+
 def test_a_corpus_whose_version_is_gone_is_one_error(mine: Path) -> None:
     store.save(mine, MANIFEST, arrays(1))
     shutil.rmtree(mine / "1")
