@@ -16,15 +16,17 @@ from motionmind.tween.result import Tween
 _FAR = 30.0  # degrees; nobody sees that a smaller move of a joint is a bridge
 _SIDES = ("left", "right")
 
-# Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body.
+# Words for what a movement shows a viewer: its greatest value, the corpus's greatest and the part of the body; and the
+# digits and the kind that format a number.
 _SHOWN = {
-    "balance": "it leans {0:.2f} m over what it stands on, in the corpus {1:.2f} at most",
-    "bounce": "it bounces: its mass is accelerated by {0:.0f} m/s^2, in the corpus by {1:.0f} at most",
-    "flight": "it floats: in the air it lacks {0:.0%} of gravity, in the corpus {1:.0%} at most",
-    "crossed_limbs": "limbs are {0:.3f} m deep in each other, in the corpus {1:.3f} at most",
-    "sliding": "feet slide: near the floor one moves in {0:.0%} of a second, in the corpus in {1:.0%} at most",
-    "pace": "{2} is {0:.1f} times as fast as is fast in the corpus, where nothing is more than {1:.1f} times",
+    "balance": ("it leans {0} m over what it stands on, in the corpus {1} at most", 2, "f"),
+    "bounce": ("it bounces: its mass is accelerated by {0} m/s^2, in the corpus by {1} at most", 0, "f"),
+    "flight": ("it floats: in the air it lacks {0} of gravity, in the corpus {1} at most", 0, "%"),
+    "crossed_limbs": ("limbs are {0} m deep in each other, in the corpus {1} at most", 3, "f"),
+    "sliding": ("feet slide: near the floor one moves in {0} of a second, in the corpus in {1} at most", 0, "%"),
+    "pace": ("{2} is {0} times as fast as is fast in the corpus, where nothing is more than {1} times", 1, "f"),
 }
+_MORE_DIGITS = 3  # at most, where two numbers would look alike
 
 
 def headline(tween: Tween) -> str:
@@ -62,7 +64,12 @@ def shown_beyond(name: str, one: Sighting) -> str:
         name: of the measure, one of `motionmind.learned.plausibility.MEASURES`.
         one: a movement's sighting of it, which is beyond.
     """
-    return _SHOWN[name].format(one.value, one.most, displayed(one.part))
+    words, digits, kind = _SHOWN[name]
+    for more in range(_MORE_DIGITS + 1):
+        value, most = (f"{number:.{digits + more}{kind}}" for number in (one.value, one.most))
+        if value != most:
+            break
+    return words.format(value, most, displayed(one.part))
 
 
 def seen_in(tween: Tween) -> str:

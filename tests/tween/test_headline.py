@@ -13,8 +13,21 @@ from motionmind.learned.plausibility import Sighting
 from motionmind.names.finding import find_posture
 from motionmind.tween.certificate import Bridge
 from motionmind.tween.engine import Engine
-from motionmind.tween.headline import beyond, headline
+from motionmind.tween.headline import beyond, headline, shown_beyond
 from motionmind.tween.result import Tween
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (0.35, "it leans 0.35 m over what it stands on, in the corpus 0.22 at most"),
+        (0.2249, "it leans 0.225 m over what it stands on, in the corpus 0.216 at most"),
+        (0.2162, "it leans 0.2162 m over what it stands on, in the corpus 0.2160 at most"),
+        (0.216 + 1e-9, "it leans 0.21600 m over what it stands on, in the corpus 0.21600 at most"),
+    ],
+)
+def test_what_exceeds_the_corpus_by_little_gets_the_digits_that_show_it(value: float, said: str) -> None:
+    assert shown_beyond("balance", Sighting(value, 0.216, "m")) == said
 
 
 @pytest.fixture(scope="module")
