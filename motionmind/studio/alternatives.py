@@ -14,10 +14,11 @@ import msgspec
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.motion import Posture
+from motionmind.body.motion import Motion, Posture
 from motionmind.corpus.corpus import Corpus
 from motionmind.display import displayed
 from motionmind.errors import NoPathError
+from motionmind.geometry import rotations as rot
 from motionmind.tween.certificate import Source
 from motionmind.tween.engine import Engine
 from motionmind.tween.headline import beyond, feet_staying, seen_in
@@ -28,6 +29,8 @@ COUNT = 4
 # people wait for, take a second or two, and proofs would take six.
 WITHIN = 0.06
 _MOVES = 2000  # of the corpus, at most, beside which a movement is usual or rare
+_TELLING = 10.0  # degrees: a joint that turns elsewhere by less hardly makes another movement
+_NAMED = 2  # joints, at most, in which alternatives differ
 _USUAL, _RARE = 25.0, 5.0  # percentiles of the corpus's own moves, below which movement is less usual, and rare
 
 How = Literal["seen", "waits", "new", "between"]
@@ -61,6 +64,7 @@ class Account(msgspec.Struct, frozen=True):
 
     Attributes:
         words: it in a line.
+        differs: by what it differs from the one that was found first; "" for that one.
         sure: how sure it is that there is nothing better of its kind.
         usual: how usual the movement is.
         beyond: what a viewer may wince at, a line each.
@@ -68,6 +72,7 @@ class Account(msgspec.Struct, frozen=True):
     """
 
     words: str
+    differs: str
     sure: str
     usual: str
     beyond: list[str]
@@ -100,20 +105,22 @@ def find(engine: Engine, a: Posture, b: Posture, count: int = COUNT, **options: 
             raise
 
 
-def account(tween: Tween, corpus: Corpus, own: Floats) -> Account:
+def account(tween: Tween, corpus: Corpus, own: Floats, first: Motion | None = None) -> Account:
     """Say what there is to say of an alternative.
 
     Args:
         tween: the alternative.
         corpus: what it was learned from.
         own: `usual_likelihoods` of the corpus [101].
+        first: the movement that was found first; None if it is this one.
     """
     if tween.moves == 0:
-        return Account("no movement: both postures are the same", "nothing is better", "", [], {})
+        return Account("no movement: both postures are the same", "", "nothing is better", "", [], {})
     seconds = float(tween.motion.times[-1] - tween.motion.times[0])
     words = "; ".join([f"{seconds:.1f} s", *feet_staying(tween.motion)])
+    differs = "" if first is None else _differs(tween.motion, first)
     said = [line.replace("_", " ") for line in beyond(tween)]
-    return Account(words, _sure(tween), _usual(tween, own), said, _stretches(tween, corpus))
+    return Account(words, differs, _sure(tween), _usual(tween, own), said, _stretches(tween, corpus))
 
 
 def usual_likelihoods(engine: Engine) -> Floats:
@@ -147,6 +154,22 @@ def _clip(source: Source, corpus: Corpus) -> str:
     changes = ", ".join(["mirrored"] * source.mirrored + ["backwards"] * source.reversed)
     origin = f"{displayed(source.corpus)}: " * (source.corpus != corpus.name)
     return f"{origin}{displayed(source.clip)}" + (f" ({changes})" if changes else "")
+
+
+def _differs(motion: Motion, first: Motion) -> str:
+    """Say in which joints a movement differs most from the first, by how much, and when."""
+    as_far = np.rint(np.linspace(0.0, len(first) - 1, len(motion))).astype(np.intp)
+    degrees = np.degrees(rot.angle(motion.rotations, first.rotations[as_far]))
+    frame = int(degrees.max(axis=1).argmax())
+    most = [int(joint) for joint in np.argsort(-degrees[frame], kind="stable")[:_NAMED]]
+    named = [
+        f"{displayed(motion.skeleton.names[joint]).replace('_', ' ')} by {degrees[frame, joint]:.0f}°"
+        for joint in most
+        if degrees[frame, joint] >= _TELLING
+    ]
+    if not named:
+        return "hardly unlike the first"
+    return f"unlike the first: {' and '.join(named)}, at {motion.times[frame] - motion.times[0]:.1f} s"
 
 
 def _sure(tween: Tween) -> str:

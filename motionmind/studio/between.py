@@ -69,8 +69,10 @@ def search(report: Report, corpus: str, sides: Sides, options: dict[str, Any], s
     engine = engine_of(corpus)
     own = usual_likelihoods(engine)
     found = find(engine, sides.a, sides.b, before=sides.before, after=sides.after, **options)
+    first: Motion | None = None
     for number, tween in enumerate(found, start=1):
-        said = account(tween, engine.corpus, own)
+        said = account(tween, engine.corpus, own, first)
+        first = first or tween.motion
         motion, missed = in_place(tween.motion, stays)
         told = msgspec.structs.replace(said, beyond=[*missed, *said.beyond])
         report(number, COUNT, "looking for others", (motion, told))
@@ -201,7 +203,7 @@ def accepted(state: State, asked: Between, alternative: int) -> Edit:
 
 def words_of(said: Account) -> str:
     """Return an account in a line."""
-    return "; ".join(part for part in (said.words, said.usual) if part)
+    return "; ".join(part for part in (said.words, said.differs, said.usual) if part)
 
 
 def routes(studio: Studio) -> list[BaseRoute]:

@@ -96,6 +96,7 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
     a, b, before, after, _ = question.sides
     own = usual_likelihoods(engine)
     distinct: dict[bytes, tuple[Motion, str]] = {}
+    first: Motion | None = None
     report(0, MOST_ALTERNATIVES, "smoothing a seam")
     warnings.simplefilter("ignore", MotionMindWarning)  # the words say what goes beyond the corpus
     try:
@@ -103,7 +104,8 @@ def smooth(report: Report, corpus: str, question: Question) -> tuple[list[tuple[
         for number, tween in enumerate(tweens, start=1):
             if tween.path.tobytes() not in distinct:
                 motion, missed = in_place(tween.motion, question.stays)
-                distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own), missed)
+                distinct[tween.path.tobytes()] = motion, _words(account(tween, engine.corpus, own, first), missed)
+                first = first or tween.motion
             report(number, MOST_ALTERNATIVES, "smoothing a seam")
     except MotionMindError as error:  # after the first, nothing else differs enough
         if not distinct:
@@ -125,7 +127,7 @@ def why_abrupt(joints: tuple[AbruptJoint, ...], corpus: str) -> str:
 
 def _words(found: Account, missed: Sequence[str]) -> str:
     """Say in a line what there is to know of an insertion."""
-    return "; ".join(said for said in (found.usual, found.words, *missed, *found.beyond) if said)
+    return "; ".join(said for said in (found.usual, found.words, found.differs, *missed, *found.beyond) if said)
 
 
 def _line(error: Exception) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from motionmind import Engine, Tween
+from motionmind import Engine, Motion, Tween
 from motionmind.errors import NoPathError
 from motionmind.names.finding import find_motion, find_posture
 from motionmind.names.spelling import Source
@@ -30,7 +32,9 @@ def ballet() -> Engine:
 def found(request: pytest.FixtureRequest, ballet: Engine) -> list[tuple[Tween, Account]]:
     a, b = map(find_posture, request.param)
     own = usual_likelihoods(ballet)
-    return [(tween, account(tween, ballet.corpus, own)) for tween in find(ballet, a, b)]
+    tweens = list(find(ballet, a, b))
+    firsts = [None, *[tweens[0].motion] * (len(tweens) - 1)]
+    return [(tween, account(tween, ballet.corpus, own, first)) for tween, first in zip(tweens, firsts, strict=True)]
 
 
 def test_alternatives_differ_and_are_near_enough(found: list[tuple[Tween, Account]]) -> None:
@@ -45,9 +49,34 @@ def test_words_say_what_is_proven(found: list[tuple[Tween, Account]]) -> None:
     for tween, said in found:
         assert (tween.status == "optimal") == ("is better" in said.sure)
         assert (not tween.bridges) == ("every move seen" in said.usual)
-        assert "_" not in "".join([said.words, said.sure, said.usual, *said.beyond])
+        assert "_" not in "".join([said.words, said.differs, said.sure, said.usual, *said.beyond])
         assert f"{tween.motion.times[-1]:.1f} s" in said.words
         assert b"nat" not in msgspec.json.encode([said.words, said.sure, said.usual, said.beyond])
+
+
+def test_words_say_where_and_when_one_differs_most_from_the_first(found: list[tuple[Tween, Account]]) -> None:
+    (tween, said), *others = found
+    assert said.differs == ""
+    for other, words in others:
+        joint, degrees, at = re.findall(r": ([a-z ]+) by (\d+)°.*, at ([\d.]+) s$", words.differs)[0]
+        apart = _degrees_apart(other.motion, tween.motion)
+        frame, number = np.unravel_index(int(apart.argmax()), apart.shape)
+        assert joint == other.motion.skeleton.names[number].replace("_", " ")
+        assert int(degrees) == round(apart.max())
+        assert float(at) == pytest.approx(other.motion.times[frame], abs=0.05 + 1e-9)
+
+
+def _degrees_apart(motion: Motion, other: Motion) -> np.ndarray:
+    """Return how differently joints are turned in each frame [T, J] and where another movement is as far on its way."""
+    last, end = len(motion) - 1, len(other) - 1
+    pairs = [(motion.rotations[frame], other.rotations[round(frame * end / last)]) for frame in range(last + 1)]
+    return np.degrees([(Rotation.from_quat(one).inv() * Rotation.from_quat(two)).magnitude() for one, two in pairs])
+
+
+def test_what_is_as_the_first_is_said_to_be_so(ballet: Engine, found: list[tuple[Tween, Account]]) -> None:
+    tween, _ = found[0]
+    said = account(tween, ballet.corpus, usual_likelihoods(ballet), tween.motion)
+    assert said.differs == "hardly unlike the first"
 
 
 def test_each_joint_is_accounted_for_from_the_first_moment_to_the_last(found: list[tuple[Tween, Account]]) -> None:

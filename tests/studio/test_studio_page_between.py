@@ -93,6 +93,7 @@ def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) 
         assert " s" in text
         assert "ballet" in text  # how usual it is
         assert "best" in text or "better" in text  # how sure
+    assert ["unlike the first" in text for text in cards.all_inner_texts()] == [False, True, True, True]
     until(studio_page, "document.querySelector('.alternatives input[type=range]').value > 0.1")
     time.fill("0.05")  # who takes hold of the time stops there
     assert float(time.input_value()) == pytest.approx(0.05)

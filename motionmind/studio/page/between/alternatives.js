@@ -99,7 +99,7 @@ function Alternatives({ studio }) {
 
 /** What stands below each, for where there is no room below them. @param {any} account */
 function said(account) {
-  return account ? [account.usual, account.sure, ...account.beyond].filter(Boolean).join("; ") : "";
+  return account ? [account.differs, account.usual, account.sure, ...account.beyond].filter(Boolean).join("; ") : "";
 }
 
 /** The place of one that is yet to be found: both its ends, pale. @param {any} props */
@@ -166,7 +166,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
       data-testid="alternative-${index + 1}"
       role="radio"
       aria-checked=${String(chosen)}
-      aria-label="Alternative ${index + 1}: ${account.words}. Up and down go from joint to joint."
+      aria-label="Alternative ${index + 1}: ${[account.words, account.differs].filter(Boolean).join("; ")}. Up and down go from joint to joint."
       tabindex=${chosen ? 0 : -1}
       onClick=${() => !from.current?.moved && desk.choose(index)}
       onKeyDown=${key}
@@ -191,6 +191,7 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
     </div>
     <div class="words">
       <p>${account.words}</p>
+      ${account.differs && html`<p>${account.differs}</p>`}
       <p class="hint">${account.usual}</p>
       <p class="hint">${account.sure}</p>
       ${account.beyond.map((/** @type {string} */ line) => html`<p class="said warning">${icon("warning")}<span>${line}</span></p>`)}

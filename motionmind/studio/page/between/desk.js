@@ -8,8 +8,8 @@ export const DRAGGED = "application/x-motionmind-posture";
 /**
  * @typedef {{key: string, frame: number, title: string}} Place
  * @typedef {{begins: number, ends: number, how: string, where: string, key: string, at: number, degrees: number}} Stretch
- * @typedef {{number: number, seconds: number, words: string, sure: string, usual: string, beyond: string[],
- *   joints: Record<string, Stretch[]>}} Account
+ * @typedef {{number: number, seconds: number, words: string, differs: string, sure: string, usual: string,
+ *   beyond: string[], joints: Record<string, Stretch[]>}} Account
  */
 
 export class Desk extends EventTarget {
