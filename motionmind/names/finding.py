@@ -103,7 +103,10 @@ class _ScoreCollection(Collection):
 
 
 class _CorpusCollection(Collection):
-    """A corpus's clips; one that people wrote has the postures that its scores name, too."""
+    """A corpus's clips; one that people wrote has the postures that its scores name, too.
+
+    What there is by name in one that people wrote is read from its scores: to learn it takes a while, the first time.
+    """
 
     def __init__(self, name: str, home: Path | None) -> None:
         super().__init__(name)
@@ -111,13 +114,25 @@ class _CorpusCollection(Collection):
         self._folder = store.locate(name, home)
 
     @cached_property
-    def _scores(self) -> dict[str, Score]:
-        """The score that names each posture, the first if several do."""
+    def _written(self) -> SourceManifest | None:
+        """The manifest that people wrote; None for a corpus that was built."""
         manifest = store.read_manifest(self._folder)
         if manifest["format"] == store.BUILT:
-            return {}
-        written = parse_manifest(manifest, SourceManifest, self._folder / store.MANIFEST)
-        return _scores_by_posture(tuple(self._folder / name for name in written.scores))
+            return None
+        return parse_manifest(manifest, SourceManifest, self._folder / store.MANIFEST)
+
+    @cached_property
+    def _all_scores(self) -> Sequence[Score]:
+        """The scores of a corpus that people wrote, in order."""
+        return _read_once(tuple(self._folder / name for name in self._written.scores)) if self._written else ()
+
+    @cached_property
+    def _scores(self) -> dict[str, Score]:
+        """The score that names each posture, the first if several do."""
+        found: dict[str, Score] = {}
+        for score in self._all_scores:
+            found = dict.fromkeys(score.postures, score) | found
+        return found
 
     @cached_property
     def _corpus(self) -> Corpus:
@@ -129,16 +144,22 @@ class _CorpusCollection(Collection):
     def postures(self) -> Sequence[str]:
         return list(self._scores)
 
-    @property
+    @cached_property
     def clips(self) -> Mapping[str, str]:
-        return _Labels(self._corpus)
+        if self._written is None:
+            return _Labels(self._corpus)
+        recorded = {clip.name: clip.about for clip in self._written.clips}
+        return recorded | {clip.name: clip.about for score in self._all_scores for clip in score.clips}
 
     def posture(self, name: str) -> Posture:
         return compose.posture(self._scores[name], name)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         corpus = self._corpus
-        return [replace(corpus.motion(corpus.clip_labelled(name)), name=name) for name in names]
+        try:
+            return [replace(corpus.motion(corpus.clip_labelled(name)), name=name) for name in names]
+        except KeyError as error:
+            raise MotionMindError(f"{self.word}: no clip {error} any more, for its files have changed") from error
 
 
 class _Labels(Mapping[str, str]):
@@ -162,17 +183,14 @@ class _Labels(Mapping[str, str]):
 
 
 _Stamps = dict[Path, tuple[int, int] | None]
-_kept: dict[tuple[Path, ...], tuple[_Stamps, dict[str, Score]]] = {}
+_kept: dict[tuple[Path, ...], tuple[_Stamps, Sequence[Score]]] = {}
 
 
-def _scores_by_posture(places: tuple[Path, ...]) -> dict[str, Score]:
-    """Return the score that names each posture, the first if several do; they are read anew once a file has changed."""
+def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
+    """Return scores; they are read anew once a file has changed."""
     if places not in _kept or _stamps(_kept[places][0]) != _kept[places][0]:
         scores, files = read_scores(places)
-        found: dict[str, Score] = {}
-        for score in scores:
-            found = dict.fromkeys(score.postures, score) | found
-        _kept[places] = _stamps(files), found
+        _kept[places] = _stamps(files), scores
     return _kept[places][1]
 
 

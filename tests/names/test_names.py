@@ -14,6 +14,7 @@ from motionmind.body.motion import Posture
 from motionmind.corpus import store
 from motionmind.errors import MotionMindError
 from motionmind.formats import read_motion, read_posture, write_motion, write_posture
+from motionmind.learned import persistence
 from motionmind.learned.model import LearnedCorpus
 from motionmind.names import finding
 from motionmind.names.finding import find_motion, find_posture, locate_score, open_collection
@@ -154,11 +155,39 @@ def test_a_posture_is_as_its_files_have_it_now(
     assert not np.array_equal(*shape)
 
 
+@pytest.mark.parametrize("corpus", BUNDLED)
+def test_the_clips_of_a_corpus_are_those_that_are_learned_from_in_order(corpus: str) -> None:
+    learned = [(clip.label, clip.about) for clip in LearnedCorpus.load(corpus).corpus.clips]
+    assert list(open_collection(parse_source(corpus)).clips.items()) == learned
+
+
+def test_a_name_that_nobody_wrote_is_an_error_before_the_corpus_is_learned(monkeypatch: pytest.MonkeyPatch) -> None:
+    def learn(*_: object) -> LearnedCorpus:
+        raise AssertionError("learned")
+
+    monkeypatch.setattr(persistence, "load", learn)
+    for word in ("ballet/adagoi", "ballet/adagoi@3"):
+        with pytest.raises(MotionMindError, match=r"ballet: no posture or clip 'adagoi'; did you mean adagio\?"):
+            find_posture(word)
+    with pytest.raises(MotionMindError, match=r"ballet: no clip 'arabesk'; did you mean arabesques\?"):
+        open_collection(parse_source("ballet")).choose(["arabesk"])
+
+
+def test_a_clip_whose_score_changes_while_a_corpus_is_open_is_an_error() -> None:
+    shutil.copytree(store.locate("karate"), "mine")
+    source = parse_source(str(Path("mine").resolve()))
+    found, score = open_collection(source), Path("mine", "kata.score")
+    assert "heian-nidan" in found.clips
+    score.write_text(score.read_text("utf-8").replace("clip heian-nidan:", "clip heian-anew:"), "utf-8")
+    with pytest.raises(MotionMindError, match="no clip 'heian-nidan' any more, for its files have changed"):
+        found.find("heian-nidan", as_clip=True)
+    assert len(open_collection(source).find("heian-anew", as_clip=True)) > 1
+
+
 @pytest.mark.parametrize("corpus", ["ballet", "walk-hexapod"])
 def test_every_posture_of_a_clip_is_the_one_that_is_learned_from(corpus: str) -> None:
     learned = LearnedCorpus.load(corpus).corpus
     clips = {clip.label: clip for clip in learned.clips}
-    assert list(open_collection(parse_source(corpus)).clips) == list(clips)
     for label in list(clips)[::9]:
         motion = learned.motion(clips[label])
         for frame in (0, len(motion) // 2, -1):
