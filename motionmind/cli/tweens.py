@@ -111,17 +111,20 @@ def tween(
     _load_numba()
     from motionmind.cli.postures import read_end
     from motionmind.corpus.store import locate
+    from motionmind.names.finding import check_named
     from motionmind.tween.engine import Engine
     from motionmind.tween.report import plain
 
     named = parse_posture(a, home), parse_posture(b, home)
     around = tuple(parse_frames(word, home) if word else None for word in (before, after))
     files = _Files(outputs, report, problem, alternatives)
-    read_from = [path for one in (*named, *around) if one for path in one.source.paths]
-    files.check([*read_from, *via_files(options, home)])
+    sources = [one.source for one in (*named, *around) if one]
+    files.check([*(path for source in sources for path in source.paths), *via_files(options, home)])
     request = request_options(options, home) | {"what_if": what_if}
     corpus = corpus or _corpus_of(named, home)
     locate(corpus, home)
+    for source in sources:
+        check_named(source, home)
     announce_first_search()  # before a bundled corpus is learned
     start, request["before"] = read_end(named[0], around[0], "before", home)
     end, request["after"] = read_end(named[1], around[1], "after", home)

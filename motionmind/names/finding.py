@@ -70,13 +70,16 @@ class Collection(ABC):
         Raises:
             MotionMindError: neither has this name.
         """
-        for is_clip in (as_clip, not as_clip):
-            if is_clip and name in self.clips:
-                return self.motions([name])[0]
-            if not is_clip and name in self.postures:
-                return replace(self.posture(name).as_motion(), name=name)
-        known = [*self.postures, *self.clips]
-        raise MotionMindError(f"{self.word}: no posture or clip {name!r}{suggestion(name, known)}")
+        self.check(name)
+        if name in self.clips and (as_clip or name not in self.postures):
+            return self.motions([name])[0]
+        return replace(self.posture(name).as_motion(), name=name)
+
+    def check(self, name: str) -> None:
+        """Raise MotionMindError, which suggests one, if neither a posture nor a clip has this name."""
+        if name not in self.postures and name not in self.clips:
+            known = [*self.postures, *self.clips]
+            raise MotionMindError(f"{self.word}: no posture or clip {name!r}{suggestion(name, known)}")
 
 
 class _ScoreCollection(Collection):
@@ -284,6 +287,15 @@ def check_exists(source: Source, home: Path | None = None) -> None:
         raise MotionMindError(f"{word}: there is no such file; frames are spelled clip.bvh@240 or clip.bvh@2.0s")
     hint = _elsewhere(word, home) or f"; corpora are {enumerated(corpora, _MOST)}, a posture of one is CORPUS/NAME"
     raise MotionMindError(f"{word}: there is no such file or corpus{hint}")
+
+
+def check_named(source: Source, home: Path | None = None) -> None:
+    """Raise MotionMindError if there is no such movement, as far as that is seen before any is read or learned."""
+    if source.kind != "file":
+        if source.name:
+            open_collection(source, home).check(source.name)
+    elif not is_file(source.place):
+        find_motion(source, home)  # which says what is wrong
 
 
 def frame_of(name: PostureName, motion: Motion) -> int:
