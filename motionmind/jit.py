@@ -20,7 +20,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
-from numba.core import ccallback, codegen, compiler, serialize, sigutils
+from numba.core import bytecode, ccallback, codegen, compiler, serialize, sigutils
 from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
@@ -35,7 +35,23 @@ _normalise: Any = sigutils.normalize_signature
 _CFunc: Any = ccallback.CFunc
 _result: Any = compiler.compile_result
 _codegen: Any = codegen
+_bytecode: Any = bytecode
 _dumps: Any = serialize.dumps
+
+
+class _Numbers:
+    """The numbers by which numba tells functions of one name and signature apart, as the loops of sort and of argsort.
+
+    numba counts from 1 in each process. But code that several have compiled comes together in one, where the linker
+    takes the first function of a name for all of them: another one is called, or the process crashes. So numbers are
+    drawn at random, and are not those of any other process, nor of one that was forked.
+    """
+
+    def __next__(self) -> int:
+        return int.from_bytes(os.urandom(8), "big")
+
+
+_bytecode.FunctionIdentity._unique_ids = _Numbers()
 
 
 def jit(function: _F) -> _F:

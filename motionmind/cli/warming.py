@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 NOTICE = "compiling inner loops, once, which takes a minute or more (`motionmind warm` does it)"
 _LAST = "search/astar.search"  # calls most of what is compiled for a search, and is there only once all of that is
 _SEARCHES = ("body/", "geometry/", "realise/", "search/")  # what a search needs, by folder
-# Of which it needs little, or nothing.
-_LATER = ("body/support._overhang", "geometry/many.matrices", "geometry/many.turns", "realise/sparse", "realise/steps")
-_LATER += ("search/pair_chain", "search/sample")
+_LATER = (  # of which it needs little, or nothing
+    *("body/support._overhang", "geometry/many.matrices", "geometry/many.turns"),
+    *("realise/sparse", "realise/steps", "search/pair_chain", "search/sample"),
+)
 _LOOK = 0.2  # seconds between two looks at what is compiled
 _AT_ONCE = 3  # processes at most that share the work
 _BACK = 10  # by which processes that stand back are nicer than others

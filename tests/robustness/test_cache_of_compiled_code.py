@@ -271,3 +271,24 @@ for _ in range(3):
         lines = [line.split() for line in told.stdout.splitlines()]
         assert [line[:3] for line in lines] == [["8.0"] * 3] * 3
         assert all(line[3] == "0" for line in lines) or not is_kept
+
+
+def test_code_of_two_processes_is_not_mixed_up_in_a_third(tmp_path: Path) -> None:
+    # numba's loops of sort and of argsort have one name and signature. If functions are counted, these have one number,
+    # too: to sort takes three functions more before them.
+    (tmp_path / "sorting.py").write_text(
+        "import numpy as np\n"
+        "from motionmind.jit import jit\n"
+        "@jit\ndef greatest(x):\n    return np.sort(x)[-1]\n"
+        "@jit\ndef last(x):\n    return np.argsort(x)[-1]\n"
+    )
+    begin = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import numba, numpy as np; from sorting import *\n"
+    begin += "x = np.ones(40); x[7] = 2.0\n"
+    end = "\nprint(sum(sum(one._cache_misses.values()) for one in (greatest, last)))"
+    for program, said in [
+        ("print(greatest(x))", "2.0\n1\n"),
+        ("[numba.njit(lambda x: x)(1.0) for _ in range(3)]; print(last(x))", "7\n1\n"),
+        ("print(greatest(x), last(x))", "2.0 7\n0\n"),
+        ("print(last(x), greatest(x))", "7 2.0\n0\n"),
+    ]:
+        assert run(tmp_path, begin + program + end).stdout == said
