@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _LISTED = 5  # projects that are named at the start
 _TERMINAL = "terminal"  # the window of edits that the command makes
+_COLD = "the page opens in some seconds; inner loops are compiled for its first search, once, in a minute or more"
 
 
 @command("motionmind studio dance.motionmind --corpus ballet")
@@ -88,7 +89,9 @@ def studio(
                     f"whoever has the URL below and reaches {url.removeprefix('http://')} can work on this project, "
                     "and whoever is on the way can read along: nothing is encrypted"
                 )
-            work, keys = Studio(project, home, first=compile_in_steps() if is_cold() else None), Keys()
+            if cold := is_cold():
+                note(_COLD)
+            work, keys = Studio(project, home, first=compile_in_steps() if cold else None), Keys()
             with suppress(MotionMindError):  # which is missing, and said to be
                 work.engine(project.state.corpus)
             entry = f"{url}/#token={keys.token}"

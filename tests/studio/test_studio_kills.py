@@ -181,6 +181,23 @@ def test_errors_of_the_command_are_one_line(tmp_path: Path, run: Run) -> None:
     assert not (tmp_path / "new.motionmind").exists()
 
 
+def test_it_says_at_once_that_it_compiles_first(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "motionmind", "studio", "--no-browser", str(tmp_path / "piece.motionmind")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ
+        | {"PYTHONPATH": str(ROOT), "MOTIONMIND_HOME": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "code")},
+    ) as process:
+        assert process.stderr is not None
+        first = process.stderr.readline()
+        process.kill()
+        out, _ = process.communicate()
+    assert "the page opens in some seconds" in first
+    assert out == ""  # the address is yet to come
+
+
 def test_it_says_where_the_extra_is_missing(tmp_path: Path) -> None:
     (tmp_path / "starlette.py").write_text("raise ImportError('no starlette')")
     ran = subprocess.run(
