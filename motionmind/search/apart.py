@@ -18,7 +18,7 @@ method of Handler and Zang, "A dual algorithm for the constrained shortest path 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
@@ -237,14 +237,18 @@ def _improve(trellis: Trellis, chosen: Ints, agreeing: Floats, allowed: Floats, 
     def excess(path: Ints) -> float:
         return float(np.maximum(agreeing[:, path].sum(axis=1) - allowed, 0.0).sum())
 
-    steps: list[tuple[Callable[[Trellis, Ints, int], None], int]]
-    steps = [(minimise_chain, chain) for chain in range(trellis.chains)]
-    steps += [(minimise_moment, t) for t in range(1, trellis.moves + 1)]
+    everywhere = np.ones(len(trellis.dom), dtype=np.bool_)
+
+    def minimise(dearer: Trellis, path: Ints, which: int) -> None:
+        if which < trellis.chains:
+            minimise_chain(dearer, path, which, everywhere)
+        else:
+            minimise_moment(dearer, path, which - trellis.chains + 1, everywhere)
 
     def replacements(factors: Sequence[float]) -> Iterator[Ints]:
         for factor in factors:
             dearer = trellis._replace(unary=trellis.unary + factor * prices @ agreeing)
-            for minimise, which in steps:
+            for which in range(trellis.chains + trellis.moves):  # each chain, then each moment
                 trial = chosen.copy()
                 minimise(dearer, trial, which)
                 if not np.array_equal(trial, chosen):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motionmind._typing import Int32s, Ints
+from motionmind._typing import Floats, Int32s, Ints
 from motionmind.search import heuristic, pair_chains, trws
 from motionmind.search.attention import Attention
 from motionmind.search.costs import path_cost
@@ -60,10 +60,16 @@ class Bounded:
         """Cost in nats below which paths are of interest, the best path found among them."""
         return self.cost + HAIR if self.found else self.cost - HAIR
 
-    def update(self, lower_bound: float, chosen: Ints) -> None:
-        """Take in a bound, and a path of positions [n], which is polished if it is near the best."""
+    def update(self, lower_bound: float, chosen: Ints, through: Floats) -> None:
+        """Take in a bound, and a path of positions [n], which is polished if it is near the best.
+
+        Args:
+            lower_bound: of all paths, nats.
+            chosen: the path.
+            through: lower bounds on the cost of every path through each position, nats [P].
+        """
         if path_cost(self.trellis, chosen) <= self.cost + WORTH_POLISHING * abs(self.cost):
-            cost = polish(self.trellis, chosen)
+            cost = polish(self.trellis, chosen, through)
             if cost < self.cost:
                 self.cost, self.states = cost, states_of(self.trellis, chosen)
         self.lower_bound = min(max(self.lower_bound, lower_bound), self.cost)
@@ -109,7 +115,7 @@ def _tighten_by_messages(state: Bounded, sweeps: int, attention: Attention) -> N
         gap, size = state.cost - state.lower_bound, len(state.trellis.dom)
         chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
         lower_bound, _ = trws.tighten(state.trellis, messages, chosen, min(SWEEPS_AT_ONCE, sweeps - done), state.cost)
-        state.update(lower_bound, chosen)
+        state.update(lower_bound, chosen, messages.through)
         if state.closed and not state.found:
             break
         trellis, messages = trws.prune(state.trellis, messages, state.limit)
@@ -129,7 +135,7 @@ def tighten_by_pair_chains(state: Bounded, attention: Attention) -> None:
         tables = state.heuristic.tables
         lower_bound = pair_chains.sweep(state.trellis, tables, through)
         heuristic.descend(state.trellis, Heuristic.of_pair_chains(tables), chosen)
-        state.update(lower_bound, chosen)
+        state.update(lower_bound, chosen, through)
         if state.found or not state.closed:
             trellis, tables = pair_chains.prune(state.trellis, tables, through, state.limit)
             state.replace(trellis, Heuristic.of_pair_chains(tables))

@@ -83,7 +83,7 @@ def _descend(state: Bounded) -> Ints:
     """Return a good path of positions [n], whatever it costs."""
     chosen = np.zeros(len(state.trellis.dom_ptr) - 1, dtype=np.int64)
     heuristic.descend(state.trellis, state.heuristic, chosen)
-    polish(state.trellis, chosen)
+    polish(state.trellis, chosen, np.full(len(state.trellis.dom), -np.inf))
     return chosen
 
 

@@ -1,6 +1,7 @@
 """Improve a path: minimise one chain, or one moment, exactly, while the rest stays as it is, until nothing improves.
 
-Both are solved by dynamic programming: along a chain backwards in time, at a moment up the tree.
+Both are solved by dynamic programming: along a chain backwards in time, at a moment up the tree. Positions that no path
+as cheap as the present one goes through are passed over: nothing better is lost, and half of a large trellis is spared.
 """
 
 from __future__ import annotations
@@ -9,31 +10,42 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats, Ints
 from motionmind.jit import jit
-from motionmind.search.costs import coupling, edge_cost, path_cost
+from motionmind.search.costs import edge_cost, path_cost
 from motionmind.search.trellis import Trellis, correction
+
+_ROUNDING = 1e-6  # nats: more than bounds are off by
 
 
 @jit
-def polish(trellis: Trellis, path: Ints) -> float:
+def polish(trellis: Trellis, path: Ints, through: Floats) -> float:
     """Improve a path [n] of positions in place, chain by chain and moment by moment, and return its cost in nats.
 
     What lies as it did when it was last minimised, between neighbours that do, is not minimised again.
+
+    Args:
+        trellis: the problem.
+        path: the path.
+        through: a lower bound on the cost of every path through each position, nats [P].
     """
     chains, cost = trellis.chains, path_cost(trellis, path)
+    kept = _of_use(path, through, cost)
     chain_waits, moment_waits = np.ones(chains, np.bool_), np.ones(trellis.moves + 2, np.bool_)
     while True:
         for chain in range(chains):
             if chain_waits[chain]:
                 before = path[chain::chains].copy()
-                minimise_chain(trellis, path, chain)
+                minimise_chain(trellis, path, chain, kept)
                 chain_waits[chain] = False
-                for changed in np.flatnonzero(path[chain::chains] != before):
+                moved = np.flatnonzero(path[chain::chains] != before)
+                for changed in moved:
                     moment_waits[changed - 1 : changed + 2] = True
                     _wake_neighbours(trellis, chain, chain_waits)
+                if len(moved) > 0:
+                    kept = _of_use(path, through, path_cost(trellis, path))
         for t in range(1, trellis.moves + 1):
             if moment_waits[t]:
                 before = path[t * chains : (t + 1) * chains].copy()
-                minimise_moment(trellis, path, t)
+                minimise_moment(trellis, path, t, kept)
                 moment_waits[t] = False
                 for changed in np.flatnonzero(path[t * chains : (t + 1) * chains] != before):
                     moment_waits[t - 1] = moment_waits[t + 1] = chain_waits[changed] = True
@@ -42,6 +54,14 @@ def polish(trellis: Trellis, path: Ints) -> float:
         if not better < cost - 1e-9:
             return min(better, cost)
         cost = better
+
+
+@jit
+def _of_use(path: Ints, through: Floats, cost: float) -> Bools:
+    """Return which positions [P] a path as cheap as this one, which costs so much, may go through; its own are."""
+    kept = through <= cost + _ROUNDING
+    kept[path] = True
+    return kept
 
 
 @jit
@@ -55,24 +75,31 @@ def _wake_neighbours(trellis: Trellis, chain: int, waits: Bools) -> None:
 
 
 @jit
-def minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
-    """Replace a chain's positions by the cheapest, given the other chains.
+def minimise_chain(trellis: Trellis, path: Ints, chain: int, kept: Bools) -> None:
+    """Replace a chain's positions by the cheapest of those that are kept [P], given the other chains.
 
     value[p] is the least cost of the chain from position p on, its couplings to the others included.
     """
     chains = trellis.chains
-    value = np.empty(trellis.dom_ptr[trellis.moves * chains + chain + 1])
+    value = np.full(trellis.dom_ptr[trellis.moves * chains + chain + 1], np.inf)
     for t in range(trellis.moves, 0, -1):
         i = t * chains + chain
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+            if not kept[p]:
+                continue
             rest = 0.0 if t == trellis.moves else np.inf
             for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
                 rest = min(rest, trellis.row_cost[e] + value[trellis.row_to[e]])
-            value[p] = rest + trellis.unary[p] + coupling(trellis, path, i, p)
+            value[p] = rest + trellis.unary[p]
             for child in range(chain + 1, chains):
                 below = i - chain + child
                 if trellis.parents[child] == chain:
                     value[p] += correction(trellis, trellis.up_ptr[below] + p - trellis.dom_ptr[i], path[below])
+        if trellis.up_ptr[i + 1] > trellis.up_ptr[i]:
+            above = i - chain + trellis.parents[chain]
+            u = trellis.up_ptr[i] + path[above] - trellis.dom_ptr[above]
+            for q in range(trellis.col_ptr[u], trellis.col_ptr[u + 1]):
+                value[trellis.col_to[q]] += trellis.col_cost[q]
     for i in range(chain + chains, len(path), chains):
         before, least = path[i - chains], np.inf
         for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
@@ -82,8 +109,8 @@ def minimise_chain(trellis: Trellis, path: Ints, chain: int) -> None:
 
 
 @jit
-def minimise_moment(trellis: Trellis, path: Ints, t: int) -> None:
-    """Replace all positions at move t by the cheapest, given the other moves.
+def minimise_moment(trellis: Trellis, path: Ints, t: int, kept: Bools) -> None:
+    """Replace all positions at move t by the cheapest of those that are kept [P], given the other moves.
 
     value[p] is the least cost of a chain with position p and of the chains below it in the tree.
     """
@@ -95,29 +122,37 @@ def minimise_moment(trellis: Trellis, path: Ints, t: int) -> None:
         before = path[i - chains]
         for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
             p = trellis.row_to[e]
-            value[p - first] = trellis.row_cost[e] + trellis.unary[p]
+            if not kept[p]:
+                continue
+            cost = trellis.row_cost[e] + trellis.unary[p]
             if t < trellis.moves:
-                value[p - first] += edge_cost(trellis, p, path[i + chains])
+                cost += edge_cost(trellis, p, path[i + chains])
             for child in range(chain + 1, chains):
-                if trellis.parents[child] == chain:
-                    value[p - first] += _cheapest(trellis, value, first, i - chain + child, p - trellis.dom_ptr[i])[0]
+                if trellis.parents[child] == chain and cost < np.inf:
+                    cost += _cheapest(trellis, path, value, first, i - chain + child, p - trellis.dom_ptr[i])[0]
+            value[p - first] = cost
     for chain in range(chains):
         i, parent = t * chains + chain, trellis.parents[chain]
         above = -1 if parent < 0 else path[i - chain + parent] - trellis.dom_ptr[i - chain + parent]
-        path[i] = _cheapest(trellis, value, first, i, above)[1]
+        path[i] = _cheapest(trellis, path, value, first, i, above)[1]
 
 
 @jit
-def _cheapest(trellis: Trellis, value: Floats, first: int, i: int, above: int) -> tuple[float, int]:
-    """Return the least cost of variable i, and its position, where its parent has index `above` (-1 for no parent)."""
-    least, best = np.inf, -1
+def _cheapest(trellis: Trellis, path: Ints, value: Floats, first: int, i: int, above: int) -> tuple[float, int]:
+    """Return the least cost of variable i, and its position, where its parent has index `above` (-1 for no parent).
+
+    Only what its chain's position one move before leads to can be taken.
+    """
+    least, best, before = np.inf, -1, path[i - trellis.chains]
     u = trellis.up_ptr[i] + above
     q, last = (trellis.col_ptr[u], trellis.col_ptr[u + 1]) if above >= 0 else (0, 0)
-    for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
+    for e in range(trellis.row_ptr[before], trellis.row_ptr[before + 1]):
+        p = trellis.row_to[e]
+        while q < last and trellis.col_to[q] < p:
+            q += 1
         cost = value[p - first]
         if q < last and trellis.col_to[q] == p:
             cost += trellis.col_cost[q]
-            q += 1
         if cost < least:
             least, best = cost, p
     return least, best

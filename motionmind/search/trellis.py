@@ -132,16 +132,18 @@ def reachable(trellis: Trellis, through: Floats, below: float) -> Bools:
     kept = through < below
     for i in range(len(trellis.dom_ptr) - 2 - trellis.chains, -1, -1):  # what leads nowhere
         for p in range(trellis.dom_ptr[i], trellis.dom_ptr[i + 1]):
-            leads = False
-            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
-                leads = leads or kept[trellis.row_to[e]]
-            kept[p] = kept[p] and leads
+            leads, e = False, trellis.row_ptr[p]
+            while kept[p] and not leads and e < trellis.row_ptr[p + 1]:
+                leads = kept[trellis.row_to[e]]
+                e += 1
+            kept[p] = leads
     led_to = np.zeros(len(kept), np.bool_)
     led_to[: trellis.dom_ptr[trellis.chains]] = True
     for p in range(len(kept)):  # what nothing leads to
         kept[p] = kept[p] and led_to[p]
         if kept[p]:
-            led_to[trellis.row_to[trellis.row_ptr[p] : trellis.row_ptr[p + 1]]] = True
+            for e in range(trellis.row_ptr[p], trellis.row_ptr[p + 1]):
+                led_to[trellis.row_to[e]] = True
     return kept
 
 

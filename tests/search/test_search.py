@@ -428,12 +428,28 @@ def test_polishing_never_makes_a_path_dearer_and_states_its_cost(kind: dict[str,
         path[: trellis.chains] = trellis.dom_ptr[: trellis.chains]
         before = trws.backward(trellis, messages) + trws.descend(trellis, messages, path, trellis.chains)
         assert before == pytest.approx(path_cost(trellis, path), abs=ROUNDING), seed
-        after = polish(trellis, path)
+        after = polish(trellis, path, messages.through)
         states = trellis.dom[path].reshape(MOVES + 1, trellis.chains)
         assert after == pytest.approx(toy.cost(states) - MOVES * toy.per_move, abs=ROUNDING), seed
         assert optimum - ROUNDING <= after <= before + ROUNDING, seed
         better += after < before - ROUNDING
     assert better > 0
+
+
+def test_polishing_passes_over_nothing_that_makes_a_path_cheaper(kind: dict[str, bool]) -> None:
+    passed_over = 0
+    for seed in range(100):
+        toy = random_toy(seed, **kind)
+        if toy.optima(MOVES)[MOVES] == np.inf:
+            continue
+        trellis = trellis_of(toy, MOVES)
+        messages, path = trws.no_messages(trellis), np.zeros((MOVES + 1) * trellis.chains, np.int64)
+        trws.tighten(trellis, messages, path, 2, np.inf)
+        other, everywhere = path.copy(), np.full(len(trellis.dom), -np.inf)
+        passed_over += int(np.sum(messages.through > path_cost(trellis, path) + ROUNDING))
+        assert polish(trellis, path, messages.through) == polish(trellis, other, everywhere), seed
+        assert (path == other).all(), seed
+    assert passed_over > 0
 
 
 def test_parts_that_nothing_couples_cost_less_effort_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -499,7 +515,7 @@ def test_nothing_is_proven_beyond_the_cost_that_paths_are_to_be_cheaper_than() -
     chosen = np.zeros(len(trellis.dom_ptr) - 1, dtype=np.int64)
     trws.tighten(trellis, trws.no_messages(trellis), chosen, 2, np.inf)
     state = bounding.Bounded(trellis, Heuristic.of_messages(trws.no_messages(trellis)), -100.0)
-    state.update(1e3, chosen)
+    state.update(1e3, chosen, np.full(len(trellis.dom), -np.inf))
     assert (state.lower_bound, state.found, state.closed) == (-100.0, False, True)
 
 
