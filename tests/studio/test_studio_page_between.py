@@ -226,8 +226,13 @@ def test_paper_is_as_the_system_has_it_until_it_is_switched(studio_page: Any, sc
     paper = "getComputedStyle(document.body).backgroundColor"
     before = studio_page.evaluate(paper)
     assert (before == "rgb(27, 26, 30)") == (scheme == "dark")
+    # Small pictures, drawn for light paper, are brighter on dark.
+    studio_page.locator("[data-testid=posture-fifth] img").wait_for()
+    filtered = "getComputedStyle(document.querySelector('[data-testid=posture-fifth] img')).filter"
+    assert (studio_page.evaluate(filtered) != "none") == (scheme == "dark")
     studio_page.get_by_test_id("dark").click()
     assert studio_page.evaluate(paper) != before
+    assert (studio_page.evaluate(filtered) == "none") == (scheme == "dark")
 
 
 def test_the_sheet_of_keys_tells_what_they_do(studio_page: Any) -> None:

@@ -48,6 +48,7 @@ export class Viewer extends EventTarget {
     this.fresh = false;
     this.player.addEventListener("change", () => this.stale());
     this.theme.addEventListener("change", () => this.#colour());
+    this.#colour();
     this.last = performance.now();
     requestAnimationFrame((now) => this.#draw(now));
   }
@@ -167,6 +168,7 @@ export class Viewer extends EventTarget {
   }
 
   #colour() {
+    document.documentElement.classList.toggle("dark", this.theme.dark);
     for (const stage of [this.stage, this.other]) if (stage) stage.dark = this.theme.dark;
     this.stale();
   }
