@@ -44,8 +44,9 @@ def studio_server(begun: bytes, tmp_path: Path) -> Iterator[Served]:
 
 @pytest.fixture
 def page(studio_page: Any) -> Any:
-    """A page with that piece, all of which is seen."""
+    """A page with that piece, all of which is seen and can be played."""
     wait_for_states(studio_page, ["inserted", "inserted"])
+    wait_for(studio_page, "Math.abs(studio.viewer.player.motion.end - piece.seconds) < 0.01")
     studio_page.get_by_test_id("zoom-fit").click()
     return studio_page
 
