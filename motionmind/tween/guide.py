@@ -33,7 +33,7 @@ from motionmind.realise.timeline import usual
 from motionmind.tween.pacing import usual_times
 
 CREEPING = 0.25  # share of the time in which walks may creep
-SELDOM = 1.6449  # standard deviations: dancers seldom, one time in twenty, take so long for so far a way
+SELDOM = 2.0  # standard deviations: dancers seldom, one time in forty, take so long for so far a way
 MOVE = 0.2  # seconds of a move that pays kappa for a tolerance's departure
 
 
