@@ -568,6 +568,8 @@ def test_it_works_in_a_frame_that_may_do_nothing_else(browser: Any, tmp_path: Pa
 
     wait("!!window.motionmind")
     assert inner.evaluate("document.documentElement.scrollHeight") == 400
+    # A frame in a process of its own may be told after it has begun that its viewer wants less motion, and then plays.
+    inner.evaluate("motionmind.player.pause()")
     inner.click("#play")
     wait("motionmind.player.time > 0.0 && document.hasFocus()")
     tab.keyboard.press("Space")  # the clicked frame has the keys
