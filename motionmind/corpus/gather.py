@@ -94,7 +94,8 @@ def gather(
             (`motionmind.corpus.recordings.take`, with the same options) stay as they are.
         rate: postures per second; None keeps every frame with its own time. "auto" takes 5 postures a second of a
             recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
-            keyframes: of a motion that says so, and of one with fewer than 15 frames a second.
+            keyframes: of a motion that says so, and of one with fewer than 15 frames a second. Corpora that are mixed
+            in are then brought to the recordings' rate, or where there are none to the lowest rate that any has.
         skip: frames to drop at each recording's start, such as an added T-pose.
         facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
             "stage" leaves it there, and facing the wall is then another state than facing the audience.
@@ -170,16 +171,16 @@ def gather(
     mixed = [(other, clip, weight) for other, weight in mix for clip in other.clips]
     if body is None or not (mixed or growing.clips):
         raise CorpusError(f"corpus {name!r}: every recording has faults, and without them nothing is left")
-    common = _common_rate(taken, bool(own), mix) if given is None else given
+    common = _common_rate(name, taken, bool(own), mix, rate == "auto") if given is None else given
     between = frames_between(common)
     for one_mixed in mixed:
-        growing.add(as_piece(_mixed(*one_mixed, given), between))
+        growing.add(as_piece(_mixed(*one_mixed, common), between))
     if mirror:
         growing.extend(images)
         present = {_name_in(other, clip) for other, clip, _ in mixed if clip.mirrored}
         for other, clip, weight in mixed:
             if _name_in(other, clip) not in present:
-                growing.add(mirror_image(_mixed(other, clip, weight, given), between))
+                growing.add(mirror_image(_mixed(other, clip, weight, common), between))
     corpus = Corpus(
         name,
         body,
@@ -242,17 +243,29 @@ def _check_mix(name: str, mix: Sequence[tuple[Corpus, float]], rate: float | Non
             )
 
 
-def _common_rate(taken: float | None, has_own: bool, mix: Sequence[tuple[Corpus, float]]) -> float | None:
-    """Return the rate of recordings and of corpora mixed with them unchanged; CorpusError if they differ.
+def _common_rate(
+    name: str, taken: float | None, has_own: bool, mix: Sequence[tuple[Corpus, float]], auto: bool
+) -> float | None:
+    """Return the rate of recordings and of the corpora mixed with them.
 
     Args:
+        name: the name of what becomes of them.
         taken: postures a second that were taken of recordings.
         has_own: whether there are recordings.
         mix: the corpora, as of `gather`.
+        auto: whether corpora may be brought to another rate than theirs.
+
+    Raises:
+        CorpusError: the rates differ, and these stay as they are or cannot be brought to one.
     """
     found: dict[float | None, str] = {taken: "the recordings"} if has_own else {}
     for mixed, _ in mix:
         found.setdefault(mixed.rate, f"corpus {mixed.name!r}")
+    lowest = min((rate for rate in found if rate is not None), default=None)
+    if len(found) > 1 and auto and not (has_own and taken != lowest):
+        brought = ", ".join(repr(mixed.name) for mixed, _ in mix if mixed.rate != lowest)
+        _log.info("corpus %s: %g postures a second, also of %s", name, lowest, brought)
+        return lowest
     if len(found) > 1:
         (a, one), (b, other) = list(found.items())[:2]
         raise CorpusError(f"{one} and {other} are of different rates ({_pace(a)}, {_pace(b)}); give a rate for all")

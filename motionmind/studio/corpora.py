@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -97,6 +97,15 @@ def list_all(home: Path | None) -> list[dict[str, Any]]:
             entry["error"] = displayed(str(error), _LINE)
         found.append(entry)
     return found
+
+
+def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
+    """Return the rate to learn at: what is wished, or the lowest of the corpora mixed in, which have no more frames."""
+    if lesson.rate is not None:
+        return lesson.rate
+    folders = store.list_corpora(home)
+    rates = [store.read_manifest(folders[one.name]).get("rate") for one in lesson.mix]
+    return min((float(rate) for rate in rates if rate is not None), default="auto")
 
 
 def _count_clips(manifest: dict[str, Any]) -> int:
@@ -189,7 +198,7 @@ def learn(report: Report, lesson: Lesson, recordings: list[Recording], home: Pat
             name=lesson.name,
             home=home,
             mix={one.name: one.weight for one in lesson.mix},
-            rate="auto" if lesson.rate is None else lesson.rate,
+            rate=_rate_of(lesson, home),
             mirror=lesson.mirror,
             title=lesson.title,
         )

@@ -20,6 +20,7 @@ from motionmind.credits.credit import Credit
 from motionmind.credits.ledger import ledger_of, sections_of
 from motionmind.errors import MotionMindError, suggestion
 from motionmind.formats import write_motion
+from motionmind.formats.bvh import write_bvh
 from motionmind.render.page import page
 from motionmind.studio.api import json
 from motionmind.studio.placement import performance
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 _UNSAFE = re.compile(r'[\\/:*?"<>|\x00-\x1f\x7f]+')  # in names of files, on some system
 _LONGEST = 100  # characters of a name
+_RATE = 30.0  # frames a second where a piece's own are not even
 _TYPES = {
     "html": "text/html; charset=utf-8",
     "glb": "model/gltf-binary",
@@ -50,7 +52,7 @@ def composed(studio: Studio) -> Motion:
         raise MotionMindError("the piece is empty: there is nothing to take away yet")
     if missing := project.missing:
         raise MotionMindError(f"the piece cannot be taken away: {missing[0]}")
-    layout = layout_of(project.state, project.finding, project.marks)
+    layout = layout_of(project.state, project.finding, project.marks, project.standing)
     return replace(performance(list(layout.parts), studio.movements.get), name=project.state.title or "piece")
 
 
@@ -75,7 +77,7 @@ def routes(studio: Studio) -> list[BaseRoute]:
     makers: dict[str, Callable[[Motion], bytes]] = {
         "html": lambda motion: page(motion).encode(),
         "glb": lambda motion: _written(motion, ".glb"),
-        "bvh": lambda motion: _written(motion, ".bvh"),
+        "bvh": lambda motion: _written(motion if motion.is_even else motion.resample(_RATE), ".bvh"),
         "json": lambda motion: _written(motion, ".json"),
     }
 
@@ -100,7 +102,10 @@ def _written(motion: Motion, suffix: str) -> bytes:
     """Return a motion as a file of a format."""
     with tempfile.TemporaryDirectory(prefix="motionmind-") as folder:
         path = Path(folder) / f"piece{suffix}"
-        write_motion(path, motion)
+        if suffix == ".bvh":
+            write_bvh(path, motion, "m")  # as Blender takes it; the panel says so
+        else:
+            write_motion(path, motion)
         return path.read_bytes()
 
 

@@ -11,12 +11,13 @@ from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
 from motionmind.studio import piece
 from motionmind.studio.checks import check_movements, corpora_of, missing_in
-from motionmind.studio.edits import Edit, touched, words_of
+from motionmind.studio.edits import Edit, Wish, touched, words_of
 from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
-from motionmind.studio.piece import Finding, Seam, State
+from motionmind.studio.piece import End, Finding, Found, Pair, Seam, State
 from motionmind.studio.placement import Marks
 from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
+from motionmind.studio.view import chosen_at
 
 _EVERY = 16  # edits after which the state is remembered, so that an undo need not apply all of them again
 
@@ -64,6 +65,7 @@ class Project:
         self._changes: list[Change] = []
         self._redoable: dict[str, list[Change]] = {}  # by window, the last to be redone first
         self._findings: dict[str, Finding] = {}
+        self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # what was inserted before a wish, between what
         self._subscribers: list[Callable[[], None]] = []
         self._windows: set[str] = set()  # that were seen since it was opened
         self._states: list[State] = []  # before the first change, and after each `_EVERY` changes more
@@ -154,6 +156,12 @@ class Project:
         """Return what is known of a seam."""
         return self._findings.get(self.question(seam))
 
+    def standing(self, seam: Seam) -> Found | None:
+        """Return what was inserted at a seam before its wish, to stand there until that is answered; None if nothing
+        was, or it is discarded, or its sides are others now."""
+        ends, found = self._stood.get(seam.pair, (None, None))
+        return found if ends == seam.ends and seam.verdict.decision != "discarded" else None
+
     def lacks(self, seam: Seam) -> bool:
         """Return whether something is missing without which a seam can be neither judged nor smoothed."""
         ends = [(end.key, end.frame) for end in seam.ends]
@@ -184,6 +192,10 @@ class Project:
             raise RefusedError(str(error)) from error
         self._note_versions(state)
         line = self._journal.append(EditLine(edit, self.sequence, window))
+        if isinstance(edit, Wish):
+            seam = self.state.seam(edit.left, edit.right)
+            if found := chosen_at(seam, self.finding(seam)):
+                self._stood[seam.pair] = seam.ends, found
         self._redoable.pop(window, None)
         self._add(Change(line.number, edit, window), state)
         self._changed()

@@ -244,7 +244,7 @@ def _read(order: Order) -> list[Motion]:
             message = re.sub("|".join(map(re.escape, taken)), lambda match: taken[match[0]], str(error))
             raise MotionMindError(message) from error
         if not found:
-            raise FormatError("holds no clip: a clip is what moves", path=path)
+            raise FormatError("holds no clip, which is what moves: write one that goes through its postures", path=path)
         if len(found) > _MOST_CLIPS:
             raise FormatError(f"holds {len(found)} clips; {_MOST_CLIPS} are the most", path=path)
         return [replace(one, name=displayed(one.name)) for one in found]

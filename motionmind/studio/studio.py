@@ -126,7 +126,7 @@ class Studio:
             "words": project.words,
             "missing": project.missing,
             "postures": [{"name": name, "key": key} for name, key in state.postures.items()],
-            "piece": view_of(state, project.finding, project.marks, project.movements.title),
+            "piece": view_of(state, project.finding, project.marks, project.movements.title, project.standing),
             "undo": project.undoable(window),
             "redo": project.redoable(window),
         }

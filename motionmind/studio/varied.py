@@ -147,7 +147,9 @@ def _shown(
     project, order = studio.project, found.order
 
     def view(blocks: tuple[Block, ...]) -> dict[str, Any]:
-        return view_of(replace(state, blocks=blocks), project.finding, project.marks, project.movements.title)
+        return view_of(
+            replace(state, blocks=blocks), project.finding, project.marks, project.movements.title, project.standing
+        )
 
     steps = np.diff(order.indices)
     about = {

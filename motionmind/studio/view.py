@@ -13,6 +13,7 @@ from motionmind.studio.placement import Layout, Marks, Part, lay_out
 
 SeamState = Literal["smooth", "abrupt", "waiting", "inserted", "discarded", "none found"]
 Findings = Callable[[Seam], Finding | None]  # returns what is known of a seam; None as long as nothing is
+Standing = Callable[[Seam], Found | None]  # returns what was inserted at a seam before what is known of it was asked
 
 _GOES_ON = "goes on as recorded"
 
@@ -37,17 +38,24 @@ def chosen_at(seam: Seam, finding: Finding | None) -> Found | None:
     return finding.insertions[min(seam.verdict.chosen, len(finding.insertions)) - 1]
 
 
-def layout_of(state: State, findings: Findings, marks: Marks) -> Layout:
-    """Place a piece's parts with what is known of its seams."""
+def layout_of(state: State, findings: Findings, marks: Marks, standing: Standing = lambda _: None) -> Layout:
+    """Place a piece's parts with what is known of its seams; until a wish is answered, what was inserted stands."""
 
     def insertion(seam: Seam) -> str | None:
-        found = chosen_at(seam, findings(seam))
+        finding = findings(seam)
+        found = standing(seam) if state_of(seam, finding) == "waiting" else chosen_at(seam, finding)
         return found.key if found else None
 
     return lay_out(state, insertion, marks)
 
 
-def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str], str]) -> dict[str, Any]:
+def view_of(
+    state: State,
+    findings: Findings,
+    marks: Marks,
+    title: Callable[[str], str],
+    standing: Standing = lambda _: None,
+) -> dict[str, Any]:
     """Return `piece` of the project's JSON: its length, parts, blocks and seams.
 
     Args:
@@ -55,8 +63,9 @@ def view_of(state: State, findings: Findings, marks: Marks, title: Callable[[str
         findings: what is known of its seams.
         marks: of the movements.
         title: returns a movement's title by its key.
+        standing: what stands at a seam until its wish is answered.
     """
-    layout = layout_of(state, findings, marks)
+    layout = layout_of(state, findings, marks, standing)
     blocks = [
         msgspec.structs.asdict(block)
         | {

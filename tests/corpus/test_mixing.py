@@ -592,9 +592,27 @@ def test_postures_of_a_mixed_corpus_are_brought_to_the_rate(home: Home) -> None:
     ):
         home.mix("mixed", [walk("c", [0, 1])], {"even": 1.0})
     with pytest.raises(CorpusError, match="corpus 'keys' and corpus 'even' are of different rates"):
-        home.mix("mixed", [], {"keys": 1.0, "even": 1.0})
+        home.mix("mixed", [], {"keys": 1.0, "even": 1.0}, rate=None)
     with pytest.raises(CorpusError, match="corpus 'even' has 10 postures a second; 20 cannot be made of them"):
         home.mix("mixed", [], {"even": 1.0}, rate=20.0)
+
+
+def test_corpora_are_brought_to_the_recordings_rate_unless_one_is_given(
+    home: Home, caplog: pytest.LogCaptureFixture
+) -> None:
+    home.keep("even", [walk("a", range(-4, 5), seconds=0.1)], rate=10.0)
+    home.keep("keys", [walk("b", [0, 2], seconds=0.4)])
+    film = walk("c", [0] * 31, seconds=1 / 30)
+    with caplog.at_level("INFO"):
+        engine = home.mix("mixed", [film], {"keys": 1.0, "even": 1.0}, rate="auto")
+    assert "corpus mixed: 5 postures a second, also of 'keys', 'even'" in caplog.messages
+    given = home.mix("mixed", [film], {"keys": 1.0, "even": 1.0}, rate=5.0)
+    assert engine.corpus.rate == 5.0
+    assert np.array_equal(engine.corpus.rotations, given.corpus.rotations)
+    assert engine.corpus.clips == given.corpus.clips
+    alone = home.mix("mixed", [], {"keys": 1.0, "even": 1.0}, rate="auto")
+    assert alone.corpus.rate == 10.0
+    assert [len(clip) for clip in alone.corpus.clips] == [5, 9]
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,26 @@ def test_insertions_are_credited_as_they_were_found(studio_server: Served) -> No
     assert shares == pytest.approx({one.clip: one.share for one in insertion.credits})
 
 
+def test_frames_that_are_not_even_are_a_file_all_the_same(studio_server: Served, tmp_path: Path) -> None:
+    """An insertion, a clip, and a seam at which one posture is held until the other comes."""
+    ends = {"a": {"key": "ballet/arabesque", "frame": 0}, "b": {"key": "ballet/fifth", "frame": 0}}
+    job = studio_server.post("/api/between", {**ends, "options": {}})["job"]
+    assert studio_server.wait_for(job)["state"] == "done"
+    studio_server.post("/api/between/accept", {"job": job, "alternative": 1, "window": "w1"})
+    studio_server.insert("b3", "ballet/adagio", 3, 20)
+    whole = composed(studio_server.studio)
+    assert not whole.is_even
+    path = tmp_path / "taken.bvh"
+    path.write_bytes(taken(studio_server, "bvh").body)
+    motion = read_motion(path)
+    assert motion.fps == pytest.approx(30.0)
+    assert motion.times[-1] == pytest.approx(whole.times[-1], abs=1 / 30)
+    text = path.read_text()
+    assert (
+        0.1 < max(float(word) for line in text.splitlines() if "OFFSET" in line for word in line.split()[1:]) < 1.0
+    )  # metres
+
+
 def test_nothing_is_taken_away_of_an_empty_piece(studio_server: Served) -> None:
     answer = studio_server.send("GET", "/api/export/bvh")
     assert (answer.status, answer.value["error"]) == (400, "the piece is empty: there is nothing to take away yet")

@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 from scores import BENDS
 from studio_server import Served, serving
 
+from motionmind import Motion, human23, write_motion
+from motionmind.geometry import rotations as rot
 from motionmind.studio.project import Project
 
 
@@ -139,6 +142,25 @@ def test_a_corpus_is_learned_looked_through_and_deleted(served: Served) -> None:
     assert (again.status, "already" in again.value["error"]) == (400, True)
     assert served.send("DELETE", "/api/corpora/mine").status == 200
     assert all(one["name"] != "mine" for one in served.get("/api/corpora"))
+
+
+def test_a_recording_is_mixed_with_a_corpus_of_keyframes(served: Served, tmp_path: Path) -> None:
+    times = np.arange(61) / 30.0
+    turns = np.zeros((61, 23, 3))
+    turns[:, 5, 0] = 0.5 * np.sin(3.0 * times)
+    path = tmp_path / "swing.bvh"
+    write_motion(path, Motion(human23(), rot.exp(turns), np.tile([0.0, 1.0, 0.0], (61, 1)), times))
+    upload = bring(served, "swing.bvh", path.read_bytes()).value
+    wish = {"name": "both", "parts": [{"upload": upload["id"]}], "mix": [{"name": "ballet"}]}
+    job = served.wait_for(served.post("/api/corpora", wish)["job"])
+    assert job["state"] == "done", job
+    assert served.get("/api/corpora/both")["rate"] == 5.0
+    # Mixed with that, keyframes are taken as often.
+    upload = bring(served, "bends.score", BENDS.encode()).value
+    wish = {"name": "more", "parts": [{"upload": upload["id"]}], "mix": [{"name": "both"}]}
+    job = served.wait_for(served.post("/api/corpora", wish)["job"])
+    assert job["state"] == "done", job
+    assert served.get("/api/corpora/more")["rate"] == 5.0
 
 
 def test_learning_is_cancelled_and_leaves_nothing(served: Served) -> None:

@@ -179,3 +179,14 @@ def test_what_is_missing_keeps_its_place_and_is_said_to_be_missing() -> None:
     assert view["blocks"][1]["seconds"] == pytest.approx(1.0)
     assert view["blocks"][2]["at"] > view["blocks"][1]["at"] + 1.0
     assert {part["key"] for part in view["parts"]} == {"c/one", "c/two"}
+
+
+def test_what_was_inserted_stands_until_a_wish_is_answered() -> None:
+    piece = piece_of(("c/one", 0, 5), ("c/two", 3, 5))
+    found = Found("m-found", 0.5, "usual")
+    view = view_of(piece, lambda _: None, Marks(movement), str.upper, lambda _: found)
+    assert [part["key"] for part in view["parts"]] == ["c/one", "m-found", "c/two"]
+    assert (view["seams"][0]["state"], view["seams"][0]["seconds"]) == ("waiting", pytest.approx(0.5))
+    none = Finding("q", True, "no way found", ())
+    view = view_of(piece, lambda _: none, Marks(movement), str.upper, lambda _: found)
+    assert [part["key"] for part in view["parts"]] == ["c/one", "c/two"]

@@ -129,8 +129,13 @@ def test_an_insertion_is_flipped_locked_discarded_and_made_longer_by_mouse(page:
     wait_for(page, "piece.seams[0].state === 'discarded'")
     page.get_by_test_id("discard").click()
     wait_for(page, "piece.seams[0].state === 'inserted'")
-    before = piece(page)["seams"][0]["seconds"]
+    before, keys = piece(page)["seams"][0]["seconds"], [part["key"] for part in piece(page)["parts"]]
+    page.evaluate("studio.api.delete('/api/seams')")
     drag(page, "insertion-1", 0.99, 40.0)
+    wait_for(page, "piece.seams[0].state === 'waiting'")  # until it is found the one before stands there
+    assert piece(page)["seams"][0]["seconds"] == before
+    assert [part["key"] for part in piece(page)["parts"]] == keys
+    page.evaluate("studio.api.post('/api/seams')")
     wait_for(page, f"piece.seams[0].state === 'inserted' && piece.seams[0].seconds > {before + 0.1}")
     seam = piece(page)["seams"][0]
     assert seam["seconds"] == pytest.approx(seam["ask"]["seconds"])
@@ -146,6 +151,13 @@ def test_a_posture_is_dropped_on_an_insertion_and_a_foot_is_pinned(page: Any) ->
     target.dispatch_event("dragover", {"dataTransfer": data})
     target.dispatch_event("drop", {"dataTransfer": data})
     wait_for(page, "piece.seams[1].ask.passing.length === 1 && piece.seams[1].state === 'inserted'")
+    assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
+    clip = page.evaluate_handle(
+        f"() => {{ const data = new DataTransfer(); data.setData('{POSTURE}', JSON.stringify({{ key: 'ballet/tendus', "
+        "frame: 0, last: 20 })); return data; }"
+    )
+    target.dispatch_event("drop", {"dataTransfer": clip})
+    page.get_by_text("An insertion passes a posture").wait_for()
     assert piece(page)["seams"][1]["ask"]["passing"] == [{"posture": "ballet/tendus", "frame": 12}]
     target.click()
     page.get_by_test_id("wishes").click()

@@ -63,6 +63,18 @@ export class Viewer extends EventTarget {
     if (this.isHome || !this.motion) this.#take(motion, { time, title: "", home: true, look: false });
   }
 
+  /** Forget the piece, which nothing is left of; whoever looks at something else goes on. */
+  clear() {
+    this.piece = undefined;
+    if (!this.isHome || !this.motion) return;
+    Object.assign(this, { motion: undefined, beside: undefined, title: "" });
+    for (const half of this.halves) half.hidden = true;
+    this.player.pause();
+    this.player.motion = /** @type {any} */ (STILL);
+    this.player.seek(0);
+    this.dispatchEvent(new Event("show"));
+  }
+
   /** Show the piece again. */
   back() {
     this.isHome = true; // also of a piece that is to come
@@ -73,9 +85,10 @@ export class Viewer extends EventTarget {
   /**
    * Show a movement that is not the piece.
    * @param {any} motion a Motion, or what has its interface, with `body` and `colours`
-   * @param {{time?: number, beside?: any, title?: string, play?: boolean, look?: boolean}} how
+   * @param {{time?: number, beside?: any, title?: string, besideTitle?: string, play?: boolean, look?: boolean}} how
    */
-  show(motion, { time, beside, title = "", play = false, look = true } = {}) {
+  show(motion, { time, beside, title = "", besideTitle = "", play = false, look = true } = {}) {
+    this.halves[1].dataset.title = besideTitle;
     this.#take(motion, { time, beside, title, look, home: false });
     if (play && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.player.play();
   }
@@ -120,6 +133,7 @@ export class Viewer extends EventTarget {
     const { motion, beside } = this;
     this.element.classList.toggle("two", Boolean(beside));
     if (beside && !this.halves[1].isConnected) this.halves[0].after(this.halves[1]);
+    this.halves[0].hidden = false;
     this.halves[1].hidden = !beside;
     if (!this.stage) this.stage = this.#stage(this.halves[0], motion);
     else this.stage.take(motion, motion.body, motion.colours);
@@ -177,7 +191,7 @@ export class Viewer extends EventTarget {
   #draw(now) {
     this.player.advance(Math.min((now - this.last) / 1000, LONGEST));
     this.last = now;
-    if (!this.fresh && this.stage && !this.busy && !this.covered) {
+    if (!this.fresh && this.stage && this.motion && !this.busy && !this.covered) {
       this.fresh = true;
       this.stage.show(this.player.time, this.ghosts);
       this.stage.render(this.player.playing);

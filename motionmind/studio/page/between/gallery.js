@@ -192,7 +192,14 @@ function Frames({ studio, clip }) {
       onInput=${seek}
     />
     <div class="row">
-      <span class="hint numbers grow">frame ${frame} of ${clip.frames - 1}</span>
+      <span
+        class="hint numbers grow moment"
+        data-testid="moment"
+        draggable="true"
+        title="Drag this moment to A, to B or to the time line"
+        onDragStart=${(/** @type {DragEvent} */ event) => event.dataTransfer?.setData(DRAGGED, JSON.stringify(place(frame)))}
+        >⠿ frame ${frame} of ${clip.frames - 1}</span
+      >
       <button class="button" onClick=${() => set("a")}>As A</button>
       <button class="button" onClick=${() => set("b")}>As B</button>
     </div>

@@ -9,7 +9,7 @@ const UNSAFE = /[\\/:*?"<>|\u0000-\u001f\u007f]+/g; // in names of files, on som
 const FILES = [
   { format: "html", testid: "export-html", name: "A page", words: "One file that plays in any browser, without the studio: to send to somebody." },
   { format: "glb", testid: "export-glb", name: "GLB", words: "The body and its movement for Blender, and for the web." },
-  { format: "bvh", testid: "export-bvh", name: "BVH", words: "Movement for Blender, MotionBuilder and other programs that animate." },
+  { format: "bvh", testid: "export-bvh", name: "BVH", words: "Movement for Blender (tick Update Scene FPS as you import it) and other programs that animate; lengths are in metres." },
   { format: "json", testid: "export-json", name: "Motion", words: "All that MotionMind knows of the movement, to go on with in Python or a terminal." },
 ];
 

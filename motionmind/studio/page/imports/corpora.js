@@ -30,7 +30,9 @@ export function Corpora({ studio, imports }) {
             ${corpus.name !== used &&
             html`<button class="button quiet" data-testid="use-${corpus.name}" disabled=${Boolean(corpus.error)}
               onClick=${() => studio.api.edit({ edit: "corpus", name: corpus.name }).catch(failed)}>Use</button>`}
-            ${corpus.own && html`<button class="button quiet" data-testid="delete-${corpus.name}" onClick=${() => setDoomed(corpus.name)}>Delete</button>`}
+            ${corpus.own &&
+            corpus.name !== used &&
+            html`<button class="button quiet" data-testid="delete-${corpus.name}" onClick=${() => setDoomed(corpus.name)}>Delete</button>`}
           </div>
         </li>`,
       )}

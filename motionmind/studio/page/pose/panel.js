@@ -28,8 +28,8 @@ export function Panel({ studio }) {
     };
   }, []);
   useKeys(studio, [
-    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: () => editor.undo() },
-    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: () => editor.redo() },
+    { keys: ["Ctrl+z"], does: "take the last change of the posture back", group: GROUP, act: (event) => isOfPosture(event, editor.began ?? editor.past[0]) && editor.undo() },
+    { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "do it again", group: GROUP, act: (event) => isOfPosture(event, editor.future[0]) && editor.redo() },
     { keys: ["k"], does: "bring it to what is known", group: GROUP, act: () => toKnown(editor) },
     { keys: ["f"], does: "feet on the floor", group: GROUP, act: () => toFloor(editor) },
     { shown: ["Tab"], does: "from handle to handle", group: GROUP },
@@ -45,6 +45,11 @@ export function Panel({ studio }) {
         : html`<p class="empty">Let the viewer show a moment, then pose it.</p>`
     }
   </div>`;
+}
+
+/** Whether a key is for a posture's change, if there is one: not at the line of time. @param {Event} event @param {unknown} change */
+function isOfPosture({ target }, change) {
+  return Boolean(change) && !(target instanceof Element && target.closest(".timeline"));
 }
 
 /** Where posing starts. @param {{studio: any}} props */

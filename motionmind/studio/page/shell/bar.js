@@ -13,8 +13,9 @@ export function Bar({ studio }) {
   const connected = useChange(store, () => store.connected !== false);
   const dark = useChange(viewer.theme, () => viewer.theme.dark);
   const [sheet, setSheet] = useState(false);
-  const undo = () => studio.act(() => studio.api.undo());
-  const redo = () => studio.act(() => studio.api.redo());
+  // Keys are pressed though there is nothing to take back, and before what was asked for last is answered.
+  const undo = () => studio.act(() => studio.api.changed.then(() => store.state?.undo && studio.api.undo()));
+  const redo = () => studio.act(() => studio.api.changed.then(() => store.state?.redo && studio.api.redo()));
   useKeys(studio, [
     { keys: ["Ctrl+z"], does: "undo", act: undo },
     { keys: ["Ctrl+Shift+z", "Ctrl+y"], shown: ["Ctrl+Shift+Z"], does: "redo", act: redo },

@@ -37,7 +37,7 @@ export class Movements {
   }
 }
 
-/** Has the interface of the player's Motion. Where a movement has not come yet, the body stays as it was. */
+/** Has the interface of the player's Motion. Where a movement has not come yet, the body waits as the one before ends. */
 export class Composed {
   /**
    * @param {Part[]} parts in order, at least one; the movement of the first has come
@@ -120,7 +120,7 @@ export class Composed {
   /** Put the posture at `time` into `rotations` [J * 4] and `root` [3]. */
   sample(time, rotations, root) {
     const index = this.partAt(time);
-    const part = this.parts[index];
+    const part = this.#hereBy(index);
     const next = this.parts[index + 1];
     const over = time - part.at - part.seconds;
     if (over <= MOMENT || !next || !this.movements.at(next.key)) {
@@ -137,9 +137,14 @@ export class Composed {
     for (let i = 0; i < from.length; i += 4) slerp(rotations, i, both, i, from.length + i, share);
   }
 
+  /** The part at `index`, or the nearest before it whose movement has come; that of the first has. @param {number} index */
+  #hereBy(index) {
+    while (index > 0 && !this.movements.at(this.parts[index].key)) index--;
+    return this.parts[index];
+  }
+
   #sampleWithin(part, time, rotations, root) {
     const motion = this.movements.at(part.key);
-    if (!motion) return;
     const begin = motion.times[part.first];
     const own = Math.min(begin + Math.max(time - part.at, 0), motion.times[part.last]);
     motion.sample(own, rotations, root);

@@ -19,7 +19,7 @@ export const KEYS = [
   ["Delete", "", "Delete", "delete the stretch; discard or restore the insertion", (does) => does.remove()],
   ["Backspace", "", "", "", (does) => does.remove()],
   ["l", "", "L", "lock or unlock the insertion", (does) => does.lock()],
-  ["w", "", "W", "what the insertion is to be: length, postures, hands and feet", (does) => does.show({ sheet: true })],
+  ["w", "", "W", "what the insertion is to be: length, postures, hands and feet", (does) => does.item?.seam && does.show({ sheet: true })],
   ["Escape", "", "", "", (does) => does.show({ sheet: false })],
   ["+", "", "+ −", "zoom", (does) => does.zoomIn()],
   ["=", "", "", "", (does) => does.zoomIn()],

@@ -98,7 +98,10 @@ function usePlayed(studio, movements, { parts }) {
   const told = JSON.stringify(parts);
   const [joints, setJoints] = useState([]);
   useEffect(() => {
-    if (parts.length === 0) return undefined;
+    if (parts.length === 0) {
+      studio.viewer.clear();
+      return undefined;
+    }
     let stale = false;
     const shown = async () => {
       await Promise.all([movements.load(parts[0].key), studio.pictured()]);

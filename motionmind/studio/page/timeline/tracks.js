@@ -95,7 +95,9 @@ export function Tracks({ does, piece, sight, selection, tempo, thumbnail }) {
     event.preventDefault();
     const posture = JSON.parse(data);
     const onto = heldBy(event, piece)?.seam;
-    if (onto) {
+    if (onto && posture.last > posture.frame) {
+      does.studio.say("An insertion passes a posture: open the clip, and drag a moment of it here", { kind: "note" });
+    } else if (onto) {
       const { left, width } = event.target.closest("[data-left]").getBoundingClientRect();
       does.pass(onto, { posture: posture.key, frame: posture.frame }, (event.clientX - left) / width);
     } else {

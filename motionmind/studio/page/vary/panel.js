@@ -10,6 +10,7 @@ import { alike, departure, insertedShare, Varying } from "./varying.js";
 
 const FARTHEST = 0.4; // share of the steps: no attractor departs farther
 const STRETCHES = [1, 2, 4, 8]; // postures
+const AFTER = 150; // milliseconds after an edit of the piece
 const INSERTED = [
   [0.5, "half of the time"],
   [0.33, "a third of it"],
@@ -39,7 +40,10 @@ export function Panel({ studio }) {
   const frames = piece?.blocks.reduce((/** @type {number} */ sum, /** @type {any} */ block) => sum + block.last - block.first + 1, 0) ?? 0;
   const isLong = frames > 2;
   useEffect(() => {
-    if (isLong) varying.ask(); // the piece is another: its variation is, too
+    if (!isLong) return undefined;
+    // The piece is another: its variation is, too; but first the edit is seen.
+    const asking = setTimeout(() => varying.ask(), varying.proposal ? AFTER : 0);
+    return () => clearTimeout(asking);
   }, [piece]);
   if (!isLong) {
     return html`<section class="stack vary">
@@ -167,8 +171,8 @@ function useView(studio, varying, piece) {
     );
     if (varying.proposal !== proposal) return; // another was asked for meanwhile
     const { viewer } = studio;
-    const title = both ? "Piece, variation" : "The variation";
-    viewer.show(both ? original : own, { time, beside: both ? own : undefined, title, look: !looking });
+    const how = both ? { beside: own, title: "The piece", besideTitle: "The variation" } : { title: "The variation" };
+    viewer.show(both ? original : own, { time, look: !looking, ...how });
   };
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
   useEffect(() => {
