@@ -138,6 +138,7 @@ def test_buttons_set_the_ends_and_dragging_does(studio_page: Any) -> None:
     page.get_by_test_id("set-b").click()
     ends = "JSON.stringify([studio.desk.ends.a?.key, studio.desk.ends.b?.key])"
     assert page.evaluate(ends) == '["ballet/first","ballet/first"]'
+    page.wait_for_selector(FOUND, timeout=LONG)  # a browser under load loses a drag from a page that is changing
     drag(page, page.get_by_test_id("posture-passe"), page.locator(".end").nth(1))
     page.locator(".end").nth(1).get_by_text("passe").wait_for()  # the browser tells of the drop when it comes to it
     assert page.evaluate(ends) == '["ballet/first","ballet/passe"]'
