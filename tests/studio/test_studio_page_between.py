@@ -134,12 +134,17 @@ def test_one_renderer_draws_all_nothing_plays_where_it_may_not_and_pointing_says
 
 def test_buttons_set_the_ends_and_dragging_does(studio_page: Any) -> None:
     page = studio_page
+    passe = page.get_by_test_id("posture-passe")
+    passe.wait_for()
+    before = passe.bounding_box()
     page.get_by_test_id("posture-first").click()
+    page.locator(".end img").wait_for()
+    assert passe.bounding_box() == before  # nothing moves away from under the hand
     page.get_by_test_id("set-b").click()
     ends = "JSON.stringify([studio.desk.ends.a?.key, studio.desk.ends.b?.key])"
     assert page.evaluate(ends) == '["ballet/first","ballet/first"]'
-    page.wait_for_selector(FOUND, timeout=LONG)  # a browser under load loses a drag from a page that is changing
-    drag(page, page.get_by_test_id("posture-passe"), page.locator(".end").nth(1))
+    assert passe.bounding_box() == before
+    drag(page, passe, page.locator(".end").nth(1))
     page.locator(".end").nth(1).get_by_text("passe").wait_for()  # the browser tells of the drop when it comes to it
     assert page.evaluate(ends) == '["ballet/first","ballet/passe"]'
     page.get_by_label("Exchange A and B").click()

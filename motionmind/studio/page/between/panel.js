@@ -55,12 +55,9 @@ export function Panel({ studio }) {
         html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
       }
     </label>
-    ${
-      choice &&
-      html`<button class="button" data-testid="insert-posture" onClick=${() => insert(studio, choice)}>
-        Put ${choice.title} onto the time line
-      </button>`
-    }
+    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => insert(studio, choice)}>
+      Put ${choice?.title ?? "what is picked"} onto the time line
+    </button>
     <${Gallery} studio=${studio} />
   </div>`;
 }
