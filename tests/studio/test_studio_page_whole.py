@@ -88,7 +88,13 @@ def test_no_panel_shuts_anybody_out(studio_server: Served, browser: Any, scheme:
     _piece(studio_server)
     page, errors = _enter(studio_server, browser, scheme, 1440)
     page.evaluate(f"{axe};0")
-    faults = {name: found for name in _panels(page) if (found := page.evaluate(_FAULTS))}
+    faults = {}
+    for name in _panels(page):
+        for width in (1440, 1024, 390):
+            page.set_viewport_size({"width": width, "height": 900})
+            if found := page.evaluate(_FAULTS):
+                faults[f"{name} at {width}"] = found
+        page.set_viewport_size({"width": 1440, "height": 900})
     page.keyboard.press("?")
     page.wait_for_timeout(300)
     if found := page.evaluate(_FAULTS):

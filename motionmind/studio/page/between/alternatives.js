@@ -191,11 +191,11 @@ function Alternative({ desk, quartet, index, chosen, account, motion }) {
     </div>
     <div class="words">
       <p>${account.words}</p>
-      ${account.differs && html`<p>${account.differs}</p>`}
-      <p class="hint">${account.usual}</p>
-      <p class="hint">${account.sure}</p>
+      ${account.differs && html`<p class="differs">${account.differs}</p>`}
       ${account.beyond.map((/** @type {string} */ line) => html`<p class="said warning">${icon("warning")}<span>${line}</span></p>`)}
       <${Joints} account=${account} point=${(/** @type {string | null} */ over) => setJoint(over === null ? null : motion.joints.findIndex((/** @type {string} */ one) => jointName(one) === over))} />
+      <p class="hint">${account.usual}</p>
+      <p class="hint">${account.sure}</p>
     </div>
   </div>`;
 }

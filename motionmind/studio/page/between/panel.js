@@ -55,8 +55,8 @@ export function Panel({ studio }) {
         html`<button class="button" onClick=${() => desk.show(true)}>Show the alternatives</button>`
       }
     </label>
-    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => insert(studio, choice)}>
-      Put ${choice?.title ?? "what is picked"} onto the time line
+    <button class="button cut" data-testid="insert-posture" disabled=${!choice} onClick=${() => choice && insert(studio, choice)}>
+      Put ${choice?.title ?? "it"} onto the time line
     </button>
     <${Gallery} studio=${studio} />
   </div>`;

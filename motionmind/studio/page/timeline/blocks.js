@@ -9,6 +9,7 @@ const LEAST = 28; // pixels of a held posture, which takes no time
 const APART = 100; // pixels from one picture of a stretch to the next, at least
 const NAMED = 52; // pixels before a stretch's name
 const PICTURES = 16; // of a stretch, at most
+const CLEAR = 48; // pixels from the piece's beginning to the middle of what is wished there
 const ROOM = 300; // pixels beside what is in sight that are there already
 
 /** A word and a sign for each state of a seam; its pattern is in timeline.css. */
@@ -123,7 +124,7 @@ export function Wishes({ piece, sight, thumbnail }) {
           class="stay"
           style=${{ left: `${(seam.at + begins * seam.seconds) * sight.scale}px`, width: `${(ends - begins) * seam.seconds * sight.scale}px` }}
         ></i>`,
-      )}<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${middle * sight.scale}px` }}>
+      )}<div key=${`${seam.left} ${seam.right}`} class="wish" style=${{ left: `${Math.max(middle * sight.scale, CLEAR)}px` }}>
         ${passing.map(({ posture, frame }) => html`<img alt="" class="passing" src=${thumbnail(posture, frame)} />`)}
         ${pins.map(({ joint }) => html`<span class="pin" title=${plain(joint)}>
           <svg viewBox="0 0 16 16"><path d="M8 9v5M5 2h6l-1 4 2 3H4l2-3z" /></svg>${plain(joint)}
