@@ -37,6 +37,6 @@ def test_long_pieces_stay_fluent(studio_server: Any, studio_page: Any) -> None:
           return spent.sort((one, other) => one - other);
         }"""
     )
-    assert taken[100] < 4.0, taken[::20]
+    assert taken[190] < 4.0, taken[::20]  # where other processes do not take turns with it
     nodes = studio_page.locator(".timeline *").count()
     assert nodes < 4000

@@ -79,6 +79,21 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     assert shared.evaluate("motionmind.motion.insertions.length") == 1
 
 
+def test_a_film_of_the_piece_is_taken_away(studio_server: Any, studio_page: Any, tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    studio_server.insert("b1", "ballet/adagio", 0, 1)
+    until(studio_page, "studio.viewer.piece?.end > 0")
+    seconds = studio_page.evaluate("studio.viewer.piece.end")
+    studio_page.get_by_test_id("open-take").click()
+    with studio_page.expect_download(timeout=LONG) as download:
+        studio_page.get_by_test_id("export-film").click()
+    assert download.value.suggested_filename == "piece.webm"
+    download.value.save_as(tmp_path / "piece.webm")
+    _, found = ffmpeg.count_frames_and_secs(str(tmp_path / "piece.webm"))
+    assert found == pytest.approx(seconds, abs=0.1)
+    until(studio_page, "!studio.viewer.busy")
+
+
 def test_four_alternatives_play_in_step_and_say_what_they_are(studio_page: Any) -> None:
     studio_page.emulate_media(reduced_motion="no-preference")
     # What is sought is seen to be: both ends, and nothing to play yet.
