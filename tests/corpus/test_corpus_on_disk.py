@@ -1,0 +1,227 @@
+"""Corpora on disk: what is saved is loaded, what is damaged is named, and where each is found."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from motionmind.corpus import store
+from motionmind.corpus.fingerprint import fingerprint
+from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.errors import CorpusError, FormatError
+
+MANIFEST = {"name": "arms", "title": "Übung", "clips": [{"name": "a", "start": 0}], "rate": None}
+
+
+def arrays(seed: int = 0) -> dict[str, NDArray[Any]]:
+    rng = np.random.default_rng(seed)
+    return {
+        "rotations": rng.normal(size=(7, 3, 4)),
+        "part.states": rng.integers(0, 9, (7, 3)).astype(np.int32),
+        "empty": np.zeros((0, 3)),
+        "strided": rng.normal(size=(8, 4))[::2, 1:],
+    }
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_what_is_saved_is_loaded_exactly(tmp_path: Path) -> None:
+    store.save(tmp_path / "deep" / "arms", MANIFEST, arrays())
+    manifest, found, *_ = store.load(tmp_path / "deep" / "arms")
+    assert {key: manifest[key] for key in MANIFEST} == MANIFEST
+    assert found.keys() == arrays().keys()
+    for name, array in arrays().items():
+        assert found[name].dtype == array.dtype
+        np.testing.assert_array_equal(found[name], array)
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["arms"]
+
+
+def test_the_same_things_are_saved_as_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        store.save(tmp_path / name, MANIFEST, arrays())
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
+def test_an_older_one_is_replaced_whole(tmp_path: Path) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays() | {"more": np.zeros(3)})
+    store.save(tmp_path / "arms", MANIFEST, arrays(1))
+    np.testing.assert_array_equal(store.load(tmp_path / "arms").arrays["rotations"], arrays(1)["rotations"])
+    assert not list(tmp_path.rglob("more.npy"))
+    assert [path.name for path in tmp_path.iterdir()] == ["arms"]
+
+
+def test_a_folder_that_is_no_built_corpus_is_never_replaced(tmp_path: Path) -> None:
+    diary = tmp_path / "home" / "diary.txt"
+    diary.parent.mkdir()
+    diary.write_text("dear diary")
+    with pytest.raises(CorpusError, match=r"holds diary.txt, .*; it is not replaced"):
+        store.save(diary.parent, MANIFEST, arrays())
+    with pytest.raises(CorpusError, match="cannot be written"):
+        store.save(diary, MANIFEST, arrays())
+    assert diary.read_text() == "dear diary"
+    assert [path.name for path in tmp_path.iterdir()] == ["home"]
+
+
+def test_a_place_that_cannot_be_written_is_one_error(tmp_path: Path) -> None:
+    for place in (tmp_path / ("x" * 300), Path("/proc/nowhere/arms")):
+        with pytest.raises(CorpusError, match="cannot be written"):
+            store.save(place, MANIFEST, arrays())
+
+
+def test_a_corpus_that_is_damaged_is_a_format_error(
+    tmp_path: Path, mutate: Callable[[str, random.Random], bytes]
+) -> None:
+    good = tmp_path / "good"
+    store.save(good, MANIFEST, arrays())
+    rng = random.Random(0)
+    for trial in range(300):
+        folder = tmp_path / f"bad{trial}"
+        shutil.copytree(good, folder)
+        file = rng.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+        if file.name == store.MANIFEST:
+            file.write_bytes(mutate(file.read_text("utf-8"), rng))
+        else:
+            data = bytearray(file.read_bytes())
+            for _ in range(rng.randint(1, 4)):
+                data[rng.randrange(min(140, len(data)))] = rng.randrange(256)
+            file.write_bytes(data[: rng.choice([len(data), rng.randrange(len(data))])])
+        with contextlib.suppress(FormatError):
+            _, found, *_ = store.load(folder)
+            for name, array in arrays().items():
+                assert found.get(name, array).shape == array.shape
+
+
+@pytest.mark.parametrize("name", ["rotations.npy", "part.states.npy"])
+@pytest.mark.parametrize("how", ["gone", "empty", "another", "folder"])
+def test_an_array_that_is_missing_or_another_is_named(tmp_path: Path, name: str, how: str) -> None:
+    store.save(tmp_path / "arms", MANIFEST, arrays())
+    file = tmp_path / "arms" / "1" / name
+    file.unlink()
+    if how == "empty":
+        file.write_bytes(b"")
+    elif how == "another":
+        np.save(file, np.zeros((6, 3, 4)))
+    elif how == "folder":
+        file.mkdir()
+    with pytest.raises(FormatError, match=name):
+        store.load(tmp_path / "arms")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"format": "motionmind-corpus", "version": 2}', "version 2; version 1 can be read"),
+        ('{"format": "motionmind-built-corpus", "version": 8}', "version 8; version 7 can be read"),
+        ('{"format": "motionmind-built-corpus", "version": 3, "folder": 3}', "there is no folder 3 beside it"),
+        ('{"format": "motionmind-motion", "version": 1}', "is 'motionmind-motion' version 1"),
+        ("{}", "is None version None"),
+        ("[]", "cannot be read as a corpus's manifest"),
+        ('{"format": ', "cannot be read as a corpus's manifest"),
+        ("", "cannot be read as a corpus's manifest"),
+        ("\udcff", "cannot be read as a corpus's manifest"),
+        ("[" * 100_000, "cannot be read as a corpus's manifest"),
+        ('{"format": "motionmind-built-corpus", "version": 1}', "does not say which arrays there are"),
+        ('{"format": "motionmind-built-corpus", "version": 1, "arrays": [1]}', "does not say which arrays there are"),
+    ],
+)
+def test_a_manifest_that_is_none_is_a_format_error(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "manifest.json").write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(FormatError, match=words):
+        store.load(tmp_path)
+
+
+SOURCE: dict[str, Any] = {
+    "format": store.FORMAT,
+    "version": store.VERSIONS[store.FORMAT][-1],
+    "name": "arms",
+    "title": "Arms",
+    "author": "us",
+    "source": "here",
+    "licence": "CC0-1.0",
+    "facing": "stage",
+    "rate": None,
+    "discretization": {"kind": "codebook"},
+    "clips": [{"name": "a", "file": "a.json", "about": ""}],
+}
+
+
+def test_what_a_persons_manifest_lacks_is_named() -> None:
+    path = Path("arms/manifest.json")
+    assert parse_manifest(SOURCE, SourceManifest, path).clips[0].file == "a.json"
+    for key in SOURCE.keys() - {"format", "version"}:
+        short = {name: value for name, value in SOURCE.items() if name != key}
+        with pytest.raises(FormatError, match=f"^arms/manifest.json: there is no key `{key}`"):
+            parse_manifest(short, SourceManifest, path)
+    for key in ("name", "file", "about"):
+        clip = {name: value for name, value in SOURCE["clips"][0].items() if name != key}
+        with pytest.raises(FormatError, match=rf"there is no key `{key}` - at `\$.clips\[0\]`"):
+            parse_manifest(SOURCE | {"clips": [clip]}, SourceManifest, path)
+
+
+@pytest.mark.parametrize(("key", "value"), [("facing", "north"), ("rate", "5"), ("clips", {}), ("discretization", "x")])
+def test_what_is_wrong_in_a_persons_manifest_is_named(key: str, value: object) -> None:
+    with pytest.raises(FormatError, match=rf"at `\$.{key}`"):
+        parse_manifest(SOURCE | {key: value}, SourceManifest, Path("manifest.json"))
+
+
+# --- names and places -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["cmu-05", "mine", "Übung_2", "v1.2", "a" * 64])
+def test_a_name_is_a_place(tmp_path: Path, name: str) -> None:
+    assert store.place_for(name, tmp_path) == tmp_path / "corpora" / name
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "../x", "a/b", "/etc", ".x", "-x", "a b", "a\0b", "a\n", "a" * 300])
+def test_a_name_that_is_none_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(CorpusError, match="cannot be a corpus's name"):
+        store.place_for(name, tmp_path)
+
+
+def test_a_bundled_corpus_keeps_its_name(tmp_path: Path) -> None:
+    with pytest.raises(CorpusError, match="'ballet' is the name of a bundled corpus"):
+        store.place_for("ballet", tmp_path)
+
+
+def test_corpora_are_found_by_name_and_by_folder(tmp_path: Path) -> None:
+    store.save(tmp_path / "corpora" / "arms", MANIFEST, arrays())
+    assert store.locate("arms", tmp_path) == tmp_path / "corpora" / "arms"
+    assert store.locate(str(tmp_path / "corpora" / "arms")) == tmp_path / "corpora" / "arms"
+    assert list(store.list_corpora(tmp_path))[:2] == ["arms", "ballet"]
+    assert store.locate("ballet", tmp_path).parent.name == "corpora"
+
+
+@pytest.mark.parametrize("name", ["", "nobody", "a" * 5000, "a\0b", "../corpora"])
+def test_an_unknown_corpus_is_answered_with_the_known_ones(tmp_path: Path, name: str) -> None:
+    with pytest.raises(CorpusError, match="there are ballet"):
+        store.locate(name, tmp_path)
+
+
+def test_home_is_what_is_asked_for_then_the_environments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MOTIONMIND_HOME", str(tmp_path / "environment"))
+    assert store.home(tmp_path) == tmp_path
+    assert store.home() == tmp_path / "environment"
+    monkeypatch.delenv("MOTIONMIND_HOME")
+    assert store.home().name == "motionmind"
+
+
+def test_a_fingerprint_tells_files_apart(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.write_bytes(b"ab")
+    two.write_bytes(b"c")
+    before = fingerprint([one, two])
+    assert fingerprint([one, two]) == before
+    two.write_bytes(b"d")
+    assert fingerprint([one, two]) != before
+    with pytest.raises(FormatError, match="three"):
+        fingerprint([tmp_path / "three"])
