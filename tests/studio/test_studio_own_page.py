@@ -188,6 +188,9 @@ def test_the_dial_answers_while_it_is_turned(served: Served, open_page: Open) ->
     page.wait_for_timeout(300)
     seen.add(page.get_by_test_id("departs").inner_text())
     assert len(seen) > 2
+    assert not page.get_by_test_id("departs").inner_text().endswith("at most")
+    page.get_by_test_id("depart").fill("40")  # farther than any order of these departs
+    until(page, "document.querySelector('[data-testid=departs]').textContent.endsWith(' at most')")
 
 
 def test_a_stretch_selected_on_the_time_line_is_kept(served: Served, open_page: Open) -> None:

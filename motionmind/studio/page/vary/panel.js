@@ -9,6 +9,7 @@ import { Tiles } from "./tiles.js";
 import { alike, departure, insertedShare, Varying } from "./varying.js";
 
 const FARTHEST = 0.4; // share of the steps: no attractor departs farther
+const OFF = 0.06; // of a share that is wished: a variation that departs less departs as far as it can
 const STRETCHES = [1, 2, 4, 8]; // postures
 const AFTER = 150; // milliseconds after an edit of the piece
 const INSERTED = [
@@ -59,6 +60,9 @@ export function Panel({ studio }) {
   const { wish, proposal, error } = varying;
   const isPiece = Boolean(proposal) && alike(proposal.piece.blocks, piece.blocks);
   const shown = isPiece ? piece : proposal?.piece;
+  const departs = proposal ? departure(proposal.departs) : "";
+  const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + OFF;
+  const told = isFarthest ? `${departs} at most` : departs;
   const vary = async () => {
     await varying.ask();
     if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
@@ -68,9 +72,9 @@ export function Panel({ studio }) {
     <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
     <label class="dial">
       <span class="row"><span class="grow">How far to depart</span>
-      <output data-testid="departs" class="pale">${proposal ? departure(proposal.departs) : ""}</output></span>
+      <output data-testid="departs" class="pale">${told}</output></span>
       <input type="range" data-testid="depart" min="0" max=${FARTHEST * 100} step="1" value=${Math.round(wish.depart * 100)}
-        aria-valuetext=${proposal ? departure(proposal.departs) : ""}
+        aria-valuetext=${told}
         onInput=${(/** @type {any} */ event) => varying.want({ depart: Number(event.target.value) / 100 })} />
     </label>
     <label class="row"><span class="grow">Insertions take at most</span>
