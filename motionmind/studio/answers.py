@@ -85,6 +85,7 @@ class SeamView(_Answer):
     decision: Decision
     ask: Ask
     at: float
+    stands: bool
     seconds: float
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import aclosing
 from typing import Annotated, Any, TypeVar
 
 import msgspec
@@ -20,6 +22,7 @@ from motionmind.studio.thumbnails import HEIGHT, thumbnail
 
 T = TypeVar("T")
 Window = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}\Z")]
+_GONE = 10.0  # seconds after which a window that has closed does not come back: a reload takes less
 _FOREVER = "private, max-age=31536000, immutable"
 
 
@@ -101,14 +104,32 @@ def _project_routes(studio: Studio) -> list[BaseRoute]:
         given = await body_of(request, Windowed)
         return written(given.window, lambda: studio.project.redo(given.window))
 
+    open_streams = Counter[str]()
+
+    def leave(window: str) -> None:
+        if not open_streams[window] and studio.project.forget(window):
+            studio.events.send("project", {"sequence": studio.project.sequence, "left": window})
+
+    async def watched(window: str, told: AsyncGenerator[bytes]) -> AsyncIterator[bytes]:
+        """What a window is told; some time after it has closed, others may take back what it did."""
+        open_streams[window] += 1
+        try:
+            async with aclosing(told):
+                async for text in told:
+                    yield text
+        finally:
+            open_streams[window] -= 1
+            asyncio.get_running_loop().call_later(_GONE, leave, window)
+
     async def events(request: Request) -> Response:
-        window_of(request)
+        window = window_of(request)
         first: dict[tuple[str, str], Any] = {("project", ""): {"sequence": studio.project.sequence}}
         if studio.has_stopped:
             first["smoothing", ""] = {"stopped": True}
         first |= {("job", job.id): job.view() for job in studio.workers.jobs}
         headers = {"cache-control": "no-store"}
-        return StreamingResponse(studio.events.open(first), headers=headers, media_type="text/event-stream")
+        told = watched(window, studio.events.open(first))
+        return StreamingResponse(told, headers=headers, media_type="text/event-stream")
 
     async def job(request: Request) -> Response:
         try:

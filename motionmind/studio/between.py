@@ -18,8 +18,9 @@ from motionmind.render.page import player_data
 from motionmind.studio.alternatives import COUNT, Account, account, find, usual_likelihoods
 from motionmind.studio.api import Window, body_of, error, json
 from motionmind.studio.edits import Ask, Choose, Edit, Frame, Insert, Key, Pin, Several, Single, Wish
-from motionmind.studio.piece import End, Finding, Found, State, key_of, question_of
+from motionmind.studio.piece import End, Finding, Found, State, key_of
 from motionmind.studio.project import RefusedError
+from motionmind.studio.questions import question_of
 from motionmind.studio.sides import options_of, sides_of
 from motionmind.studio.stays import in_place, stays_of
 from motionmind.studio.worker_loop import engine_of

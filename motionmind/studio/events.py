@@ -6,7 +6,7 @@ A window that reads slowly is told the latest of each thing, not all that came b
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from typing import Any
 
 import msgspec
@@ -36,7 +36,7 @@ class Events:
         for stream in self._streams:
             stream.put((event, about), text)
 
-    def open(self, first: dict[tuple[str, str], Any]) -> AsyncIterator[bytes]:
+    def open(self, first: dict[tuple[str, str], Any]) -> AsyncGenerator[bytes]:
         """Open a stream, which begins with some events (see `send`), by their kinds and what they are about.
 
         Raises:
@@ -57,7 +57,7 @@ class Events:
         for stream in self._streams:
             stream.end()
 
-    async def _told(self, stream: _Stream) -> AsyncIterator[bytes]:
+    async def _told(self, stream: _Stream) -> AsyncGenerator[bytes]:
         try:
             yield b"retry: 1000\n\n"
             while (text := await stream.take()) is not None:

@@ -16,6 +16,7 @@ from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.render.page import player_data
 from motionmind.studio import api
+from motionmind.studio.checks import corpora_of
 from motionmind.studio.corpora import Lesson, Recording, check_lesson, known, learn, list_all, sheet_of
 from motionmind.studio.uploads import Choices, Upload, Uploads
 
@@ -98,8 +99,10 @@ def _corpus_routes(studio: Studio, uploads: Uploads) -> list[BaseRoute]:
 
     async def delete(request: Request) -> Response:
         name = known(request.path_params["name"], home)
-        if name == studio.project.state.corpus or name in studio.project.versions:
+        if name in corpora_of(studio.project.state):
             raise MotionMindError(f"this piece needs the corpus {displayed(name)}: it cannot be deleted while it does")
+        if name in studio.project.versions:
+            raise MotionMindError(f"undo or redo leads back to the corpus {displayed(name)}: it cannot be deleted here")
         store.delete(name, home)
         studio.forget(name)
         return api.json({})

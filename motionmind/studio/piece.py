@@ -7,7 +7,6 @@ comes in (`motionmind.studio.checks`).
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
@@ -42,7 +41,7 @@ from motionmind.studio.edits import (
 )
 
 OWN = "own/"  # keys of saved postures
-_MIRRORED = "~"
+MIRRORED = "~"
 
 Pair = tuple[str, str]  # ids of two blocks, the one before and the one after a seam
 
@@ -54,11 +53,13 @@ class Verdict(msgspec.Struct, frozen=True):
         ask: the wish for its insertion.
         chosen: number of the insertion chosen of those found, counted from 1.
         decision: "locked" insertions change only when they are opened again; "discarded" ones are left out.
+        corpus: the corpus that a locked insertion was found in, whatever the piece's is now; "" of one that is not.
     """
 
     ask: Ask = Ask()
     chosen: int = 1
     decision: Decision = "open"
+    corpus: str = ""
 
 
 class End(msgspec.Struct, frozen=True):
@@ -196,7 +197,7 @@ class State:
         Raises:
             MotionMindError: there is no such posture.
         """
-        mark, bare = (_MIRRORED, key[1:]) if key.startswith(_MIRRORED) else ("", key)
+        mark, bare = (MIRRORED, key[1:]) if key.startswith(MIRRORED) else ("", key)
         if not bare.startswith(OWN):
             return key
         name = bare.removeprefix(OWN)
@@ -207,7 +208,7 @@ class State:
 
 def key_of(block: Block) -> str:
     """Return the key of the movement that a block shows, with `~` if it is mirrored."""
-    return _MIRRORED + block.source if block.mirrored else block.source
+    return MIRRORED + block.source if block.mirrored else block.source
 
 
 def apply(state: State, edit: Edit) -> State:
@@ -259,7 +260,8 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return _judged(state, (left, right), Verdict(verdict.ask, alternative))
         case Decide(left, right, decision):
             verdict = state.seam(left, right).verdict
-            return _judged(state, (left, right), Verdict(verdict.ask, verdict.chosen, decision))
+            found_in = (verdict.corpus or state.corpus) if decision == "locked" else ""
+            return _judged(state, (left, right), Verdict(verdict.ask, verdict.chosen, decision, found_in))
         case Wish(left=left, right=right):
             _open(state.seam(left, right))
             passing = tuple(msgspec.structs.replace(one, posture=state.stable(one.posture)) for one in edit.ask.passing)
@@ -272,7 +274,7 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             for block in blocks:
                 if block.id in state.used and block not in state.blocks:
                     raise MotionMindError(f"{block.id} is another stretch: a new one needs a new id")
-            return replace(state, blocks=blocks, used=state.used | names, about=about)
+            return replace(arranged(state, blocks), used=state.used | names, about=about)
         case SavePosture(name, posture):
             return _saved(state, name, posture)
         case SetCorpus(name):
@@ -281,12 +283,29 @@ def _apply(state: State, edit: Single) -> State:  # noqa: PLR0911 (one case an e
             return replace(state, title=title)
 
 
+def arranged(state: State, blocks: tuple[Block, ...]) -> State:
+    """Return a piece with its blocks in another order, or cut into others: a word on a seam goes with the seam's ends.
+
+    Args:
+        state: the piece.
+        blocks: the blocks; one that was in the piece has its id if it is the same stretch.
+    """
+    words = {seam.ends: seam.verdict for seam in state.seams if seam.verdict != Verdict()}
+    after = replace(state, blocks=blocks)
+    new = {
+        seam.pair: Verdict(word.ask, word.chosen, "discarded" if word.decision == "discarded" else "open")
+        for seam in after.seams
+        if seam.pair not in state.verdicts and (word := words.get(seam.ends))
+    }
+    return replace(after, verdicts={**state.verdicts, **new}) if new else after
+
+
 def _checked(state: State, block: Block) -> Block:
     """The block, its source a movement that stays; MotionMindError if it ends before it begins."""
     if block.first > block.last:
         raise MotionMindError(f"a stretch cannot go from frame {block.first} back to frame {block.last}")
     source, mirrored = state.stable(block.source), block.mirrored
-    if source.startswith(_MIRRORED):
+    if source.startswith(MIRRORED):
         source, mirrored = source[1:], not mirrored
     return msgspec.structs.replace(block, source=source, mirrored=mirrored)
 
@@ -372,21 +391,3 @@ def _saved(state: State, name: str, posture: str | None) -> State:
     elif postures.pop(name, None) is None:
         raise MotionMindError(f"no posture is saved as {displayed(name)}")
     return replace(state, postures=postures)
-
-
-def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[str, str]) -> str:
-    """Return the hash of all that the answer at a seam depends on, in hexadecimal.
-
-    Args:
-        ends: both sides of the seam.
-        ask: the wish.
-        corpus: name of the corpus that judges.
-        versions: the version of each corpus that the project uses, by name.
-    """
-    names = {key.lstrip(_MIRRORED).partition("/")[0] for key in _keys(ends, ask)} | {corpus}
-    used = sorted((name, versions[name]) for name in names if name in versions)
-    return hashlib.sha256(msgspec.json.encode([ends, ask, corpus, used])).hexdigest()[:32]
-
-
-def _keys(ends: tuple[End, End], ask: Ask) -> list[str]:
-    return [end.key for end in ends] + [one.posture for one in ask.passing]

@@ -11,11 +11,12 @@ from motionmind.display import displayed
 from motionmind.errors import FormatError, MotionMindError, enumerated
 from motionmind.studio import piece
 from motionmind.studio.checks import check_movements, corpora_of, missing_in
-from motionmind.studio.edits import Edit, Wish, touched, words_of
+from motionmind.studio.edits import Edit, SetCorpus, Wish, touched, words_of
 from motionmind.studio.journal import Journal
 from motionmind.studio.movements import Movements, version_of
 from motionmind.studio.piece import End, Finding, Found, Pair, Seam, State
 from motionmind.studio.placement import Marks
+from motionmind.studio.questions import question_of
 from motionmind.studio.records import Corpora, EditLine, Head, RedoLine, UndoLine, decode_line
 from motionmind.studio.view import chosen_at
 
@@ -65,7 +66,7 @@ class Project:
         self._changes: list[Change] = []
         self._redoable: dict[str, list[Change]] = {}  # by window, the last to be redone first
         self._findings: dict[str, Finding] = {}
-        self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # what was inserted before a wish, between what
+        self._stood: dict[Pair, tuple[tuple[End, End], Found]] = {}  # what was inserted before it was asked anew
         self._subscribers: list[Callable[[], None]] = []
         self._windows: set[str] = set()  # that were seen since it was opened
         self._states: list[State] = []  # before the first change, and after each `_EVERY` changes more
@@ -150,15 +151,19 @@ class Project:
 
     def question(self, seam: Seam) -> str:
         """Return the question that a seam asks."""
-        return piece.question_of(seam.ends, seam.verdict.ask, self.state.corpus, self.versions)
+        return question_of(seam.ends, seam.verdict.ask, self.corpus_at(seam), self.versions)
+
+    def corpus_at(self, seam: Seam) -> str:
+        """Return the name of the corpus that judges a seam: the piece's, or that of an insertion that is locked."""
+        return seam.verdict.corpus or self.state.corpus
 
     def finding(self, seam: Seam) -> Finding | None:
         """Return what is known of a seam."""
         return self._findings.get(self.question(seam))
 
     def standing(self, seam: Seam) -> Found | None:
-        """Return what was inserted at a seam before its wish, to stand there until that is answered; None if nothing
-        was, or it is discarded, or its sides are others now."""
+        """Return what was inserted at a seam before it was asked anew, to stand there until that is answered; None if
+        nothing was, or it is discarded, or its sides are others now."""
         ends, found = self._stood.get(seam.pair, (None, None))
         return found if ends == seam.ends and seam.verdict.decision != "discarded" else None
 
@@ -166,7 +171,7 @@ class Project:
         """Return whether something is missing without which a seam can be neither judged nor smoothed."""
         ends = [(end.key, end.frame) for end in seam.ends]
         passed = [(one.posture, one.frame) for one in seam.verdict.ask.passing]
-        return not (self.movements.has(self.state.corpus) and all(self.marks.has(*at) for at in ends + passed))
+        return not (self.movements.has(self.corpus_at(seam)) and all(self.marks.has(*at) for at in ends + passed))
 
     def keep_finding(self, finding: Finding) -> None:
         """Keep what was found at a seam; MotionMindError if it cannot be written."""
@@ -192,8 +197,12 @@ class Project:
             raise RefusedError(str(error)) from error
         self._note_versions(state)
         line = self._journal.append(EditLine(edit, self.sequence, window))
+        asked: tuple[Seam, ...] = ()
         if isinstance(edit, Wish):
-            seam = self.state.seam(edit.left, edit.right)
+            asked = (self.state.seam(edit.left, edit.right),)
+        elif isinstance(edit, SetCorpus):
+            asked = self.state.seams
+        for seam in asked:
             if found := chosen_at(seam, self.finding(seam)):
                 self._stood[seam.pair] = seam.ends, found
         self._redoable.pop(window, None)
@@ -238,6 +247,12 @@ class Project:
         """Say what `redo` would do again; None if there is nothing."""
         stack = self._redoable.get(window)
         return words_of(stack[-1].edit) if stack else None
+
+    def forget(self, window: str) -> bool:
+        """Note that a window is gone for good: what it did, all others may take back; returns whether it was there."""
+        was_there = window in self._windows
+        self._windows.discard(window)
+        return was_there
 
     def greet(self, window: str) -> None:
         """Note that a window is there: what it did, it alone takes back."""
@@ -344,7 +359,7 @@ class Project:
     def _check_corpora(self, written: Mapping[str, str]) -> None:
         """Compare the corpora that there are with those that the project was made with."""
         changed = []
-        used = corpora_of(self.state)
+        used = corpora_of(self.state) | {self.corpus_at(seam) for seam in self.state.seams}
         for name in sorted(used | set(written)):
             try:
                 version = version_of(name, self._home)

@@ -19,7 +19,7 @@ from starlette.routing import BaseRoute, Route
 
 from motionmind.body.motion import Motion
 from motionmind.display import displayed
-from motionmind.errors import MotionMindError, MotionMindWarning, enumerated
+from motionmind.errors import MotionMindError, MotionMindWarning, SkeletonError, enumerated
 from motionmind.studio import api
 from motionmind.studio.alternatives import Account, account, find, usual_likelihoods
 from motionmind.studio.edits import Ask, Pin
@@ -73,7 +73,11 @@ def judge(report: Report, corpus: str, questions: Sequence[Question]) -> list[Fi
         a, b, _, _, seconds = question.sides
         try:
             joints = test.abrupt_joints(a, b, seconds)
-        except MotionMindError as error:  # another body than the corpus's
+        except SkeletonError:
+            words = f"{displayed(corpus)} has another body than the piece: nothing of it can be inserted"
+            findings.append(Finding(question.name, True, words, ()))
+            continue
+        except MotionMindError as error:
             findings.append(Finding(question.name, True, f"cannot be judged: {_line(error)}", ()))
             continue
         searched = None if joints or question.wished else ()
@@ -182,7 +186,6 @@ class Smoother:
     async def _step(self) -> bool:
         """Judge all seams that are new, or else smooth the newest that is abrupt; return whether there was any."""
         project = self._studio.project
-        corpus = project.state.corpus
         open_seams: dict[str, tuple[Seam, Finding | None]] = {}
         for seam in project.state.seams:
             if seam.goes_on or project.lacks(seam):
@@ -193,14 +196,15 @@ class Smoother:
             self._seen.setdefault(name, len(self._seen))
         new = {name: seam for name, (seam, finding) in open_seams.items() if finding is None}
         if new:
-            await self._judge(corpus, new)
+            corpus = project.corpus_at(next(iter(new.values())))
+            await self._judge(corpus, {name: seam for name, seam in new.items() if project.corpus_at(seam) == corpus})
             return True
         if not open_seams:
             return False
         newest = max(open_seams, key=self._seen.__getitem__)
         seam, judged = open_seams[newest]
         assert judged is not None
-        await self._smooth(corpus, self._asked(newest, seam), judged)
+        await self._smooth(project.corpus_at(seam), self._asked(newest, seam), judged)
         return True
 
     async def _judge(self, corpus: str, seams: dict[str, Seam]) -> None:
@@ -241,7 +245,7 @@ class Smoother:
 
     def _asked(self, name: str, seam: Seam) -> Question:
         movement, ask = self._studio.movements.get, seam.verdict.ask
-        sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.state.corpus))
+        sides = sides_of(seam.ends, movement, self._studio.movements.facing(self._studio.project.corpus_at(seam)))
         skeleton = sides.a.skeleton
         return Question(name, sides, options_of(ask, skeleton, movement), ask != Ask(), stays_of(ask, skeleton))
 

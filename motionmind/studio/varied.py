@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
@@ -22,7 +21,7 @@ from motionmind.render.page import base64_of
 from motionmind.studio import api
 from motionmind.studio.attractor_map import drawn, map_of
 from motionmind.studio.edits import Block
-from motionmind.studio.piece import State
+from motionmind.studio.piece import State, arranged
 from motionmind.studio.varying import (
     EVERY,
     Clock,
@@ -148,7 +147,7 @@ def _shown(
 
     def view(blocks: tuple[Block, ...]) -> dict[str, Any]:
         return view_of(
-            replace(state, blocks=blocks), project.finding, project.marks, project.movements.title, project.standing
+            arranged(state, blocks), project.finding, project.marks, project.movements.title, project.standing
         )
 
     steps = np.diff(order.indices)

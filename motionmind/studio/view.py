@@ -103,5 +103,6 @@ def _seam_view(
         "decision": seam.verdict.decision,
         "ask": msgspec.to_builtins(seam.verdict.ask),
         "at": begin,
+        "stands": insertion is not None,
         "seconds": insertion.seconds if insertion else after.at - begin,
     }

@@ -67,6 +67,7 @@ def test_from_the_open_page_to_a_file_in_six_clicks(studio_page: Any, tmp_path: 
     studio_page.wait_for_selector(FOUND, timeout=LONG)
     mouse.click("alternative-2")
     mouse.click("accept")
+    until(studio_page, "studio.store.selection?.seam && studio.viewer.isHome")  # what was accepted is what one sees
     mouse.click("open-take")
     with studio_page.expect_download() as download:
         mouse.click("export-html")

@@ -79,7 +79,9 @@ def test_a_browser_without_the_token_is_told_where_to_look(
     context = browser.new_context()
     page = context.new_page()
     page.goto(studio_server.url + end)
-    expect(page.get_by_text("that the terminal shows")).to_be_visible()
+    expect(page.get_by_test_id("toast").get_by_text("that the terminal shows")).to_be_visible()
+    if not end:  # as a page that is still open when the studio is started again
+        expect(page.get_by_test_id("offline")).to_contain_text("nothing is saved; open the studio at the address")
     context.close()
 
 

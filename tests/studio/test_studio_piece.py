@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from motionmind.errors import MotionMindError
 from motionmind.studio import edits as e
 from motionmind.studio.checks import check_movements
-from motionmind.studio.piece import State, Verdict, apply, apply_all, question_of
+from motionmind.studio.piece import State, Verdict, apply, apply_all
+from motionmind.studio.questions import question_of
 
 IDS = [f"b{number}" for number in range(8)]
 FRAMES = st.integers(0, 12)
@@ -206,7 +207,9 @@ def test_a_locked_insertion_changes_only_when_it_is_unlocked():
         with pytest.raises(MotionMindError, match=r"between b1 and b2 is locked: unlock it first"):
             apply(state, edit)
     assert apply(state, e.Trim("b1", 3, 8)).verdicts == state.verdicts
-    assert apply(state, e.Split("b1", 5, "n")).seam("n", "b2").verdict == Verdict(chosen=3, decision="locked")
+    assert apply(state, e.Split("b1", 5, "n")).seam("n", "b2").verdict == Verdict(
+        chosen=3, decision="locked", corpus="ballet"
+    )
     open_again = apply_all([e.Decide("b1", "b2", "open"), e.Trim("b1", 2, 7)], state)
     assert open_again.seam("b1", "b2").verdict == Verdict()
 
@@ -272,3 +275,21 @@ def test_words_say_what_an_edit_does():
     assert e.words_of(e.SavePosture("rest", None)) == "forget the posture rest"
     for kind in e.Single.__args__:
         assert kind in e._WORDS or kind in (e.Decide, e.Arrange, e.SavePosture)
+
+
+def test_a_word_on_a_seam_goes_with_its_ends_into_another_order() -> None:
+    """As a variation makes it: the same junction comes of new stretches."""
+    state = apply_all(
+        [
+            e.Insert("b1", "ballet/adagio", 0, 5),
+            e.Insert("b2", "karate/kata", 3, 9),
+            e.Insert("b3", "ballet/adagio", 7, 9),
+            e.Decide("b1", "b2", "discarded"),
+            e.Choose("b2", "b3", 3),
+            e.Decide("b2", "b3", "locked"),
+        ]
+    )
+    new = e.Block("n1", "ballet/adagio", 2, 5), e.Block("n2", "karate/kata", 3, 9), e.Block("n3", "ballet/adagio", 7, 8)
+    after = apply(state, e.Arrange((*new, state.block("b3")), {}))
+    assert [seam.verdict for seam in after.seams] == [Verdict(decision="discarded"), Verdict(chosen=3), Verdict()]
+    assert apply(state, e.Arrange(state.blocks, {})).seams == state.seams

@@ -100,6 +100,13 @@ def test_a_hand_is_dragged_brought_to_what_is_known_and_saved_by_mouse(studio_se
     assert "posture bow = bow left" in page.get_by_test_id("score-lines").input_value()
     page.get_by_test_id("posture-to-timeline").click()
     page.wait_for_function("() => window.studio.store.state.piece.blocks.length === 1")
+    # At the line of time the keys are the piece's, and the posture is come back to.
+    page.locator(".stretches [role=option]").click()
+    page.get_by_text("Go on with the posture").wait_for()
+    page.keyboard.press("Control+z")
+    page.wait_for_function("() => window.studio.store.state.piece.blocks.length === 0")
+    page.get_by_test_id("mirror-posture").click()  # which is seen
+    page.get_by_text("Go on with the posture").wait_for(state="detached")
     page.get_by_test_id("use-a").click()
     page.get_by_test_id("panel-between").wait_for()
 

@@ -5,12 +5,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from bundled_clips import ballet_clip
 from studio_server import Served
 
 from motionmind.errors import MotionMindError
 from motionmind.studio import piece
-from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, Trim
+from motionmind.studio.edits import Decide, Delete, Insert, Mirror, Move, SetCorpus, Trim
+from motionmind.studio.piece import Finding, Found
 from motionmind.studio.project import Project, RefusedError
+from motionmind.studio.view import chosen_at
 
 Make = Callable[..., Project]
 
@@ -73,6 +76,59 @@ def test_undo_is_refused_where_a_later_edit_rests_on_it(make_project: Make) -> N
     project.redo("w1")
     project.redo("w2")
     assert project.state == before
+
+
+def test_what_a_window_did_that_has_closed_others_take_back(make_project: Make) -> None:
+    project = make_project()
+    project.edit("w1", block(1))
+    project.edit("w2", Mirror("b1"))
+    assert project.forget("w2")
+    assert not project.forget("w2")
+    assert project.undoable("w1") == "mirror a stretch"
+    project.undo("w1")
+    project.undo("w1")
+    assert order(project) == []
+    project.greet("w2")
+    assert project.undoable("w2") is None
+
+
+def with_insertion(project: Project) -> Found:
+    """Let something be inserted between two stretches."""
+    project.edit("w1", block(1))
+    project.edit("w1", block(3))
+    (seam,) = project.state.seams
+    motion = ballet_clip("plies").slice(0, 9)
+    found = Found(project.movements.keep(motion), 2.0, "usual")
+    project.keep_finding(Finding(project.question(seam), True, "too sudden", (found,)))
+    return found
+
+
+def test_a_locked_insertion_stays_whatever_the_corpus(make_project: Make) -> None:
+    project = make_project()
+    found = with_insertion(project)
+    project.edit("w1", Decide("b1", "b3", "locked"))
+    project.edit("w1", SetCorpus("karate"))
+    assert chosen_at(project.state.seams[0], project.finding(project.state.seams[0])) == found
+    project.close()
+    again = make_project()
+    (seam,) = again.state.seams
+    assert chosen_at(seam, again.finding(seam)) == found
+    assert again.corpus_at(seam) == "ballet"
+    again.edit("w1", Decide("b1", "b3", "open"))
+    (seam,) = again.state.seams
+    assert again.finding(seam) is None
+    assert again.corpus_at(seam) == "karate"
+
+
+def test_an_insertion_stands_until_the_other_corpus_has_its_own(make_project: Make) -> None:
+    project = make_project()
+    found = with_insertion(project)
+    project.edit("w1", SetCorpus("karate"))
+    (seam,) = project.state.seams
+    assert project.finding(seam) is None
+    assert project.standing(seam) == found
+    project.edit("w1", Trim("b3", 31, 35))
+    assert project.standing(project.state.seams[0]) is None  # it begins elsewhere now
 
 
 def test_a_new_edit_ends_what_could_be_done_again_in_its_window_alone(make_project: Make) -> None:
@@ -234,6 +290,24 @@ def test_two_windows_see_each_others_edits(studio_server: Served) -> None:
         assert next(events) == ("project", {"sequence": sequence})
     assert [one["id"] for one in other.project()["piece"]["blocks"]] == ["b1"]
     assert other.project()["undo"] is None
+
+
+def test_the_studio_notices_that_a_window_has_closed(studio_server: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionmind.studio.api._GONE", 0.05)
+    other = studio_server.another("w2")
+    studio_server.insert("b1", "ballet/adagio", 0, 9)
+    with studio_server.listening() as events:
+        assert next(events)[0] == "project"
+        with other.listening() as told:
+            next(told)
+            other.edit(edit="mirror", block="b1")
+            assert studio_server.send("POST", "/api/undo", {"window": "w1"}).status == 409
+            with other.listening() as second:  # as long as one of its streams is open it is there
+                next(second)
+        studio_server.edit(edit="title", title="another")
+        left = next(data for kind, data in events if kind == "project" and "left" in data)
+    assert left["left"] == "w2"
+    assert studio_server.post("/api/undo", {"window": "w1"})["undo"] == "mirror a stretch"
 
 
 def test_movements_and_pictures(studio_server: Served) -> None:

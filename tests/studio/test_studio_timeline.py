@@ -134,6 +134,8 @@ def test_an_insertion_is_flipped_locked_discarded_and_made_longer_by_mouse(page:
     drag(page, "insertion-1", 0.99, 40.0)
     wait_for(page, "piece.seams[0].state === 'waiting'")  # until it is found the one before stands there
     assert piece(page)["seams"][0]["seconds"] == before
+    assert mark.bounding_box()["width"] > 60
+    assert page.get_by_test_id("selected").inner_text().startswith("Insertion, ")
     assert [part["key"] for part in piece(page)["parts"]] == keys
     page.evaluate("studio.api.post('/api/seams')")
     wait_for(page, f"piece.seams[0].state === 'inserted' && piece.seams[0].seconds > {before + 0.1}")

@@ -1,5 +1,6 @@
 /** What the page knows: the project as it stands, what is selected, and the jobs that run. It knows no views. */
 
+import { AwayError } from "./api.js";
 import { useChange } from "./shell/hooks.js";
 
 const AGAIN = [500, 1000, 2000, 4000]; // milliseconds until a lost connection is tried again
@@ -20,6 +21,7 @@ export class Store extends EventTarget {
     /** @type {Map<string, any>} */
     this.jobs = new Map();
     this.connected = true;
+    this.refusal = ""; // why the studio does not let this page in again, if it is there
     this.stopped = false; // whether seams wait until somebody lets smoothing go on
     this.tries = 0;
     api.taken = (state) => this.take(state);
@@ -58,14 +60,16 @@ export class Store extends EventTarget {
       if (!this.connected) this.set({ connected: true });
     });
     source.addEventListener("project", (event) => {
-      const { sequence } = JSON.parse(event.data);
-      if (this.state && sequence > this.state.sequence) this.load().catch(() => {});
+      const { sequence, left } = JSON.parse(event.data); // `left` is a window whose edits are everybody's now
+      if (this.state && (left || sequence > this.state.sequence)) this.load().catch(() => {});
     });
     source.addEventListener("smoothing", (event) => this.set(JSON.parse(event.data)));
     source.addEventListener("job", (event) => this.#hear(JSON.parse(event.data)));
     source.addEventListener("error", () => {
       source.close();
       this.set({ connected: false });
+      // Streams do not tell why: a studio that was started again lets in who has the address that it printed then.
+      this.load().catch((error) => this.set({ refusal: error instanceof AwayError ? "" : error.message }));
       setTimeout(() => this.#listen(), AGAIN[Math.min(this.tries++, AGAIN.length - 1)]);
     });
   }

@@ -121,6 +121,11 @@ export class Desk extends EventTarget {
     // The next movement goes on from here.
     Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
     viewer.back();
+    const seam = store.state.piece.seams.at(-1);
+    if (seam) {
+      store.set({ selection: { seam: [seam.left, seam.right] } });
+      viewer.player.seek(seam.at); // where what was accepted begins
+    }
     this.#changed();
     this.dispatchEvent(new Event("accepted"));
   }

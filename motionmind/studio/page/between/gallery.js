@@ -148,6 +148,7 @@ function Frames({ studio, clip }) {
   const [frame, setFrame] = useState(0);
   const motion = useRef(/** @type {any} */ (null));
   const wanted = useRef(-1); // the frame that was sought before the movement came
+  const taken = useRef(false); // whether all of it was put onto the time line before that
   const place = (/** @type {number} */ at) => ({ key: clip.key, frame: at, title: `${clip.title} ${at}` });
   useEffect(() => {
     let here = true;
@@ -155,7 +156,7 @@ function Frames({ studio, clip }) {
     studio.act(() => movement(studio.api, clip.key)).then((/** @type {any} */ found) => {
       if (!here || !found) return;
       motion.current = found;
-      if (desk.shown) return; // somebody was quicker
+      if (desk.shown || taken.current) return; // somebody was quicker
       const sought = wanted.current >= 0;
       viewer.show(found, { time: sought ? found.times[wanted.current] : found.start, title: clip.title, play: !sought });
     });
@@ -203,6 +204,9 @@ function Frames({ studio, clip }) {
       <button class="button" onClick=${() => set("a")}>As A</button>
       <button class="button" onClick=${() => set("b")}>As B</button>
     </div>
-    <button class="button" data-testid="insert-clip" onClick=${() => insert(studio, whole(clip))}>All of it, onto the time line</button>
+    <button class="button" data-testid="insert-clip" onClick=${() => {
+      taken.current = true;
+      insert(studio, whole(clip));
+    }}>All of it, onto the time line</button>
   </div>`;
 }

@@ -11,9 +11,10 @@ export function Keep({ studio, editor }) {
   const called = name.trim() || fresh(studio);
   const save = async () => {
     const key = await editor.keep(called);
+    const replaced = studio.store.state?.postures?.some((/** @type {{name: string}} */ one) => one.name === called);
     forget(`own/${called}`);
     await studio.api.edit({ edit: "posture", name: called, posture: key });
-    studio.say(`Saved as ${called}.`);
+    studio.say(replaced ? `${called} is replaced: undo brings the one before back.` : `Saved as ${called}.`);
     return `own/${called}`;
   };
   const end = (/** @type {"a" | "b"} */ which) => async () => {

@@ -18,6 +18,7 @@ const KNOWN = /** @type {[import("./session.js").Known, string][]} */ ([
 export function Panel({ studio }) {
   const editor = editorOf(studio);
   useChange(editor, () => editor.version);
+  useChange(studio.viewer, () => studio.viewer.motion, "show"); // whether the posture is what it shows
   useEffect(() => {
     if (editor.motion) editor.show();
     else studio.act(() => start(studio));

@@ -172,6 +172,7 @@ export class Editor extends EventTarget {
   /** Make another posture of it. @param {"mirror" | "floor" | "known" | "whole"} to @param {string} words */
   async change(to, words) {
     await this.end();
+    if (!this.shown) this.show();
     const before = this.posture;
     const kept = to === "known" && this.dragged ? this.dragged : null;
     this.requests.send(() => this.studio.api.post("/api/pose/change", { pose: this.#pose(this.posture), to, kept }));

@@ -10,6 +10,7 @@ import { shownKeys } from "./keys.js";
 export function Bar({ studio }) {
   const { store, viewer } = studio;
   const state = useChange(store, () => store.state);
+  const refusal = useChange(store, () => store.refusal);
   const connected = useChange(store, () => store.connected !== false);
   const dark = useChange(viewer.theme, () => viewer.theme.dark);
   const [sheet, setSheet] = useState(false);
@@ -30,7 +31,7 @@ export function Bar({ studio }) {
     ${state?.corpus && html`<span class="hint corpus cut">moves like <strong>${state.corpus}</strong></span>`}
     <span class="space"></span>
     <${Readiness} store=${store} />
-    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved</span>`}
+    ${!connected && html`<span class="offline" role="alert" data-testid="offline">Not connected: nothing is saved${refusal && `; ${refusal}`}</span>`}
     ${button("undo", "Undo", state?.undo, undo)} ${button("redo", "Redo", state?.redo, redo)}
     <button
       class="button quiet icon"

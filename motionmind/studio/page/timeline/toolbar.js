@@ -70,8 +70,8 @@ function OfSeam({ does, seam, sheet }) {
   const any = alternatives.length > 0;
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
-      <b>${state === "inserted" ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
-      <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : words}</span>
+      <b>${state === "inserted" || seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
+      <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : seam.stands ? "another is being sought" : words}</span>
     </p>
     ${any &&
     html`<div class="row flip">

@@ -1,0 +1,29 @@
+"""What is asked at a seam, as a name under which the answer is kept."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+
+import msgspec
+
+from motionmind.studio.edits import Ask
+from motionmind.studio.piece import MIRRORED, End
+
+
+def question_of(ends: tuple[End, End], ask: Ask, corpus: str, versions: Mapping[str, str]) -> str:
+    """Return the hash of all that the answer at a seam depends on, in hexadecimal.
+
+    Args:
+        ends: both sides of the seam.
+        ask: the wish.
+        corpus: name of the corpus that judges.
+        versions: the version of each corpus that the project uses, by name.
+    """
+    names = {key.lstrip(MIRRORED).partition("/")[0] for key in _keys(ends, ask)} | {corpus}
+    used = sorted((name, versions[name]) for name in names if name in versions)
+    return hashlib.sha256(msgspec.json.encode([ends, ask, corpus, used])).hexdigest()[:32]
+
+
+def _keys(ends: tuple[End, End], ask: Ask) -> list[str]:
+    return [end.key for end in ends] + [one.posture for one in ask.passing]
