@@ -82,7 +82,7 @@ function Progress({ studio, job, busy }) {
       <p>${result.name} is learned: ${result.clips} clips, ${result.postures} postures.</p>
       ${result.notes.map((/** @type {string} */ note) => html`<p class="said warning">⚠ ${note}</p>`)}
       <button type="button" class="button" data-testid="use-learned"
-        onClick=${() => studio.api.edit({ edit: "corpus", name: result.name })}>Use it for this piece</button>
+        onClick=${() => studio.act(() => studio.api.edit({ edit: "corpus", name: result.name }))}>Use it for this piece</button>
     </div>`;
   }
   return html`<p class=${state === "failed" ? "said error" : "hint"} role="status" data-testid="learn-ended">${
