@@ -34,19 +34,23 @@ from pathlib import Path
 from motionmind.studio.edits import Insert
 from motionmind.studio.project import Project
 
+def say(line):
+    os.write(1, f"{line}\\n".encode())  # in one call, so that no kill leaves a line without its end
+
 def write(path):
     project = Project.open(path)
-    print(os.getpid(), len(project.state.blocks), sep="\\n", flush=True)
+    say(os.getpid())
+    say(len(project.state.blocks))
     for number in range(len(project.state.used), 100_000):
         project.edit("w1", Insert(f"b{number}", "ballet/adagio", 0, 9))
-        print(number + 1, flush=True)
+        say(number + 1)
 
 for _ in sys.stdin:
     if (writer := os.fork()) == 0:
         write(Path(sys.argv[1]))
         os._exit(0)
     os.waitpid(writer, 0)
-    print("ended", flush=True)
+    say("ended")
 """
 
 

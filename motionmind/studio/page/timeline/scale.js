@@ -6,10 +6,11 @@ const APART = 64; // pixels between numbers on the ruler, at least
 const STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1200, 3600];
 const BAR = 8; // counts that dancers count to
 const CROWD = 300; // stretches in sight, at most
+const SIDES = 40; // pixels beside a piece that is shown whole: a posture that it ends with is drawn on both sides of its end
 
 /** The scale that shows `seconds` in `width` pixels, as far as so many stretches can be told apart. */
 export function fitting(seconds, width, stretches) {
-  return bounded(width / Math.max(seconds * 1.02, 1), seconds, width, stretches);
+  return bounded((width - SIDES) / Math.max(seconds, 1), seconds, width, stretches);
 }
 
 /** A scale within its bounds. */
