@@ -1,4 +1,4 @@
-"""What is asked at a seam, as a name under which the answer is kept."""
+"""Questions at the seams, each by a name under which its answer is kept."""
 
 from __future__ import annotations
 
