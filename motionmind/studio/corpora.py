@@ -104,7 +104,7 @@ def _rate_of(lesson: Lesson, home: Path | None) -> float | Literal["auto"]:
     if lesson.rate is not None:
         return lesson.rate
     folders = store.list_corpora(home)
-    rates = [store.read_manifest(folders[one.name]).get("rate") for one in lesson.mix]
+    rates = [store.read_manifest(folders[known(one.name, home)]).get("rate") for one in lesson.mix]
     return min((float(rate) for rate in rates if rate is not None), default="auto")
 
 

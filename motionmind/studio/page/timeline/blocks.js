@@ -81,7 +81,7 @@ export function Seams({ piece, sight, draft, selection, over }) {
       const mine = draft?.kind === "last" && draft.left === seam.left && draft.right === seam.right ? draft : null;
       const [sign, word] = STATES[seam.state];
       const inserted = seam.state === "inserted";
-      const stands = inserted || seam.stands; // until another is found
+      const { stands } = seam; // what is inserted, or was until another is found
       const width = stands ? (mine?.seconds ?? seam.seconds) * sight.scale : LEAST;
       const left = stands ? seam.at * sight.scale : (seam.at + seam.seconds / 2) * sight.scale - LEAST / 2;
       const locked = seam.decision === "locked";

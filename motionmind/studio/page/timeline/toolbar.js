@@ -70,7 +70,7 @@ function OfSeam({ does, seam, sheet }) {
   const any = alternatives.length > 0;
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
-      <b>${state === "inserted" || seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
+      <b>${seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
       <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : seam.stands ? "another is being sought" : words}</span>
     </p>
     ${any &&
