@@ -72,6 +72,22 @@ def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
         expect(page.get_by_test_id("block-b1")).to_have_count(0)
 
 
+def test_what_is_edited_while_a_page_opens_is_seen_there(studio_server: Served, studio_page: Any, expect: Any) -> None:
+    edited: list[Any] = []
+
+    def late(route: Any) -> None:
+        """The answer of before the edit, once the edit has been told of."""
+        answer = route.fetch()
+        if not edited:
+            edited.append(studio_server.insert("b1", "ballet/adagio", 0, 20))
+            studio_page.wait_for_timeout(1000)
+        route.fulfill(response=answer)
+
+    studio_page.route("**/api/project?*", late)
+    studio_page.reload()
+    expect(studio_page.get_by_test_id("block-b1")).to_be_visible()
+
+
 @pytest.mark.parametrize("end", ["", "/#token=wrong"])
 def test_a_browser_without_the_token_is_told_where_to_look(
     studio_server: Served, browser: Any, expect: Any, end: str

@@ -24,6 +24,7 @@ export class Store extends EventTarget {
     this.refusal = ""; // why the studio does not let this page in again, if it is there
     this.stopped = false; // whether seams wait until somebody lets smoothing go on
     this.tries = 0;
+    this.heard = 0; // the latest sequence that was told of
     api.taken = (state) => this.take(state);
   }
 
@@ -36,7 +37,10 @@ export class Store extends EventTarget {
 
   /** Fetch the project as it stands. */
   async load() {
-    this.take(await this.api.get(`/api/project?window=${this.api.window}`));
+    const path = `/api/project?window=${this.api.window}`;
+    this.take(await this.api.get(path));
+    // The first answer may have been on its way when something was edited.
+    if (this.state.sequence < this.heard) this.take(await this.api.get(path));
   }
 
   /** Take over a state, unless it is older than the one that is there. @param {any} state */
@@ -61,6 +65,7 @@ export class Store extends EventTarget {
     });
     source.addEventListener("project", (event) => {
       const { sequence, left } = JSON.parse(event.data); // `left` is a window whose edits are everybody's now
+      this.heard = sequence;
       if (this.state && (left || sequence > this.state.sequence)) this.load().catch(() => {});
     });
     source.addEventListener("smoothing", (event) => this.set(JSON.parse(event.data)));
