@@ -33,10 +33,10 @@ def named(name: str) -> Posture:
     return own_skeleton(read_posture(POSTURES / f"{name}.json").as_motion()).posture(0)
 
 
-def in_the_air() -> Posture:
-    """The highest posture of the jumps on the spot."""
+def highest(name: str) -> Posture:
+    """The posture of a clip of the bundled ballet whose lowest point is highest."""
     corpus = Engine.load("ballet").corpus
-    motion = corpus.motion(next(clip for clip in corpus.clips if clip.name == "sautes"))
+    motion = corpus.motion(next(clip for clip in corpus.clips if clip.name == name))
     return motion.posture(int(lowest_height(motion.skeleton, motion.rotations, motion.root).argmax()))
 
 
@@ -61,7 +61,8 @@ def moved(posture: Posture, by: tuple[float, float, float]) -> Posture:
 CASES: dict[str, Callable[[], tuple[Posture, Posture]]] = {
     "arabesque-to-fifth": lambda: (named("arabesque"), named("fifth")),
     "bow-to-passe": lambda: (named("bow"), named("passe")),
-    "fifth-into-a-jump": lambda: (named("fifth"), in_the_air()),
+    "fifth-into-a-jump": lambda: (named("fifth"), highest("sautes")),
+    "fifth-into-a-grand-jete": lambda: (named("fifth"), highest("grand-jete")),
     "handstand-to-standing": lambda: (upside_down(named("arms-fifth")), named("fifth")),
     "far-apart": lambda: (named("fifth"), moved(named("tendu"), (APART, 0.0, 0.0))),
     "turned": lambda: (

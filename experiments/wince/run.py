@@ -18,7 +18,7 @@ from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import standing_rise
 from motionmind.geometry import rotations as rot
 
-PAIRS, ONE_LEG, JUMPS = 120, 50, 30  # of each corpus
+PAIRS, ONE_LEG, JUMPS = 120, 100, 90  # of each corpus
 BUDGET = 20_000
 MAKERS = ("motionmind", "eased")
 LIFTED = 0.02  # metres by which a standing foot may rise

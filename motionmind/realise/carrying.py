@@ -157,7 +157,7 @@ def carry(
         steady += standing_rows(shape, bearing, floor, freedom)
         steady = [joined(steady + flight_rows(flights, mass, standing, gravity, fps))]
         for _ in range(ROUNDS[1]):
-            rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, fps)]
+            rows = [*steady, sunk_rows(shape, floor, start), hurry_rows(start, travels, freedom, fps)]
             reaching = legs_to_places(legs, shape, bearing, floor, start)
             rows += [
                 reach_rows(reaching, bearing, start, bones, fps),

@@ -208,13 +208,14 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         fps: frames a second.
     """
     low = lowest_height(skeleton, rotations, root)
-    up = ~given & (low > low.min() + LOW * size_of(skeleton))
+    off_floor = low > low.min() + LOW * size_of(skeleton)
+    up = ~given & off_floor
     mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
     if mass is None:
         return root
     out, fall = root.copy(), np.zeros(len(root))
     fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
-    for start, stop in _falls(fall, up, round(PAUSES * fps)):
+    for start, stop in _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps)):
         seconds = np.arange(stop - start + 2) / fps
         line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
         fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
@@ -222,19 +223,24 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
     return out
 
 
-def _falls(fall: Floats, up: Bools, pauses: int) -> list[tuple[int, int]]:
+def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:
     """Return the first frame of each fall, and the one after its last.
+
+    A pause is between two falls, or between a fall and an end in the air.
 
     Args:
         fall: downward acceleration of the mass, in gravities [N].
-        up: where the body is off the floor [N].
+        up: where the body is off the floor, and may be moved [N].
+        in_air: whether it is off the floor in the first and in the last frame, which may not.
         pauses: frames of a pause at most.
     """
     fast = up & (fall > FALLING)
     whole = fast.copy()
     for start, stop in runs_of(~fast):
-        if start > 0 and stop < len(fast) and stop - start <= pauses:
-            whole[start:stop] = np.all(up[start:stop] & (fall[start:stop] > -FALLING))
+        inner = slice(max(start, 1), min(stop, len(fast) - 1))
+        between = (start > 0 or in_air[0]) and (stop < len(fast) or in_air[1])
+        if between and inner.stop - inner.start <= pauses:
+            whole[inner] = np.all(up[inner] & (fall[inner] > -FALLING))
     out = []
     for start, stop in runs_of(whole):
         # What trembles falls on the whole no faster than that: then pauses part it.

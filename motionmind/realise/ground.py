@@ -73,6 +73,23 @@ class Stance(NamedTuple):
         return self._replace(**{name: by * getattr(self, name) for name in lengths})
 
 
+def ends_in_air(stance: Stance, low: Mapping[int, float], size: float) -> Bools:
+    """Return whether the first and the last posture of a body are in the air [2].
+
+    Args:
+        stance: how the corpus's bodies hold themselves along its movement; no matter in how much time.
+        low: height of the lowest point above 0 of the given postures, metres, as of `set_on_floor`.
+        size: of the body (`motionmind.body.support.size_of`).
+    """
+    return _hovering(stance.scaled(1.0 / size), _of_ends(low) / size)
+
+
+def _of_ends(low: Mapping[int, float]) -> Floats:
+    """Return the heights of the first and of the last posture [2], of all that are given."""
+    first, *_, last = low.values()
+    return np.array([first, last])
+
+
 def set_on_floor(
     skeleton: Skeleton,
     rotations: Floats,
@@ -156,7 +173,7 @@ def _set_down(
 ) -> tuple[Floats, Floats]:
     """Return what `set_on_floor` does, of a body as large as a person, where gravity is as given."""
     half_steps, given = stance.half_steps, 2 * np.array(list(low))
-    lows = np.array([low[0], low[given[-1] // 2]])
+    lows = _of_ends(low)
     hovering = _hovering(stance, lows)
     aloft = stance.aloft.copy()
     aloft[[0, -1]] = np.where(hovering, 1.0, aloft[[0, -1]])

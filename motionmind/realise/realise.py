@@ -15,6 +15,8 @@ from motionmind.body.contact import lowest_height
 from motionmind.body.limits import within_limits
 from motionmind.body.motion import Insertion, Motion, Posture, Velocity
 from motionmind.body.plausibility import GRAVITY
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import size_of
 from motionmind.corpus.corpus import Corpus, subdivide_times
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -23,11 +25,11 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.ground import Stance, set_on_floor
+from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import ENDS_AT, HEADROOM, JUMPS_AT, LONGER, keep_pace, slow_down
+from motionmind.realise.retime import ENDS_AT, HEADROOM, JUMPS_AT, LONGER, jump_in_time, keep_pace, slow_down
 from motionmind.realise.settling import keeper, settled
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
@@ -127,14 +129,19 @@ def realise(
     walk = _bend_to_states(walk, chains, states, clock, stops, corpus, within)
     size = a.skeleton.height / corpus.skeleton.height if corpus.skeleton.height > 0.0 else 1.0
     travel = travel_along(walk.trust[:, :1] * (walk.moves @ carriage.travel[walk.of_moves]), walk.headings)
-    if length is None:
-        longer = np.full(len(travel), slower)
-        if fastest is not None:
-            moving = leaving is not None, arriving is not None
-            missing = (b.root - a.root) / size - travel.sum(axis=0)
-            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
+    given = [0, *(2 * move for move in through), -1]
+    moving, low = (leaving is not None, arriving is not None), _given_heights(postures, walk)
+    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
+    stance = _stance(walk, carriage, travel, size, given)
+    longer = np.full(len(travel), slower)
+    if length is None and fastest is not None:
+        missing = (b.root - a.root) / size - travel.sum(axis=0)
+        longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
+    if "flight" not in without:
+        longer = _with_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, fastest, length)
+    if length is None or longer.min() < 1.0:
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
-        walk = walk._replace(half_steps=half_steps)
+        walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
     smooth, quick = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
     detail, detailed = _detail(walk, clock, corpus, carriage, smooth, quick)
     rotations = rot.mul(smooth, rot.exp(detail))
@@ -143,29 +150,12 @@ def realise(
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
-    # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
-    trust = walk.trust[:, 0]
-    in_air, clearance = carriage.aloft[walk.of_moments], carriage.clearance[walk.of_moments]
-    aloft = walk.moments @ in_air
-    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
-    given = [0, *(2 * move for move in through), -1]
-    flies = trusted * aloft
-    leaps = size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9)
     most = None
     if peaks is not None:
         most = peaks(LONGER * float(clock.frames[-1]), pace)
-        flies[np.sqrt(2.0 * GRAVITY * leaps) > JUMPS_AT * most[-2] * a.skeleton.height] = 0.0
-    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
-    stance = Stance(
-        walk.half_steps,
-        size * (walk.moments @ clearance),
-        trusted,
-        walk.moments @ carriage.stands[walk.of_moments],
-        flies,
-        leaps,
-        size * travel,
-        size * float(carriage.overhang[0]),
-    )
+        high = np.sqrt(2.0 * GRAVITY * stance.leaps) > JUMPS_AT * most[-2] * a.skeleton.height
+        high[given] = False
+        stance = stance._replace(aloft=np.where(high, 0.0, stance.aloft))
     rotations, root = set_on_floor(
         a.skeleton,
         rotations,
@@ -174,14 +164,13 @@ def realise(
         stance,
         carriage.loose,
         fixed[: len(a.skeleton)],
-        _given_heights(postures, walk),
+        low,
         (a.root, b.root),
         (None if leaving is None else leaving.root, None if arriving is None else arriving.root),
         None if fastest is None else pace * fastest[: len(a.skeleton)],
         np.inf if fastest is None else float(HEADROOM * pace * fastest[-1] * a.skeleton.height),
         without,
     )
-    moving = leaving is not None, arriving is not None
     settle = partial(
         settled,
         stops=[*stops],
@@ -223,6 +212,70 @@ def _walk_near(
         path = rotation_spline(clock.moves, path, half_steps[::2])
         stops = {0: stops[0], clock.usual_moves: stops[last]}
     return expect(corpus, carriage, stops, half_steps, path, near)
+
+
+def _stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, given: Sequence[int]) -> Stance:
+    """Return how the corpus's bodies hold themselves along a walk, on a body so many times as large.
+
+    Args:
+        walk: the movement at its half steps.
+        carriage: how the corpus's bodies hold themselves.
+        travel: level displacement of the root in each half step [2 T, 3], metres, on the corpus's skeleton.
+        size: of the body, in heights of the corpus's skeleton.
+        given: half steps at which postures are given.
+    """
+    trust, in_air, clearance = walk.trust[:, 0], carriage.aloft[walk.of_moments], carriage.clearance[walk.of_moments]
+    aloft = walk.moments @ in_air
+    trusted = np.interp(np.arange(len(walk.half_steps)), 0.5 + np.arange(len(trust)), trust)
+    flies = trusted * aloft
+    flies[given] = aloft[given]  # whether a given posture is in the air is no matter of trust
+    return Stance(
+        walk.half_steps,
+        size * (walk.moments @ clearance),
+        trusted,
+        walk.moments @ carriage.stands[walk.of_moments],
+        flies,
+        size * (walk.moments @ (in_air * clearance)) / np.maximum(aloft, 1e-9),
+        size * travel,
+        size * float(carriage.overhang[0]),
+    )
+
+
+def _with_jumps(
+    walk: Expectation,
+    longer: Floats,
+    corpus: Corpus,
+    skeleton: Skeleton,
+    stance: Stance,
+    low: Mapping[int, float],
+    moving: tuple[bool, bool],
+    fastest: Floats | None,
+    length: float | None,
+) -> Floats:
+    """Return how many times longer each half step is to take [2 T], where jumps into given postures keep to gravity.
+
+    Args:
+        walk: the movement at its half steps.
+        longer: how many times longer each would take else [2 T].
+        corpus: what it was learned from.
+        skeleton: the body.
+        stance: how the corpus's bodies hold themselves along the walk.
+        low: height of the lowest point of the given postures, metres, by the number of the walk's moves to there.
+        moving: whether the first and the last posture are passed at a given velocity.
+        fastest: speeds of the joints first [J], rad/s; None for any.
+        length: how long all of it takes whatever it does, seconds; None for as long as it comes to.
+    """
+    in_air = ends_in_air(stance, low, size_of(skeleton)) & ~np.array(moving)
+    if not in_air.any():
+        return longer
+    seconds = longer * np.diff(walk.half_steps)
+    rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
+    speeds = np.full(len(skeleton), np.inf) if fastest is None else fastest[: len(skeleton)]
+    quicker = jump_in_time(skeleton, rotations, seconds, stance.clearance, (low[0], low[max(low)]), in_air, speeds)
+    out, jumps = longer * quicker, quicker < 1.0
+    if length is not None and jumps.any() and not jumps.all():
+        out[~jumps] *= (length - seconds[jumps] @ quicker[jumps]) / seconds[~jumps].sum()
+    return out
 
 
 def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:

@@ -19,14 +19,15 @@ from motionmind._typing import Bools, Floats
 from motionmind.body.contact import LOW, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
-from motionmind.body.support import size_of
+from motionmind.body.skeleton import Skeleton
+from motionmind.body.support import centre_of_mass, size_of
 from motionmind.corpus.corpus import Corpus
 from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
-from motionmind.realise.flight import FALLING
+from motionmind.realise.flight import FALLING, HOVERS
 from motionmind.realise.knees import bell
 from motionmind.realise.timeline import Timeline, stretch
 
@@ -37,6 +38,9 @@ AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slo
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
 SLIGHT = 1e-3  # by which a clock is not worth slowing
+SITS = 0.1  # metres: a body that leaves the floor no lower than that under where it could is not hurried
+HIGHER = 0.02  # metres: what is no higher than that is not worth a longer fall
+HURRIES = 2.5  # times as fast as all but a hundredth of the corpus's moments: as joints may be in a leap
 SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
 
 
@@ -76,6 +80,56 @@ def keep_pace(
         if is_moving:
             slower = 1.0 + (slower - 1.0) * np.clip(since / SETTLES, 0.0, 1.0)
     return np.asarray(slower)
+
+
+def jump_in_time(
+    skeleton: Skeleton,
+    rotations: Floats,
+    seconds: Floats,
+    heights: Floats,
+    low: tuple[float, float],
+    in_air: Bools,
+    fastest: Floats,
+) -> Floats:
+    """Return how many times as long each half step is to take [2 T], at most 1, so that jumps are from stretched legs.
+
+    Where the first or the last posture is in the air, how long the body falls from there is gravity's to say. A walk
+    may take longer from the floor to there: then the body would leave the floor in a posture in which it is lower, as
+    in a split, and first come down so far. It is to leave it in the one in which it stands highest, and legs hurry.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations at the half steps [2 T + 1, J, 4].
+        seconds: how long half steps take [2 T].
+        heights: of the corpus's lowest points above the floor at the half steps [2 T + 1], metres.
+        low: height of the lowest point above the floor in the first and in the last posture [2], metres.
+        in_air: whether they are in the air, and how they are passed is not given [2].
+        fastest: speeds of the joints, rad/s, that are not exceeded more than HURRIES times [J].
+    """
+    out, still = np.ones(len(seconds)), np.zeros((len(rotations), 3))
+    mass = centre_of_mass(skeleton, rotations, still) if in_air.any() else None
+    if mass is None:
+        return out
+    standing = mass[:, 1] - lowest_height(skeleton, rotations, still)
+    for end, onward in ((0, slice(None)), (-1, slice(None, None, -1))):
+        if not in_air[end]:
+            continue
+        # From the posture in the air on, or back.
+        high, takes, best, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, (0, 1.0)
+        for step in range(1, len(high)):
+            if heights[onward][step] < HOVERS * size_of(skeleton):
+                break
+            turned = rot.angle(rotations[onward][step - 1], rotations[onward][step])
+            hurries = max(hurries, float((turned / fastest).max()) / seconds[onward][step - 1])
+            takes += seconds[onward][step - 1]
+            rise = high[0] + low[end] - high[step]
+            share = np.sqrt(max(2.0 * rise / GRAVITY, 0.0)) / takes
+            if share < 1.0 and np.isinf(best):
+                best = high[step] + SITS  # here it would leave the floor
+            elif high[step] > best and hurries <= HURRIES * share:
+                best, quicker = high[step] + HIGHER, (step, share)
+        out[onward][: quicker[0]] = quicker[1]
+    return out
 
 
 def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:

@@ -50,22 +50,27 @@ def prior_rows(prior: Floats, bearing: Bearing, fps: float) -> list[Rows]:
     return rows
 
 
-def hurry_rows(root: Floats, travels: float, fps: float) -> Rows:
-    """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second."""
+def hurry_rows(root: Floats, travels: float, freedom: Floats, fps: float) -> Rows:
+    """Return rows that slow a root [N, 3] down where it is about to travel faster than it may, metres a second.
+
+    For a flight, where legs are free [N], it may.
+    """
     # Rows look at three frames: each at its first two, and the last one at its last two.
     first = np.minimum(np.arange(len(root) - 1), len(root) - 3)
-    return Rows(first, *_hurry_rows(root, first, travels, fps))
+    return Rows(first, *_hurry_rows(root, first, travels, freedom, fps))
 
 
 @jit
-def _hurry_rows(root: Floats, first: Ints, travels: float, fps: float) -> tuple[Floats, Floats, Floats]:
+def _hurry_rows(
+    root: Floats, first: Ints, travels: float, freedom: Floats, fps: float
+) -> tuple[Floats, Floats, Floats]:
     """Return the coefficients [N - 1, 9], targets and weights of rows that begin with the `first` frames [N - 1]."""
     coefficients, weights = np.zeros((len(first), 9)), np.zeros(len(first))
     for t in range(len(first)):
         x, z = fps * (root[t + 1, 0] - root[t, 0]), fps * (root[t + 1, 2] - root[t, 2])
         speed = np.sqrt(x * x + z * z)
         if speed > NEARLY * travels:
-            weights[t] = HURRY**-2.0
+            weights[t] = (1.0 - freedom[t]) * HURRY**-2.0
             for k, way in ((0, x), (2, z)):
                 along, at = way / max(speed, 1e-9), 3 * (t - first[t]) + k
                 coefficients[t, at], coefficients[t, at + 3] = -fps * along, fps * along

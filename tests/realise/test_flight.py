@@ -140,6 +140,23 @@ def test_a_fall_goes_on_where_legs_are_drawn_up_and_ends_where_something_pushes(
         assert (fell[14, 1] == bumpy[14, 1]) != goes_on
 
 
+@pytest.mark.parametrize("end", [0, -1])
+def test_a_fall_reaches_to_an_end_in_the_air(end: int) -> None:
+    """Legs that hurry into a posture in the air take the last frame before it off the parabola; not so on the floor."""
+    rotations, root, _ = leap()
+    for kept, in_air in ((slice(0, 15), True), (slice(0, 28), False)):
+        poses, way = (one[kept] if end else one[kept][::-1] for one in (rotations, root.copy()))
+        beside = len(way) - 2 if end else 1
+        way[beside, 1] -= 0.006
+        given = np.zeros(len(way), dtype=np.bool_)
+        given[[0, -1]] = True
+        fell = fall_freely(BODY, poses, way, given, FPS)
+        assert (fell[beside, 1] != way[beside, 1]) == in_air
+        if in_air:
+            np.testing.assert_allclose(falls(poses, fell)[beside - 1], -GRAVITY, atol=1e-9)
+        np.testing.assert_array_equal(fell[[0, -1]], way[[0, -1]])
+
+
 def test_a_body_that_trembles_off_the_floor_does_not_fall() -> None:
     """Somebody holds it up for a second, and it is shaken by millimetres: accelerations of gravity and more."""
     rng = np.random.default_rng(0)

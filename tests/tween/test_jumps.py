@@ -1,0 +1,163 @@
+"""Jumps into and out of postures that are given in the air: from legs that stretch, and as long as gravity has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionmind import Engine, Motion, Posture
+from motionmind._typing import Bools, Floats
+from motionmind.body.contact import lowest_height
+from motionmind.body.human import human23
+from motionmind.body.plausibility import GRAVITY
+from motionmind.body.support import centre_of_mass
+from motionmind.geometry import rotations as rot
+from motionmind.realise.retime import HURRIES, jump_in_time
+
+BODY, FPS = human23(), 30.0
+CROUCH = 0.6  # metres: below this no dancer has the pelvis before a leap or after it; in a split it is at 0.3
+SPLIT = 11  # half steps from standing to a split
+
+
+@pytest.fixture(scope="module")
+def ballet() -> Engine:
+    return Engine.load("ballet")
+
+
+def posture(engine: Engine, number: int) -> Posture:
+    return Posture(BODY, engine.corpus.rotations[number], engine.corpus.root[number])
+
+
+def leap(engine: Engine, number: int) -> Posture:
+    """Keyframes of the grand jete: flying into the split, in it, and out of it."""
+    clip = next(clip for clip in engine.corpus.clips if clip.name == "grand-jete")
+    low = lowest_height(BODY, engine.corpus.rotations, engine.corpus.root)
+    up = [k for k in range(clip.start, clip.stop) if low[k] > 0.3]
+    return posture(engine, up[number])
+
+
+def standing(engine: Engine, seed: int) -> list[Posture]:
+    low = lowest_height(BODY, engine.corpus.rotations, engine.corpus.root)
+    on_floor = np.flatnonzero(low < 0.02)
+    return [posture(engine, int(k)) for k in np.random.default_rng(seed).choice(on_floor, 4, replace=False)]
+
+
+def in_place(moved: Posture, at: Posture) -> Posture:
+    """A posture half a metre from another."""
+    return replace(moved, root=np.array([at.root[0] + 0.5, moved.root[1], at.root[2]]))
+
+
+def off_floor(motion: Motion) -> Bools:
+    """Frames in the air, with both neighbours."""
+    up = lowest_height(BODY, motion.rotations, motion.root) > 0.06
+    return np.asarray(up[1:-1] & up[2:] & up[:-2])
+
+
+def check_leap(motion: Motion) -> None:
+    mass = centre_of_mass(BODY, motion.rotations, motion.root)
+    assert mass is not None
+    fps = (len(motion) - 1) / motion.times[-1]
+    falls = -(fps**2) * np.diff(mass[:, 1], 2)[off_floor(motion)]
+    assert len(falls) > 1
+    assert np.abs(falls / GRAVITY - 1.0).max() < 0.2
+    assert motion.root[:, 1].min() > CROUCH
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_leap_is_from_stretched_legs_and_lands_on_them(ballet: Engine, number: int, seed: int) -> None:
+    for stands in standing(ballet, seed):
+        into = leap(ballet, number)
+        check_leap(ballet.tween(stands, in_place(into, stands), fps=FPS).motion)
+        check_leap(ballet.tween(into, in_place(stands, into), fps=FPS).motion)
+
+
+def test_from_leap_to_leap_the_body_lands_on_its_feet_between(ballet: Engine) -> None:
+    a, b = leap(ballet, 1), leap(ballet, 4)
+    motion = ballet.tween(a, b, fps=FPS).motion
+    check_leap(motion)
+    assert lowest_height(BODY, motion.rotations, motion.root).min() < 0.02
+
+
+@pytest.mark.parametrize("seconds", [1.6, 2.4])
+def test_a_leap_of_a_given_duration_has_gravitys_too(ballet: Engine, seconds: float) -> None:
+    a = posture(ballet, 0)
+    motion = ballet.tween(a, in_place(leap(ballet, 1), a), duration=seconds, fps=FPS).motion
+    assert motion.times[-1] == pytest.approx(seconds)
+    check_leap(motion)
+
+
+def test_who_gives_up_flight_gives_up_its_time(ballet: Engine) -> None:
+    a = posture(ballet, 0)
+    asked = {"duration": 2.4, "fps": FPS}
+    plain = ballet.tween(a, in_place(leap(ballet, 1), a), without={"flight"}, **asked).motion  # type: ignore[arg-type]
+    assert plain.root[:, 1].min() < CROUCH
+
+
+def split(share: Floats) -> Floats:
+    """Rotations of a body whose legs part, one forward and one back [N, J, 4], by shares of a quarter turn."""
+    rotations = np.tile(rot.IDENTITY, (len(share), len(BODY), 1))
+    for hip, sign in (("left_hip", 1.0), ("right_hip", -1.0)):
+        rotations[:, BODY.index(hip)] = rot.from_axis_angle([1.0, 0.0, 0.0], sign * 0.45 * np.pi * share)
+    return rotations
+
+
+def timed(
+    seconds: float,
+    low: float,
+    heights: Floats | None = None,
+    in_air: tuple[bool, bool] = (False, True),
+    fastest: float = 4.0,
+) -> Floats:
+    """How much longer half steps are to take, of which each takes as long as given, from standing into a split."""
+    share = np.linspace(0.0, 1.0, SPLIT)
+    share = share if in_air[1] else share[::-1]
+    up = np.linspace(0.0, low, SPLIT) if heights is None else heights
+    up = up if in_air[1] else up[::-1]
+    lows = (0.0, low) if in_air[1] else (low, 0.0)
+    poses, speeds = split(share), np.full(len(BODY), fastest)
+    return jump_in_time(BODY, poses, np.full(SPLIT - 1, seconds), up, lows, np.array(in_air, dtype=np.bool_), speeds)
+
+
+@pytest.mark.parametrize("fastest", [4.0, 1.0])
+def test_a_walk_into_the_air_takes_as_long_as_the_fall_from_there(fastest: float) -> None:
+    slow = timed(0.2, 1.0, fastest=fastest)
+    jumps = slow < 1.0
+    rises = np.flatnonzero(jumps)
+    assert rises[-1] == SPLIT - 2
+    assert len(rises) == rises[-1] + 1 - rises[0]  # the last ones, without a gap
+    assert len(set(slow[jumps])) == 1
+    poses, still = split(np.linspace(0.0, 1.0, SPLIT)), np.zeros((SPLIT, 3))
+    mass = centre_of_mass(BODY, poses, still)
+    assert mass is not None
+    high = mass[:, 1] - lowest_height(BODY, poses, still)
+    fall = np.sqrt(2.0 * (high[-1] + 1.0 - high[rises[0]]) / GRAVITY)
+    assert 0.2 * float(slow[jumps].sum()) == pytest.approx(fall)
+    # Legs hurry, and no faster than they may.
+    turn = np.abs(np.diff(np.linspace(0.0, 1.0, SPLIT)))[jumps].sum() * 0.45 * np.pi
+    assert turn / fall < HURRIES * fastest
+    assert np.array_equal(timed(0.2, 1.0, in_air=(True, False), fastest=fastest), slow[::-1])
+
+
+def test_slower_legs_leave_the_floor_farther_apart() -> None:
+    times = [timed(0.2, 1.0, fastest=fastest) for fastest in (4.0, 1.2, 1.0)]
+    hurried = [int((one < 1.0).sum()) for one in times]
+    assert hurried == sorted(hurried, reverse=True)
+    assert hurried[0] > hurried[-1] > 0
+
+
+@pytest.mark.parametrize(
+    ("seconds", "low", "heights", "in_air"),
+    [
+        (0.2, 1.0, None, (False, False)),  # nothing is given in the air
+        (0.02, 1.0, None, (False, True)),  # quick enough
+        (0.2, 1.0, np.zeros(SPLIT), (False, True)),  # the corpus's bodies stand
+        (0.2, 0.1, None, (False, True)),  # lower than it stands: no jump
+    ],
+)
+def test_other_walks_are_left_as_they_are(
+    seconds: float, low: float, heights: Floats | None, in_air: tuple[bool, bool]
+) -> None:
+    assert np.array_equal(timed(seconds, low, heights, in_air), np.ones(SPLIT - 1))
