@@ -73,15 +73,18 @@ class Stance(NamedTuple):
         return self._replace(**{name: by * getattr(self, name) for name in lengths})
 
 
-def ends_in_air(stance: Stance, low: Mapping[int, float], size: float) -> Bools:
-    """Return whether the first and the last posture of a body are in the air [2].
+def ends_in_air(stance: Stance, low: Mapping[int, float], size: float) -> tuple[Bools, Floats]:
+    """Return whether the first and the last posture of a body are in the air [2], and how high they are [2], metres.
 
     Args:
         stance: how the corpus's bodies hold themselves along its movement; no matter in how much time.
         low: height of the lowest point above 0 of the given postures, metres, as of `set_on_floor`.
         size: of the body (`motionmind.body.support.size_of`).
     """
-    return _hovering(stance.scaled(1.0 / size), _of_ends(low) / size)
+    small, ends = stance.scaled(1.0 / size), _of_ends(low) / size
+    hovering = _hovering(small, ends)
+    floor = _floor_under(stance.half_steps, small.clearance, ends, hovering)
+    return hovering, size * (ends - floor[[0, -1]])
 
 
 def _of_ends(low: Mapping[int, float]) -> Floats:

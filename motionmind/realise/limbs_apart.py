@@ -76,6 +76,9 @@ def keep_limbs_apart(
     if not is_any_deeper(ends, capsules.radii, pairs, allowed):
         return rotations
     depths, directions = pair_depths(ends, capsules.radii, pairs)
+    # Beside a given posture, where nothing may turn, there is no time to part: there they do so little by little.
+    near = 1.0 - _risen((np.abs(frames[:, None] - held).min(axis=1) - 1) / (SPREADS * fps))
+    allowed += near[:, None] * np.maximum(depths - allowed, 0.0)
     limbs = _limbs_of(skeleton, capsules)
     still = np.zeros((len(rotations), 4))
     if root is not None:
@@ -199,9 +202,14 @@ def _eased(need: Floats, frozen: Bools, rise: int) -> Floats:
     window = np.hanning(2 * rise + 3)[1:-1]
     frames = np.arange(len(need))
     far = np.abs(frames[:, None] - frames[frozen]).min(axis=1)
-    share = np.minimum(far / rise, 1.0)
-    eased = np.convolve(around, window / window.sum(), "valid") * share * share * (3.0 - 2.0 * share)
+    eased = np.convolve(around, window / window.sum(), "valid") * _risen(far / rise)
     return np.where(frozen, 0.0, np.maximum(eased, need))
+
+
+def _risen(share: Floats) -> Floats:
+    """Return a smooth step: 0 where a share [N] is 0, or less, 1 from where it is 1."""
+    share = np.clip(share, 0.0, 1.0)
+    return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 @jit

@@ -25,6 +25,7 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
+from motionmind.realise.feet import KNEE
 from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
@@ -262,16 +263,17 @@ def _with_jumps(
         stance: how the corpus's bodies hold themselves along the walk.
         low: height of the lowest point of the given postures, metres, by the number of the walk's moves to there.
         moving: whether the first and the last posture are passed at a given velocity.
-        fastest: speeds of the joints first [J], rad/s; None for any.
+        fastest: speeds of the joints first [J], rad/s; None for as fast as knees bend.
         length: how long all of it takes whatever it does, seconds; None for as long as it comes to.
     """
-    in_air = ends_in_air(stance, low, size_of(skeleton)) & ~np.array(moving)
+    in_air, above = ends_in_air(stance, low, size_of(skeleton))
+    in_air &= ~np.array(moving)
     if not in_air.any():
         return longer
     seconds = longer * np.diff(walk.half_steps)
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
-    speeds = np.full(len(skeleton), np.inf) if fastest is None else fastest[: len(skeleton)]
-    quicker = jump_in_time(skeleton, rotations, seconds, stance.clearance, (low[0], low[max(low)]), in_air, speeds)
+    speeds = np.full(len(skeleton), KNEE) if fastest is None else fastest[: len(skeleton)]
+    quicker = jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, speeds)
     out, jumps = longer * quicker, quicker < 1.0
     if length is not None and jumps.any() and not jumps.all():
         out[~jumps] *= (length - seconds[jumps] @ quicker[jumps]) / seconds[~jumps].sum()

@@ -87,7 +87,7 @@ def jump_in_time(
     rotations: Floats,
     seconds: Floats,
     heights: Floats,
-    low: tuple[float, float],
+    low: Floats,
     in_air: Bools,
     fastest: Floats,
 ) -> Floats:
@@ -123,10 +123,12 @@ def jump_in_time(
             hurries = max(hurries, float((turned / fastest).max()) / seconds[onward][step - 1])
             takes += seconds[onward][step - 1]
             rise = high[0] + low[end] - high[step]
-            share = np.sqrt(max(2.0 * rise / GRAVITY, 0.0)) / takes
-            if share < 1.0 and np.isinf(best):
-                best = high[step] + SITS  # here it would leave the floor
-            elif high[step] > best and hurries <= HURRIES * share:
+            share = np.sqrt(2.0 * rise / GRAVITY) / takes if rise > 0.0 else np.inf
+            if share >= 1.0:
+                continue
+            if np.isinf(best):  # before this step it would leave the floor
+                best = min(high[step - 1], high[step]) + SITS
+            if high[step] > best and hurries <= HURRIES * share:
                 best, quicker = high[step] + HIGHER, (step, share)
         out[onward][: quicker[0]] = quicker[1]
     return out

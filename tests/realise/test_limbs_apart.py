@@ -229,6 +229,17 @@ def test_tweens_keep_their_legs_apart_unless_told_otherwise() -> None:
     assert max(kept) < 0.03
 
 
+def test_arms_that_meet_beside_a_given_posture_part_without_a_jerk() -> None:
+    """Forearms that were crossed come into each other in the second frame; driven apart at once, they flew apart."""
+    found, fps = Engine.load("macarena"), 30.0
+    a, b = (Posture(found.corpus.skeleton, found.corpus.rotations[k], found.corpus.root[k]) for k in (76, 36))
+    plain, apart_ = (found.tween(a, b, fps=fps, without=left).motion for left in ({"limbs"}, set()))
+    arms = [BODY.index(f"{side}_shoulder") for side in ("left", "right")]
+    fastest = [fps * rot.angle(one.rotations[:-1, arms], one.rotations[1:, arms])[:10].max() for one in (plain, apart_)]
+    assert fastest[0] < 6.0
+    assert fastest[1] < 11.5
+
+
 def test_any_pair_that_is_deeper_than_allowed_is_seen() -> None:
     capsules = capsules_of(BODY)
     pairs = capsules.pairs()

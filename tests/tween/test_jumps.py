@@ -116,7 +116,7 @@ def timed(
     share = share if in_air[1] else share[::-1]
     up = np.linspace(0.0, low, SPLIT) if heights is None else heights
     up = up if in_air[1] else up[::-1]
-    lows = (0.0, low) if in_air[1] else (low, 0.0)
+    lows = np.array([0.0, low] if in_air[1] else [low, 0.0])
     poses, speeds = split(share), np.full(len(BODY), fastest)
     return jump_in_time(BODY, poses, np.full(SPLIT - 1, seconds), up, lows, np.array(in_air, dtype=np.bool_), speeds)
 
