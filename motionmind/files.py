@@ -293,6 +293,25 @@ def _remove_leftovers(folder: Path) -> None:
                         Path(entry.path).unlink()
 
 
+def make_room(purpose: str) -> Path:
+    """Return a new folder among the system's temporary ones, which others may not read.
+
+    What processes that were killed left of the same purpose, a word, is removed.
+    """
+    import shutil
+    import tempfile
+
+    room = Path(tempfile.mkdtemp(prefix=f"motionmind-{purpose}-{os.getpid()}-"))
+    with suppress(OSError):
+        own, rooms = room.stat().st_uid, re.compile(rf"motionmind-{purpose}-(\d+)-\w+")
+        for entry in os.scandir(room.parent):
+            if (parts := rooms.fullmatch(entry.name)) and not _runs(int(parts[1])):
+                with suppress(OSError):
+                    if entry.is_dir(follow_symlinks=False) and entry.stat(follow_symlinks=False).st_uid == own:
+                        shutil.rmtree(entry.path)
+    return room
+
+
 def _runs(process: int) -> bool:
     """Return whether a process of this number runs on this machine; True where that cannot be asked."""
     if os.name == "nt":  # where asking would end it

@@ -13,7 +13,6 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Annotated
 from weakref import finalize
 
@@ -22,6 +21,7 @@ import msgspec
 from motionmind.body.motion import Motion
 from motionmind.display import displayed
 from motionmind.errors import MotionMindError
+from motionmind.files import make_room
 from motionmind.formats.units import UNITS
 from motionmind.studio.reading import FACTS, ORDER, SECONDS, SUFFIXES, Answer, Facts, Order, load_clip
 
@@ -86,7 +86,7 @@ class Uploads:
     """The files that were brought since the studio was started; they go with it."""
 
     def __init__(self) -> None:
-        self._folder = Path(mkdtemp(prefix="motionmind-studio-"))  # others may not read it
+        self._folder = make_room("studio")
         self._goes = finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
         self._uploads: dict[str, Upload] = {}
         self._reading = asyncio.Semaphore(_AT_ONCE)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import io
+import subprocess
+import sys
+import tempfile
 import time
 import zipfile
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -168,6 +171,25 @@ def test_goes_with_the_studio(tmp_path: Path) -> None:
     other = uploads.folder(bring(uploads, "bends.score", TITLED.encode()).id)
     uploads.close()
     assert not other.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there nobody can be asked whether a process runs")
+def test_a_studio_that_was_killed_leaves_nothing_for_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    gone, stays, linked = (tmp_path / name for name in (f"motionmind-studio-{int(dead.stdout)}-a1_", "mine", "other"))
+    for folder in (gone, stays, linked):
+        (folder / "0").mkdir(parents=True)
+        (folder / "0" / "upload.bvh").write_text("movement")
+    (tmp_path / f"motionmind-studio-{int(dead.stdout)}-link").symlink_to(linked)
+    first = Uploads()
+    second = Uploads()
+    folders = [one.folder(bring(one, "bends.score", TITLED.encode()).id) for one in (first, second)]
+    assert not gone.exists()
+    assert all((folder / "0" / "upload.bvh").exists() for folder in (stays, linked))
+    assert all(folder.is_dir() for folder in folders)  # those who run keep theirs
+    first.close()
+    second.close()
 
 
 # --- files that mean harm ---------------------------------------------------------------------------------------------
