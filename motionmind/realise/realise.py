@@ -275,7 +275,9 @@ def _with_jumps(
     speeds = np.full(len(skeleton), KNEE) if fastest is None else fastest[: len(skeleton)]
     quicker = jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, speeds)
     out, jumps = longer * quicker, quicker < 1.0
-    if length is not None and jumps.any() and not jumps.all():
+    if length is not None and jumps.all():
+        return longer
+    if length is not None:
         out[~jumps] *= (length - seconds[jumps] @ quicker[jumps]) / seconds[~jumps].sum()
     return out
 

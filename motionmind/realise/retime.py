@@ -38,8 +38,8 @@ AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slo
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
 SLIGHT = 1e-3  # by which a clock is not worth slowing
-SITS = 0.1  # metres: a body that leaves the floor no lower than that under where it could is not hurried
-HIGHER = 0.02  # metres: what is no higher than that is not worth a longer fall
+SITS = 0.1  # metres, of a person: a body that leaves the floor no lower than that under where it could is not hurried
+HIGHER = 0.02  # metres, of a person: what is no higher than that is not worth a longer fall
 HURRIES = 2.5  # times as fast as all but a hundredth of the corpus's moments: as joints may be in a leap
 SETTLES = 0.3  # seconds from an end that is passed at a given speed, in which the clock comes to slow down
 
@@ -110,14 +110,14 @@ def jump_in_time(
     mass = centre_of_mass(skeleton, rotations, still) if in_air.any() else None
     if mass is None:
         return out
-    standing = mass[:, 1] - lowest_height(skeleton, rotations, still)
+    standing, size = mass[:, 1] - lowest_height(skeleton, rotations, still), size_of(skeleton)
     for end, onward in ((0, slice(None)), (-1, slice(None, None, -1))):
         if not in_air[end]:
             continue
         # From the posture in the air on, or back.
         high, takes, best, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, (0, 1.0)
         for step in range(1, len(high)):
-            if heights[onward][step] < HOVERS * size_of(skeleton):
+            if heights[onward][step] < HOVERS * size:
                 break
             turned = rot.angle(rotations[onward][step - 1], rotations[onward][step])
             hurries = max(hurries, float((turned / fastest).max()) / seconds[onward][step - 1])
@@ -127,9 +127,9 @@ def jump_in_time(
             if share >= 1.0:
                 continue
             if np.isinf(best):  # before this step it would leave the floor
-                best = min(high[step - 1], high[step]) + SITS
+                best = min(high[step - 1], high[step]) + SITS * size
             if high[step] > best and hurries <= HURRIES * share:
-                best, quicker = high[step] + HIGHER, (step, share)
+                best, quicker = high[step] + HIGHER * size, (step, share)
         out[onward][: quicker[0]] = quicker[1]
     return out
 

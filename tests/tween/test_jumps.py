@@ -89,6 +89,12 @@ def test_a_leap_of_a_given_duration_has_gravitys_too(ballet: Engine, seconds: fl
     check_leap(motion)
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.2, 0.4])
+def test_there_is_no_time_to_take_where_all_is_in_the_air(ballet: Engine, seconds: float) -> None:
+    motion = ballet.tween(leap(ballet, 0), leap(ballet, 2), duration=seconds, fps=FPS).motion
+    assert motion.times[-1] == pytest.approx(seconds)
+
+
 def test_who_gives_up_flight_gives_up_its_time(ballet: Engine) -> None:
     a = posture(ballet, 0)
     asked = {"duration": 2.4, "fps": FPS}
@@ -139,6 +145,17 @@ def test_a_walk_into_the_air_takes_as_long_as_the_fall_from_there(fastest: float
     turn = np.abs(np.diff(np.linspace(0.0, 1.0, SPLIT)))[jumps].sum() * 0.45 * np.pi
     assert turn / fall < HURRIES * fastest
     assert np.array_equal(timed(0.2, 1.0, in_air=(True, False), fastest=fastest), slow[::-1])
+
+
+def test_a_body_half_as_large_hurries_by_its_size() -> None:
+    """Falls of half the height take 1 / sqrt(2) of the time, from the same posture if legs need no more than that."""
+    half = replace(BODY, offsets=0.5 * BODY.offsets, tips=0.5 * BODY.tips)
+    poses, seconds, up = split(np.linspace(0.0, 1.0, SPLIT)), np.full(SPLIT - 1, 0.2), np.linspace(0.0, 1.0, SPLIT)
+    lows, in_air, fastest = np.array([0.0, 1.0]), np.array([False, True]), np.full(len(BODY), 9.0)
+    large = jump_in_time(BODY, poses, seconds, up, lows, in_air, fastest)
+    small = jump_in_time(half, poses, seconds, 0.5 * up, 0.5 * lows, in_air, fastest)
+    np.testing.assert_allclose(small[large < 1.0], large[large < 1.0] / np.sqrt(2.0))
+    np.testing.assert_array_equal(small[large == 1.0], 1.0)
 
 
 def test_slower_legs_leave_the_floor_farther_apart() -> None:
