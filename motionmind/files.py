@@ -296,7 +296,7 @@ def _remove_leftovers(folder: Path) -> None:
 def make_room(purpose: str) -> Path:
     """Return a new folder among the system's temporary ones, which others may not read.
 
-    What processes that were killed left of the same purpose, a word, is removed.
+    What processes that were killed left of the same purpose, a word, is removed after a day.
     """
     import shutil
     import tempfile
@@ -307,7 +307,9 @@ def make_room(purpose: str) -> Path:
         for entry in os.scandir(room.parent):
             if (parts := rooms.fullmatch(entry.name)) and not _runs(int(parts[1])):
                 with suppress(OSError):
-                    if entry.is_dir(follow_symlinks=False) and entry.stat(follow_symlinks=False).st_uid == own:
+                    found = entry.stat(follow_symlinks=False)
+                    # It may run where numbers of processes are others, and see the same folder.
+                    if stat.S_ISDIR(found.st_mode) and found.st_uid == own and time.time() - found.st_mtime > _DAY:
                         shutil.rmtree(entry.path)
     return room
 

@@ -25,7 +25,6 @@ from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.detail import detail_of, likest_moves, moves_near, share_of_detail
 from motionmind.realise.expectation import Expectation, expect
-from motionmind.realise.feet import KNEE
 from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
@@ -138,9 +137,9 @@ def realise(
     if length is None and fastest is not None:
         missing = (b.root - a.root) / size - travel.sum(axis=0)
         longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
-    if "flight" not in without:
-        longer = _with_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, fastest, length)
-    if length is None or longer.min() < 1.0:
+    if length is None:
+        if fastest is not None and "flight" not in without:
+            longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, pace * fastest)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
     smooth, quick = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
@@ -242,7 +241,7 @@ def _stance(walk: Expectation, carriage: Carriage, travel: Floats, size: float, 
     )
 
 
-def _with_jumps(
+def _for_jumps(
     walk: Expectation,
     longer: Floats,
     corpus: Corpus,
@@ -250,10 +249,9 @@ def _with_jumps(
     stance: Stance,
     low: Mapping[int, float],
     moving: tuple[bool, bool],
-    fastest: Floats | None,
-    length: float | None,
+    fastest: Floats,
 ) -> Floats:
-    """Return how many times longer each half step is to take [2 T], where jumps into given postures keep to gravity.
+    """Return how many times as long each half step is to take [2 T] for jumps into given postures (`jump_in_time`).
 
     Args:
         walk: the movement at its half steps.
@@ -263,23 +261,19 @@ def _with_jumps(
         stance: how the corpus's bodies hold themselves along the walk.
         low: height of the lowest point of the given postures, metres, by the number of the walk's moves to there.
         moving: whether the first and the last posture are passed at a given velocity.
-        fastest: speeds of the joints first [J], rad/s; None for as fast as knees bend.
-        length: how long all of it takes whatever it does, seconds; None for as long as it comes to.
+        fastest: speeds of the joints first [J], rad/s.
     """
     in_air, above = ends_in_air(stance, low, size_of(skeleton))
     in_air &= ~np.array(moving)
     if not in_air.any():
-        return longer
+        return np.ones(len(longer))
+    first, *on_the_way, last = low
+    passed = (first, *on_the_way, last)
+    reach = 2 * (passed[1] - first), 2 * (last - passed[-2])
     seconds = longer * np.diff(walk.half_steps)
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
-    speeds = np.full(len(skeleton), KNEE) if fastest is None else fastest[: len(skeleton)]
-    quicker = jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, speeds)
-    out, jumps = longer * quicker, quicker < 1.0
-    if length is not None and jumps.all():
-        return longer
-    if length is not None:
-        out[~jumps] *= (length - seconds[jumps] @ quicker[jumps]) / seconds[~jumps].sum()
-    return out
+    speeds = fastest[: len(skeleton)]
+    return jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, reach, speeds)
 
 
 def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:

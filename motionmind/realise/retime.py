@@ -27,7 +27,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
-from motionmind.realise.flight import FALLING, HOVERS
+from motionmind.realise.flight import FALLING
 from motionmind.realise.knees import bell
 from motionmind.realise.timeline import Timeline, stretch
 
@@ -38,6 +38,7 @@ AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slo
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
 SLIGHT = 1e-3  # by which a clock is not worth slowing
+LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
 SITS = 0.1  # metres, of a person: a body that leaves the floor no lower than that under where it could is not hurried
 HIGHER = 0.02  # metres, of a person: what is no higher than that is not worth a longer fall
 HURRIES = 2.5  # times as fast as all but a hundredth of the corpus's moments: as joints may be in a leap
@@ -89,6 +90,7 @@ def jump_in_time(
     heights: Floats,
     low: Floats,
     in_air: Bools,
+    reach: tuple[int, int],
     fastest: Floats,
 ) -> Floats:
     """Return how many times as long each half step is to take [2 T], at most 1, so that jumps are from stretched legs.
@@ -104,6 +106,7 @@ def jump_in_time(
         heights: of the corpus's lowest points above the floor at the half steps [2 T + 1], metres.
         low: height of the lowest point above the floor in the first and in the last posture [2], metres.
         in_air: whether they are in the air, and how they are passed is not given [2].
+        reach: half steps from there to the next posture that is given.
         fastest: speeds of the joints, rad/s, that are not exceeded more than HURRIES times [J].
     """
     out, still = np.ones(len(seconds)), np.zeros((len(rotations), 3))
@@ -115,13 +118,14 @@ def jump_in_time(
         if not in_air[end]:
             continue
         # From the posture in the air on, or back.
-        high, takes, best, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, (0, 1.0)
-        for step in range(1, len(high)):
-            if heights[onward][step] < HOVERS * size:
+        high, takes, best, highest, hurries, quicker = standing[onward], 0.0, np.inf, 0.0, 0.0, (0, 1.0)
+        for step in range(1, reach[end] + 1):
+            if heights[onward][step] < LEFT * size:
                 break
             turned = rot.angle(rotations[onward][step - 1], rotations[onward][step])
             hurries = max(hurries, float((turned / fastest).max()) / seconds[onward][step - 1])
             takes += seconds[onward][step - 1]
+            highest = max(highest, high[step])
             rise = high[0] + low[end] - high[step]
             share = np.sqrt(2.0 * rise / GRAVITY) / takes if rise > 0.0 else np.inf
             if share >= 1.0:
@@ -130,7 +134,8 @@ def jump_in_time(
                 best = min(high[step - 1], high[step]) + SITS * size
             if high[step] > best and hurries <= HURRIES * share:
                 best, quicker = high[step] + HIGHER * size, (step, share)
-        out[onward][: quicker[0]] = quicker[1]
+        if high[quicker[0]] > highest - SITS * size:  # halfway down, legs would still be apart
+            out[onward][: quicker[0]] = quicker[1]
     return out
 
 

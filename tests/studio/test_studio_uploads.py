@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
 import subprocess
 import sys
 import tempfile
@@ -182,11 +183,15 @@ def test_a_studio_that_was_killed_leaves_nothing_for_long(tmp_path: Path, monkey
         (folder / "0").mkdir(parents=True)
         (folder / "0" / "upload.bvh").write_text("movement")
     (tmp_path / f"motionmind-studio-{int(dead.stdout)}-link").symlink_to(linked)
+    fresh = tmp_path / f"motionmind-studio-{int(dead.stdout)}-b2_"
+    fresh.mkdir()  # who runs elsewhere, and sees this folder, may have made it
+    os.utime(gone, (time.time() - 9e4,) * 2)
     first = Uploads()
     second = Uploads()
     folders = [one.folder(bring(one, "bends.score", TITLED.encode()).id) for one in (first, second)]
     assert not gone.exists()
     assert all((folder / "0" / "upload.bvh").exists() for folder in (stays, linked))
+    assert fresh.exists()
     assert all(folder.is_dir() for folder in folders)  # those who run keep theirs
     first.close()
     second.close()
