@@ -134,12 +134,12 @@ def realise(
     # All heights are of the body of `a`, which the motion is on; `b` may have stood on shorter legs.
     stance = _stance(walk, carriage, travel, size, given)
     longer = np.full(len(travel), slower)
-    if length is None and fastest is not None:
-        missing = (b.root - a.root) / size - travel.sum(axis=0)
-        longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
     if length is None:
-        if fastest is not None and "flight" not in without:
-            longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, pace * fastest)
+        if fastest is not None:
+            missing = (b.root - a.root) / size - travel.sum(axis=0)
+            longer *= keep_pace(walk, clock.frames, corpus, fastest, travel + missing / len(travel), moving)
+            if "flight" not in without:
+                longer *= _for_jumps(walk, longer, corpus, a.skeleton, stance, low, moving, pace * fastest)
         clock, half_steps = stretch(clock, walk.half_steps, longer, fps)
         walk, stance = walk._replace(half_steps=half_steps), stance._replace(half_steps=half_steps)
     smooth, quick = corpus.from_chains(walk.chains(corpus, clock.frames)), None if fastest is None else pace * fastest
@@ -267,13 +267,11 @@ def _for_jumps(
     in_air &= ~np.array(moving)
     if not in_air.any():
         return np.ones(len(longer))
-    first, *on_the_way, last = low
-    passed = (first, *on_the_way, last)
-    reach = 2 * (passed[1] - first), 2 * (last - passed[-2])
+    moves = [*low]
+    reach = 2 * (moves[1] - moves[0]), 2 * (moves[-1] - moves[-2])
     seconds = longer * np.diff(walk.half_steps)
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
-    speeds = fastest[: len(skeleton)]
-    return jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, reach, speeds)
+    return jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, reach, fastest[: len(skeleton)])
 
 
 def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:

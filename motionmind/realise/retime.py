@@ -1,4 +1,5 @@
-"""Retiming: a movement takes longer where something in it would be faster than the corpus's bodies usually are.
+"""Retiming: a movement takes longer where something in it would be faster than the corpus's bodies usually are, and a
+leap as long as the fall from where it begins (`jump_in_time`).
 
 How long a movement takes on the whole is settled before its path is known, and by the way from end to end alone. On the
 way a joint may go there and back. Where that would be faster than all but the corpus's fastest hundredth of moments,

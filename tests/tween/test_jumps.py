@@ -97,8 +97,7 @@ def test_a_leap_begins_after_the_posture_before_it() -> None:
 
 def test_who_gives_up_flight_gives_up_its_time(ballet: Engine) -> None:
     a = posture(ballet, 0)
-    asked = {"duration": 2.4, "fps": FPS}
-    plain = ballet.tween(a, in_place(leap(ballet, 1), a), without={"flight"}, **asked).motion  # type: ignore[arg-type]
+    plain = ballet.tween(a, in_place(leap(ballet, 1), a), without={"flight"}, duration=2.4, fps=FPS).motion
     assert plain.root[:, 1].min() < CROUCH
 
 
