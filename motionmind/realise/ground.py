@@ -37,7 +37,7 @@ from motionmind.realise.feet import (
 from motionmind.realise.flight import EVER, SURELY
 from motionmind.realise.knees import cover
 from motionmind.realise.minimal import departure
-from motionmind.realise.root import root_trajectory, stand
+from motionmind.realise.root import root_trajectory, stand, steps_easily
 
 SPREADS = 0.03, 0.04  # metres, standard deviation: how high walks are that stand at a given posture, and that are aloft
 LEAPS = 0.18  # metres above those that stand from which it is in the air, though no walk is
@@ -191,10 +191,11 @@ def _set_down(
     held = np.stack([np.interp(middles, half_steps, limb) for limb in stance.stands.T], axis=1)
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     clear = np.maximum(heights - floor, 0.0)
-    root = _with_rates(root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1]), times, rates)
-    root = stand(skeleton, rotations, root, heights)
-    root[0], root[-1] = ends
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
+    easily = steps_easily(_feet_above(skeleton, rotations, feet), fps)
+    root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1], easily)
+    root = stand(skeleton, rotations, _with_rates(root, times, rates), heights)
+    root[0], root[-1] = ends
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (aloft, stance.leaps))
     frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()
@@ -278,6 +279,13 @@ def _reach_floor(
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
+
+
+def _feet_above(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Floats:
+    """Return the height of each foot above the body's lowest point [N, feet], metres."""
+    still = np.zeros((len(rotations), 3))
+    low = lowest_height(skeleton, rotations, still)
+    return foot_heights(skeleton, rotations, still, feet) - low[:, None]
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:

@@ -8,11 +8,15 @@ from motionmind._typing import Floats
 from motionmind.body.contact import lowest_height
 from motionmind.body.limbs import limb_of_points
 from motionmind.body.skeleton import Skeleton
+from motionmind.realise.knees import smoothed
 
 GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen to 1/e
 SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
 WALKS = 0.3  # metres a second of missing travel that is made up evenly by half
 STARTS = 0.3  # seconds in which even travel starts and stops
+RAISED = 0.1, 0.25  # metres above the lowest point: from the second foot there on, a body travels less, and least
+LEAST = 0.3  # share of even travel that is left then: no dancer walks with a leg in the air
+GATHERS = 0.2  # seconds around within which travel changes so
 BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
 
 
@@ -25,6 +29,7 @@ def root_trajectory(
     a: Floats,
     b: Floats,
     seconds: float,
+    easily: Floats,
 ) -> Floats:
     """Return positions [N, 3] of the root, metres, from `a` to `b`; their heights are provisional, `stand` sets them.
 
@@ -32,7 +37,8 @@ def root_trajectory(
     `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p the motion of point p
     relative to the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to
     b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one multiplier l for all: the distance
-    missing to `b` is made up where the body stands least.
+    missing to `b` is made up where the body stands least. If it is far, it is made up evenly, where the body steps
+    `easily`.
 
     Args:
         skeleton: the body.
@@ -43,6 +49,7 @@ def root_trajectory(
         a: first position of the root [3], metres.
         b: last position of the root [3], metres.
         seconds: duration of the whole.
+        easily: how easily the body steps between frames [N - 1], from 0 to 1 (`steps_easily`).
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -54,10 +61,27 @@ def root_trajectory(
     fast = np.linalg.norm(missing) / seconds
     evenly = fast**2 / (fast**2 + WALKS**2)
     since = np.linspace(0.0, seconds, len(steps) + 2)[1:-1]
-    ramp = np.minimum(np.minimum(since, since[::-1]) / STARTS, 1.0)
+    ramp = easily * np.minimum(np.minimum(since, since[::-1]) / STARTS, 1.0)
     slack = (1.0 - evenly) * slack + evenly * ramp / ramp.sum()
     steps += slack[:, None] * missing
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+
+
+def steps_easily(above: Floats, fps: float) -> Floats:
+    """Return how easily a body steps between frames [N - 1], from LEAST to 1.
+
+    With one foot high up it would hop there.
+
+    Args:
+        above: height of each foot above the lowest point [N, feet], metres.
+        fps: frames a second.
+    """
+    if above.shape[1] < 2:
+        return np.ones(len(above) - 1)
+    low, high = RAISED
+    s = np.clip((np.sort(above, axis=1)[:, 1] - low) / (high - low), 0.0, 1.0)
+    easily = smoothed(1.0 - (1.0 - LEAST) * s * s * (3.0 - 2.0 * s), 0.5 * GATHERS, fps)
+    return np.asarray(0.5 * (easily[1:] + easily[:-1]))
 
 
 def stand(skeleton: Skeleton, rotations: Floats, root: Floats, clearance: Floats) -> Floats:

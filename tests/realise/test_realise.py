@@ -22,13 +22,15 @@ from motionmind.geometry import rotations as rot
 from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.grammar.transitions import Transitions, count_transitions
 from motionmind.learned.carriage import SLIDES, Carriage, learn_carriage
+from motionmind.realise.carrying import foot_heights
 from motionmind.realise.detail import GOES_OVER, LIVELIER, MISSES, detail_of, likest_moves, share_of_detail
 from motionmind.realise.expectation import Expectation
+from motionmind.realise.feet import find_free_feet
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.mean_walk import mean_rotations
 from motionmind.realise.realise import FIRMLY, LINGERS, realise
 from motionmind.realise.retime import HEADROOM, keep_pace
-from motionmind.realise.root import root_trajectory, stand
+from motionmind.realise.root import LEAST, root_trajectory, stand, steps_easily
 from motionmind.realise.timeline import Timeline, durations
 from motionmind.realise.walks import ANYWHERE, STRAIGHT_ON, squared_distances
 
@@ -71,7 +73,9 @@ def test_a_foot_that_stands_carries_the_body() -> None:
     rest[:, [stander.index("left_ankle"), stander.index("right_ankle")]] = rot.inv(sway)[:, None]
     feet = [stander.index("left_toes"), stander.index("right_toes")]
     seen = stander.positions(rest, np.zeros((30, 3)))[:, feet].mean(axis=1)
-    root = root_trajectory(stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1], 1.0)
+    root = root_trajectory(
+        stander, rest, np.zeros(30), np.ones((29, 6)), np.zeros((29, 3)), -seen[0], -seen[-1], 1.0, np.ones(29)
+    )
     np.testing.assert_allclose(root[:, [0, 2]], -seen[:, [0, 2]], atol=0.01)
     assert np.ptp(seen[:, 2]) > 0.1
 
@@ -98,7 +102,9 @@ def test_limbs_stand_the_less_the_faster_their_lowest_points_move() -> None:
 def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() -> None:
     motion, drift = walk(12), np.random.default_rng(0).normal(size=(11, 3))
     a, b = np.zeros(3), np.array([1.0, 0.0, -2.0])
-    flown = root_trajectory(human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0)
+    flown = root_trajectory(
+        human23(), motion.rotations, np.full(12, 3.0), np.ones((11, 6)), drift, a, b, 1.0, np.ones(11)
+    )
     missing = b - drift.sum(axis=0)
     added = np.diff(flown, axis=0) - drift
     share = added @ missing / (missing @ missing)
@@ -113,10 +119,39 @@ def test_in_the_air_a_body_travels_as_the_corpus_does_and_ends_where_it_is_to() 
 def test_a_little_way_that_is_missing_is_made_up_in_the_air_rather_than_on_the_floor() -> None:
     still, clearance = np.tile(rot.IDENTITY, (21, 23, 1)), np.where(np.arange(21) > 10, 1.0, 0.0)
     flown = root_trajectory(
-        human23(), still, clearance, np.ones((20, 6)), np.zeros((20, 3)), np.zeros(3), np.array([0.01, 0.0, 0.0]), 1.0
+        human23(),
+        still,
+        clearance,
+        np.ones((20, 6)),
+        np.zeros((20, 3)),
+        np.zeros(3),
+        np.array([0.01, 0.0, 0.0]),
+        1.0,
+        np.ones(20),
     )
     steps = np.diff(flown[:, 0])
     assert steps[:10].max() < 0.3 * steps[11:].min()
+
+
+def test_a_far_way_is_gone_where_both_feet_are_low() -> None:
+    """A leg that is raised for a while is no time to travel: on one leg the body would hop."""
+    dancer = human23()
+    raised = np.tile(rot.IDENTITY, (91, 23, 1))
+    raised[30:60, dancer.index("left_hip")] = rot.from_axis_angle([1.0, 0.0, 0.0], np.array(-1.4))
+    still = np.zeros((91, 3))
+    feet = foot_heights(dancer, raised, still, find_free_feet(dancer, np.zeros(23, dtype=bool)))
+    above = feet - lowest_height(dancer, raised, still)[:, None]
+    easily = steps_easily(above, 30.0)
+    assert easily.shape == (90,)
+    np.testing.assert_allclose(easily[[0, 15, 75, 89]], 1.0)
+    np.testing.assert_allclose(easily[35:55], LEAST)
+    np.testing.assert_allclose(steps_easily(above[:, ::-1], 30.0), easily)
+    np.testing.assert_array_equal(steps_easily(above[:, :1], 30.0), np.ones(90))
+    far = np.array([0.0, 0.0, 6.0])
+    root = root_trajectory(dancer, raised, still[:, 0], np.zeros((90, 6)), still[1:], still[0], far, 3.0, easily)
+    steps = np.diff(root[:, 2])
+    assert steps[36:54].max() < 0.4 * steps[[20, 70]].min()
+    np.testing.assert_allclose(root[-1], far, atol=1e-12)
 
 
 def test_each_half_step_is_slowed_as_much_as_its_fastest_joint_needs() -> None:
