@@ -7,7 +7,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from motionmind.notation.read import read_score, read_scores
 from motionmind.notation.score import Score
 
 _MOST = 60  # names in a message
+_POSTURES = 256  # that are kept
 _SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # as names of files end
 
 
@@ -155,7 +156,7 @@ class _CorpusCollection(Collection):
         return recorded | {clip.name: clip.about for score in self._all_scores for clip in score.clips}
 
     def posture(self, name: str) -> Posture:
-        return compose.posture(self._scores[name], name)
+        return _posture(self._scores[name], name)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         corpus = self._corpus
@@ -195,6 +196,12 @@ def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
         scores, files = read_scores(places)
         _kept[places] = _stamps(files), scores
     return _kept[places][1]
+
+
+@lru_cache(_POSTURES)
+def _posture(score: Score, name: str) -> Posture:
+    """Return a posture of a score that is kept; to bring its weight over its feet takes half as long as a tween."""
+    return compose.posture(score, name)
 
 
 def _stamps(files: Iterable[Path]) -> _Stamps:
