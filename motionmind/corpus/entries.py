@@ -7,6 +7,7 @@ every clip is where it starts and what it counts, and that is in the columns.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
 
 import msgspec
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from motionmind.corpus.corpus import Clip
 
 _Kind = TypeVar("_Kind")
+
+KEPT = 4096  # entries that were read lately: one tween asks for the same ones hundreds of times
 
 
 class Packed(NamedTuple):
@@ -50,6 +53,7 @@ class Entries(Sequence[_Kind]):
     def __init__(self, packed: Packed, kind: type[_Kind]) -> None:
         self._text, self._lines = packed
         self._decoder = msgspec.json.Decoder(kind)
+        self._lately = lru_cache(KEPT)(self._read)
 
     def __len__(self) -> int:
         return len(self._lines) - 1
@@ -62,7 +66,7 @@ class Entries(Sequence[_Kind]):
 
     def __getitem__(self, index: int | slice) -> _Kind | tuple[_Kind, ...]:
         numbers = range(len(self))[index]
-        return self._read(numbers) if isinstance(numbers, int) else tuple(map(self._read, numbers))
+        return self._lately(numbers) if isinstance(numbers, int) else tuple(map(self._read, numbers))
 
     def __iter__(self) -> Iterator[_Kind]:
         return map(self._read, range(len(self)))
