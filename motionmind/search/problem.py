@@ -219,11 +219,15 @@ def _costs_to_go(model: Model, goal: Ints, moves: int, timed: Floats) -> Floats:
             arrived = value[k - 1, first:last] + model.alone[first:last]
             if len(timed) > 0:
                 arrived += timed[moves - k + 1, first:last]
+            if k > 1:
+                arrived[~model.allowed[first:last]] = np.inf
             for row in range(first, last):
-                best = np.inf
-                for e in range(model.indptr[row], model.indptr[row + 1]):
-                    target = model.targets[e]
-                    if k == 1 or model.allowed[first + target]:
-                        best = min(best, model.costs[e] + arrived[target])
-                value[k, row] = best
+                least, other = np.inf, np.inf  # of every other edge, for the next need not wait for the one before
+                end = model.indptr[row + 1]
+                for e in range(model.indptr[row], end - 1, 2):
+                    least = min(least, model.costs[e] + arrived[model.targets[e]])
+                    other = min(other, model.costs[e + 1] + arrived[model.targets[e + 1]])
+                if (end - model.indptr[row]) % 2:
+                    least = min(least, model.costs[end - 1] + arrived[model.targets[end - 1]])
+                value[k, row] = min(least, other)
     return value
