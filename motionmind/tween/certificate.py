@@ -69,7 +69,7 @@ def break_down_cost(
     probability = np.exp(-graph.weights("conditional"))
     shape = (len(path) - 1, len(grammar.chains))
     moves, together, likelihood, guide = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    timed = problem.timed_costs(len(path) - 1)
+    edges, timed = graph.edges(at), problem.timed_costs(len(path) - 1)
     if timed is not None:
         guide[:] = np.take_along_axis(timed[1:], problem.model.starts[:-1] + path[1:], axis=1)
     for t, chain in np.ndindex(*shape):
@@ -79,8 +79,7 @@ def break_down_cost(
         moves[t, chain] = held.costs[first + np.searchsorted(held.targets[first:last], after)]
         if parent >= 0:
             together[t, chain] = factor * network.cost(chain, int(path[t + 1, parent]), after, held.starts)
-        edge = graph.edge(chain, int(at[t, chain]), int(at[t + 1, chain]))
-        likelihood[t, chain] = probability[edge] if edge >= 0 else 0.0
+        likelihood[t, chain] = probability[edges[t, chain]] if edges[t, chain] >= 0 else 0.0
     orientations = space.decode(at)
     degrees = np.degrees(rot.angle(orientations[:-1], orientations[1:]))
     names = tuple(tuple(space.label(chain, int(state)) for chain, state in enumerate(row)) for row in at)
@@ -172,10 +171,10 @@ def trace_path(
     """
     graph = grammar.transitions
     bridges, waits, sources = [], [], []
-    for move, (before, after) in enumerate(pairwise(path)):
+    for move, ((before, after), edges) in enumerate(zip(pairwise(path), graph.edges(path), strict=True)):
         row: list[Source | None] = []
         for chain, joint in enumerate(grammar.chains):
-            edge = graph.edge(chain, before[chain], after[chain])
+            edge = edges[chain]
             seen = (int(graph.attests[edge]), int(graph.arrives[edge])) if edge >= 0 else None
             row.append(source_of(corpus, *seen, joint) if seen else None)
             holds_goal = before[chain] == after[chain] == path[-1, chain]
