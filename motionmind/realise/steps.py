@@ -14,8 +14,14 @@ from motionmind.jit import jit
 
 
 @jit
-def _edges(numbers: Ints, first: int, last: int, wanted: int) -> int:
-    """Return which of rising numbers, from the first up to the last, is the wanted one; -1 for none."""
+def _edges(numbers: Ints, first: int, last: int, wanted: int, beside: int) -> int:
+    """Return which of rising numbers, from the first up to the last, is the wanted one; -1 for none.
+
+    Those on both sides of one that was found last are tried first: steps follow one another.
+    """
+    for near in (beside + 1, beside - 1):
+        if first <= near < last and numbers[near] == wanted:
+            return near
     stop = last
     while first < last:
         middle = (first + last) // 2
@@ -44,7 +50,7 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
     """Return moments and those to which so many steps lead from them; or from which they lead there, if not `ahead`."""
     moves = len(begins) // 2
     turns = _backward(begins, ends, moves)
-    out = [0][:0]
+    out, found = [0][:0], 0
     for moment in moments:
         here = [int(moment)]
         for _ in range(steps):
@@ -55,9 +61,10 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
                     continue
                 for first, last in ((0, turns), (turns, moves)):
                     numbers = begins[:moves] if ahead else ends[moves:]
-                    move = _edges(numbers, first, last, one)
+                    move = _edges(numbers, first, last, one, found)
                     if move >= 0:
                         on.append(postures + move)
+                        found = move
             here = on
             out.extend(on)
     return np.array(out, np.int64)
@@ -70,7 +77,7 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
     moves = len(begins) // 2
     turns = _backward(begins, ends, moves)
     at, other, steps = np.empty((3, 2 * len(moments)), np.int64)
-    count = 0
+    count = found = 0
     for k in range(len(moments)):
         one = moments[k]
         if one >= postures:
@@ -79,8 +86,9 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
             count += 1
             continue
         for first, last in ((0, turns), (turns, moves)):
-            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one)
+            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one, found)
             if move >= 0:
+                found = move
                 at[count], other[count], steps[count] = k, postures + move, move + (0 if ahead else moves)
                 count += 1
     return at[:count], other[:count], steps[:count]
