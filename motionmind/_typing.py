@@ -11,6 +11,7 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
 Int16s = NDArray[np.int16]
+Int8s = NDArray[np.int8]
 Indices = NDArray[np.intp]
 Pixels = NDArray[np.uint8]  # RGB [H, W, 3], or what else is told by bytes
 Bytes = NDArray[np.uint8]  # text, UTF-8 [B]

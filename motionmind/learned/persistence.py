@@ -276,6 +276,8 @@ def _array_names(kind: type[_Part]) -> list[str]:
 def _trees(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton) -> Neighbours | None:
     """Return the trees over a corpus's moments; None where it has none."""
     own = {name.partition(".")[2]: array for name, array in arrays.items() if name in TREES}
+    if own:
+        own.setdefault("codes", np.zeros(0, np.int8))
     return Neighbours(parts_of(skeleton), **own) if own else None
 
 

@@ -106,6 +106,7 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.centres": _Form("f4", "D joints 4", -2.0, 2.0),
     "neighbours.radii": _Form("f8", "parts D", 0.0),
     "neighbours.weights": _Form("f8", "parts D", 0.0, 1e15),
+    "neighbours.codes": _Form("i1", "codes"),
 }
 
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
@@ -245,10 +246,14 @@ def _check_carriage(arrays: Mapping[str, NDArray[Any]], postures: int, moves: in
 
 def _check_trees(arrays: Mapping[str, NDArray[Any]]) -> None:
     """Check the trees over a corpus's moments."""
-    if missing := next((name for name in TREES if name not in arrays), None):
+    codes = "neighbours.codes"  # which the first versions that had trees did not keep
+    if missing := next((name for name in TREES if name not in arrays and name != codes), None):
         raise ValueError(f"lists no array {missing}")
     order, ranks = arrays["neighbours.order"], arrays["neighbours.ranks"]
     count = order.shape[1]
+    numbers = 4 * count * arrays["neighbours.centres"].shape[1]
+    if codes in arrays and len(arrays[codes]) != numbers:
+        raise ValueError(f"{codes} is of the shape {[len(arrays[codes])]}, not {[numbers]}")
     for name in ("neighbours.order", "neighbours.ranks"):
         _check_range(name, arrays, count)
     if any((rank[own] != np.arange(count)).any() for rank, own in zip(ranks, order, strict=True)):

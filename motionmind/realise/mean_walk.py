@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from itertools import pairwise
@@ -20,7 +20,7 @@ from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.marginals import posterior_marginals
 from motionmind.realise.minimal import LASTS, departure, minimal_movement, trust
-from motionmind.realise.sparse import Chosen, all_of, choose
+from motionmind.realise.sparse import Chosen, all_of, choose, steps_on
 from motionmind.realise.stops import Rates, Stop
 from motionmind.realise.walks import (
     FOLLOWS_WITHIN,
@@ -36,7 +36,7 @@ from motionmind.realise.walks import (
 
 STRIDE = 0.5  # radians a joint that go with travelling as far as the body is tall; chosen on cmu-05 and cmu-16
 THREADS = min(4, os.cpu_count() or 1)  # in which parts of the body are worked on; results do not depend on it
-HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
+COUNTS = 1e-6  # the least weight that counts in a mean
 BUSY = 4000  # moments of a corpus that keep a thread busy: for fewer, another costs more than it saves
 
 
@@ -181,8 +181,8 @@ def _mean_between(
         each = map if pool is None else pool.map
         distances = [*each(off, np.array_split(passed, threads))] if trees is None else []
 
-        def walk(number: int) -> tuple[Chosen, Floats, float, float]:
-            part = parts[number]
+        def walk(number: int) -> tuple[Chosen, Floats, Floats, float, float]:
+            part, here = parts[number], shown
             if trees is None:
                 chosen = all_of(carriage, number)
                 own = distances[0][number] if threads == 1 else np.concatenate([of[number] for of in distances])
@@ -191,7 +191,7 @@ def _mean_between(
                 here = _taken(shown, np.asarray(chosen.moments), part)
                 to = np.ascontiguousarray(passed[:, part])
                 own = squared_distances(here, np.zeros((len(part), 1), dtype=np.int64), 1, to)[0]
-            return chosen, *_part_marginals(part, chosen, rates, ends, times, own)
+            return chosen, here, *_part_marginals(part, chosen, rates, ends, times, own)
 
         known = dict(zip(larger, each(walk, larger), strict=True))
 
@@ -203,20 +203,19 @@ def _mean_between(
                 walks = [*(known[n] for n in numbers[:-1]), mine]
                 about = np.ascontiguousarray(minimal[:, here])
                 if trees is None:
-                    weights = _mixed(*(marginals for _, marginals, *_ in walks))
+                    weights = _mixed(*(marginals for _, _, marginals, *_ in walks))
                     mean = mean_rotations(weights, shown, np.array(here), about)
                 else:
-                    weights = np.concatenate([size * one[1] for size, one in zip(SIZES, walks, strict=True)], axis=1)
-                    of = np.concatenate([chosen.moments for chosen, *_ in walks])
-                    mean = mean_rotations(weights, _taken(shown, of, np.array(here)), np.arange(len(here)), about)
+                    columns = [np.array([np.flatnonzero(parts[n] == joint)[0] for joint in here]) for n in numbers]
+                    mean = _mean_of_few([one[1:3] for one in walks], columns, about)
                 off = rot.log(rot.inv_mul(about, mean))
                 off = _without_ends(off, times, leaving is not None, arriving is not None)
-                trusted[here] = np.dot(SIZES, [trust_in_part for _, _, trust_in_part, _ in walks])
+                trusted[here] = np.dot(SIZES, [trust_in_part for *_, trust_in_part, _ in walks])
                 poses[:, here] = rot.mul(about, rot.exp(trusted[here, None] * off))
             return mine[-1]
 
         lost = [*each(move, sorted({numbers[-1] for numbers in groups})), *(one[-1] for one in known.values())]
-    moments = tuple((marginals, chosen.moments) for chosen, marginals, *_ in (known[0], known[1]))
+    moments = tuple((marginals, chosen.moments) for chosen, _, marginals, *_ in (known[0], known[1]))
     return _Walk(poses, moments, trusted, max(lost))
 
 
@@ -255,27 +254,8 @@ def _part_marginals(
             mass = chosen.weights @ near[-k]
             near[-k] *= chosen.near[k]
             left_out = max(left_out, 1.0 - float(chosen.weights @ near[-k] / mass))
-    marginals = posterior_marginals(*_steps_on(chosen, near[0]), chosen.clusters, chosen.weights, near)
+    marginals = posterior_marginals(*steps_on(chosen, near[0]), chosen.clusters, chosen.weights, near)
     return marginals, trust(nearest, _way(part, ends, float(times[-1] - times[0]))), left_out
-
-
-def _steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
-    """Return the steps of walks, as `posterior_marginals` takes them, of which some lead on from where walks begin.
-
-    Of many performances of a dance, all moments near its last posture end clips. Then walks stay where a clip ends for
-    a step, after which they may go over to another.
-
-    Args:
-        chosen: the moments, and the corpus's steps between them.
-        near: how likely walks begin in each moment [n].
-    """
-    if near[chosen.begins].max(initial=0.0) > HARDLY:
-        return chosen.begins, chosen.ends, chosen.shares
-    leads = np.zeros(len(near), dtype=np.bool_)
-    leads[chosen.begins] = True
-    ends = np.flatnonzero(~leads)
-    begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
-    return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
 def _way(part: Ints, ends: tuple[Stop, Stop], seconds: float) -> float:
@@ -306,6 +286,22 @@ def _rate_terms(part: Ints, rates: Rates | None, stop: Stop) -> list[Floats]:
         terms.append((rates.turn - stop.rates.turn) ** 2 / TURNS_WITHIN**2)
         terms.append(np.sum((rates.travel - stop.rates.travel) ** 2, axis=1) / TRAVELS_WITHIN**2)
     return terms
+
+
+def _mean_of_few(walks: Sequence[tuple[Floats, Floats]], columns: Sequence[Ints], about: Floats) -> Floats:
+    """Return `mean_rotations` over the walks of all three sizes; of moments that hardly count nothing is read.
+
+    Args:
+        walks: of each size the orientations of the moments' parts [n, p, 4], and the marginals [S + 1, n].
+        columns: which of these joints the mean is of [m], for each size.
+        about: as for `mean_rotations`.
+    """
+    weights, shown = [], []
+    for size, (orientations, marginals), own in zip(SIZES, walks, columns, strict=True):
+        counts = np.flatnonzero(size * marginals.max(axis=0) >= COUNTS)
+        weights.append(size * marginals[:, counts])
+        shown.append(_taken(orientations, counts, own))
+    return mean_rotations(np.concatenate(weights, axis=1), np.concatenate(shown), np.arange(about.shape[1]), about)
 
 
 @jit
@@ -360,7 +356,7 @@ def mean_rotations(weights: Floats, orientations: Floats, joints: Ints, about: F
     counted = np.zeros((moments + -moments % 4, count))
     for i in range(moments):
         for t in range(count):
-            counted[i, t] = weights[t, i] if weights[t, i] >= 1e-6 else 0.0
+            counted[i, t] = weights[t, i] if weights[t, i] >= COUNTS else 0.0
     near, sums, signed, shown = np.empty((4, count)), np.empty((4, count)), np.empty((4, count)), np.empty((4, 4))
     for j in range(len(joints)):
         near[:] = about[:, j].T

@@ -4,9 +4,9 @@ The sums over all walks (`motionmind.realise.marginals`) take time in proportion
 are taken over a few thousand moments, which are found by the tree of the part (`motionmind.learned.neighbours`):
 
 - those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
-  the last, where walks end, and those that lead there; those nearest to each posture of a path to follow;
-- for all others, one moment of each of a few hundred balls into which the tree is cut: they are the smaller, the nearer
-  to the path that walks are to follow.
+  the last, where walks end, and those that lead there; those nearest to every other posture of a path to follow, and
+  those that follow on them up to the next;
+- for all others, one moment of each of a few hundred balls into which the tree is cut.
 
 What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
 the weights add up to those of the corpus. A step to a moment that is not chosen leads to one that stands for its ball:
@@ -21,20 +21,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motionmind._typing import Bools, Floats, Int32s, Ints, Singles
-from motionmind.geometry.distances import squared_distance
+from motionmind._typing import Bools, Floats, Int32s, Ints
 from motionmind.jit import jit
 from motionmind.learned.carriage import Carriage
-from motionmind.learned.neighbours import INSIDE, Neighbours, find_near
+from motionmind.learned.neighbours import Neighbours, find_near
 from motionmind.realise.steps import follow, steps_at
-from motionmind.realise.walks import FOLLOWS_WITHIN
 
-SPLITS = 640  # balls that are cut in two
-ENDS = 96  # moments near each end, with those that follow on them or lead to them
+SPLITS = 384  # balls that are cut in two
+ENDS = 64  # moments near each end, with those that follow on them or lead to them
 ALONG = 8  # steps for which these are followed
-NEAREST, BY_PATH = 24, 16  # of those at the ends, that are followed half the way; moments near each posture of a path
+NEAREST = 24  # of those at the ends, that are followed half the way
+BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
 PATH_LEAVES = 12  # of a tree that are searched for these
-EVERYWHERE = 0.01  # of what following a path counts, what any ball does
+HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 
 
 class Chosen(NamedTuple):
@@ -78,12 +77,9 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
         steps: of a walk.
     """
     near, *runs = _near_ends(carriage, number, ends.tobytes())
-    by_path = near[:, :0]
-    if path is None:
-        nodes = _evenly(trees, number)
-    else:
-        by_path, _ = find_near(trees, number, carriage.orientations, path, BY_PATH, PATH_LEAVES)
-        nodes = _nodes(trees, number, path)
+    by_path, nodes = near[:, :0], _balls(trees, number)
+    if path is not None:
+        by_path = find_near(trees, number, carriage.orientations, path[::2], BY_PATH, PATH_LEAVES)
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
     runs.append(follow(by_path.ravel(), True, 2, *chain))
     runs += [follow(end[:NEAREST], on, steps // 2 + 1, *chain) for end, on in zip(near, (True, False), strict=True)]
@@ -103,26 +99,40 @@ def choose(trees: Neighbours, number: int, carriage: Carriage, ends: Floats, pat
     )
 
 
+def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return the steps of walks, as `posterior_marginals` takes them, of which some lead on from where walks begin.
+
+    Of many performances of a dance, all moments near its last posture end clips. Then walks stay where a clip ends for
+    a step, after which they may go over to another.
+
+    Args:
+        chosen: the moments, and the corpus's steps between them.
+        near: how likely walks begin in each moment [n].
+    """
+    if near[chosen.begins].max(initial=0.0) > HARDLY:
+        return chosen.begins, chosen.ends, chosen.shares
+    leads = np.zeros(len(near), dtype=np.bool_)
+    leads[chosen.begins] = True
+    ends = np.flatnonzero(~leads)
+    begins, goals = (np.concatenate([of, ends]) for of in (chosen.begins, chosen.ends))
+    return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
+
+
 @lru_cache(maxsize=18)  # of all parts; the guide of a search and its motion ask for the same
 def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
     """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
     the last, some steps on; `ends` are the bytes of those of `choose`."""
     assert carriage.trees is not None
     postures = np.frombuffer(ends).reshape(2, -1, 4)
-    near, _ = find_near(carriage.trees, number, carriage.orientations, postures, ENDS)
+    near = find_near(carriage.trees, number, carriage.orientations, postures, ENDS)
     chain = carriage.begins, carriage.ends, len(carriage.orientations) - len(carriage.turn)
     return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
 
 
 @lru_cache(maxsize=9)
-def _evenly(trees: Neighbours, number: int) -> Ints:
-    """Return the balls that a part's tree is cut into where there is no path to follow."""
-    return _nodes(trees, number, np.empty((0, max(int(part.max()) for part in trees.parts) + 1, 4)))
-
-
-def _nodes(trees: Neighbours, number: int, path: Floats) -> Ints:
-    own = np.ascontiguousarray(path[:, trees.parts[number]])
-    return _cut(own, trees.bounds, trees.centres_of(number), trees.radii[number], trees.weights[number])
+def _balls(trees: Neighbours, number: int) -> Ints:
+    """Return the nodes of the balls that a part's tree is cut into, in its order [B]."""
+    return _cut(trees.bounds, trees.radii[number], trees.weights[number])
 
 
 def _rising(numbers: Ints) -> Ints:
@@ -190,12 +200,11 @@ def _goals(moments: Ints, leads: Ints, starts: Int32s, stands: Ints, ranks: Int3
 
 
 @jit
-def _cut(path: Floats, bounds: Int32s, centres: Singles, radii: Floats, weights: Floats) -> Ints:
-    """Cut a tree into balls that are the smaller, the more they matter: return their nodes in its order [n].
+def _cut(bounds: Int32s, radii: Floats, weights: Floats) -> Ints:
+    """Cut a tree into balls, of which none is much wider or heavier: return their nodes in its order [n].
 
     Args:
-        path: the part in the postures to follow [K, m, 4].
-        bounds, centres, radii, weights: of the nodes.
+        bounds, radii, weights: of the nodes.
     """
     heap, leaves = [(-1.0, 0)], [0][:0]
     for _ in range(SPLITS):
@@ -206,11 +215,7 @@ def _cut(path: Floats, bounds: Int32s, centres: Singles, radii: Floats, weights:
             leaves.append(node)
             continue
         for child in (2 * node + 1, 2 * node + 2):
-            worth = EVERYWHERE
-            for k in range(len(path)):
-                away = np.sqrt(squared_distance(centres[child], path[k]) / path.shape[1])
-                worth += np.exp(-(max(away - INSIDE * radii[child], 0.0) ** 2) / (2.0 * FOLLOWS_WITHIN**2))
-            heapq.heappush(heap, (-weights[child] * worth * radii[child] ** 2, child))
+            heapq.heappush(heap, (-weights[child] * radii[child] ** 2, child))
     for _, node in heap:
         leaves.append(node)
     nodes = np.array(leaves, np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,21 +56,37 @@ def test_children_halve_their_parents() -> None:
             assert abs((middle - first) - (last - middle)) <= 1
 
 
-def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(engine: Engine, trees: Neighbours) -> None:
+@pytest.mark.parametrize("coded", [True, False])
+def test_in_all_leaves_the_nearest_are_found_and_in_a_few_nearly(
+    engine: Engine, trees: Neighbours, coded: bool
+) -> None:
     rng, shown = np.random.default_rng(0), engine.carriage.orientations
+    if not coded:
+        trees = replace(trees, codes=trees.codes[:0])
     leaves, nearly = len(trees.bounds) // 2 + 1, []
     for number, part in enumerate(trees.parts):
         for _ in range(4):
             posture = rot.mul(shown[rng.integers(len(shown))], rot.exp(rng.normal(0.0, 0.1, (shown.shape[1], 3))))
-            off = np.sort(distances(engine, part, posture[part]))
-            found, squared = find_near(trees, number, shown, posture[None], 50, leaves)
+            off = np.sqrt(distances(engine, part, posture[part]))
+            found = find_near(trees, number, shown, posture[None], 50, leaves)
             assert found.shape == (1, 50)
-            np.testing.assert_allclose(squared[0], off[:50], atol=1e-12)
-            few, nearest = find_near(trees, number, shown, posture[None], len(shown), leaves // 8)
+            assert len(np.unique(found)) == 50
+            np.testing.assert_allclose(off[found[0]], np.sort(off)[:50], atol=0.02 if coded else 1e-5)
+            few = find_near(trees, number, shown, posture[None], len(shown), leaves // 8)
             assert few.shape[1] <= leaves // 8 * LEAF
-            nearly.append(np.sqrt(nearest[0, 0] / off[0]))
+            nearly.append(off[few[0, 0]] / off.min())
     assert np.median(nearly) < 1.01
     assert np.quantile(nearly, 0.9) < 1.5
+
+
+def test_codes_are_of_what_the_moments_of_each_leaf_show(engine: Engine, trees: Neighbours) -> None:
+    for number, part in enumerate(trees.parts):
+        for start, stop in trees.bounds[len(trees.bounds) // 2 :]:
+            shown = engine.carriage.orientations[trees.order[number, start:stop]][:, part]
+            codes = trees.codes_of(number)[4 * len(part) * start : 4 * len(part) * stop]
+            np.testing.assert_allclose(
+                codes.reshape(-1, stop - start).T / 127.0, shown.reshape(len(shown), -1), atol=4e-3
+            )
 
 
 def test_postures_near_one_are_no_middles_of_moves(engine: Engine, trees: Neighbours) -> None:
@@ -97,3 +114,23 @@ def test_trees_are_kept_with_the_corpus_and_checked(engine: Engine, trees: Neigh
         with pytest.raises(FormatError, match=r"neighbours\.\w+ .*corpus build"):
             persistence.load(str(folder))
         file.write_bytes(whole)
+
+
+def test_a_corpus_that_keeps_no_codes_is_searched_by_its_orientations(
+    engine: Engine, trees: Neighbours, tmp_path: Path
+) -> None:
+    learned, folder = replace(engine, carriage=replace(engine.carriage, trees=trees)), tmp_path / "large"
+    persistence.save(learned, folder)
+    manifest = json.loads((folder / store.MANIFEST).read_bytes())
+    size = manifest["arrays"].pop("neighbours.codes")
+    (folder / store.MANIFEST).write_text(json.dumps(manifest))
+    loaded = persistence.load(str(folder)).carriage
+    assert loaded.trees is not None
+    assert len(loaded.trees.codes) == 0
+    posture = loaded.orientations[7]
+    assert postures_near(loaded.trees, loaded.orientations, posture, 5, len(engine.corpus))[0] == 7
+    manifest["arrays"]["neighbours.codes"] = [size[0], size[1] - 1]
+    np.save(store.load(folder).place / "neighbours.codes.npy", trees.codes[1:])
+    (folder / store.MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(FormatError, match=r"neighbours\.codes is of the shape"):
+        persistence.load(str(folder))
