@@ -9,7 +9,7 @@ Bodies have so many joints that balls overlap, and a search that is to be certai
 them. This one looks at a fixed number of leaves, those first whose nearest moment is likely to be nearest.
 
 What a leaf's moments show of the part lies together, a byte a number: a leaf is read in one piece, where the moments'
-own orientations are somewhere else each. Of these bytes distances are off by a hundredth of a radian a joint at most.
+own orientations are somewhere else each. By these bytes distances are off by about a hundredth of a radian a joint.
 
 All parts' trees halve the same numbers of moments, so one table says where nodes begin and end: node n has the children
 2 n + 1 and 2 n + 2, and a node of the last level is a leaf.
