@@ -7,7 +7,6 @@ every clip is where it starts and what it counts, and that is in the columns.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
 
 import msgspec
@@ -53,7 +52,7 @@ class Entries(Sequence[_Kind]):
     def __init__(self, packed: Packed, kind: type[_Kind]) -> None:
         self._text, self._lines = packed
         self._decoder = msgspec.json.Decoder(kind)
-        self._lately = lru_cache(KEPT)(self._read)
+        self._lately: dict[int, _Kind] = {}
 
     def __len__(self) -> int:
         return len(self._lines) - 1
@@ -66,7 +65,14 @@ class Entries(Sequence[_Kind]):
 
     def __getitem__(self, index: int | slice) -> _Kind | tuple[_Kind, ...]:
         numbers = range(len(self))[index]
-        return self._lately(numbers) if isinstance(numbers, int) else tuple(map(self._read, numbers))
+        if not isinstance(numbers, int):
+            return tuple(map(self._read, numbers))
+        kept = self._lately  # another thread may begin a new one
+        if numbers not in kept:
+            if len(kept) >= KEPT:
+                kept = self._lately = {}
+            kept[numbers] = self._read(numbers)
+        return kept[numbers]
 
     def __iter__(self) -> Iterator[_Kind]:
         return map(self._read, range(len(self)))

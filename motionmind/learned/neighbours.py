@@ -9,7 +9,8 @@ Bodies have so many joints that balls overlap, and a search that is to be certai
 them. This one looks at a fixed number of leaves, those first whose nearest moment is likely to be nearest.
 
 What a leaf's moments show of the part lies together, a byte a number: a leaf is read in one piece, where the moments'
-own orientations are somewhere else each. By these bytes distances are off by about a hundredth of a radian a joint.
+own orientations are scattered over gigabytes. By these bytes distances of near moments are off by about a hundredth of
+a radian a joint.
 
 All parts' trees halve the same numbers of moments, so one table says where nodes begin and end: node n has the children
 2 n + 1 and 2 n + 2, and a node of the last level is a leaf.
@@ -53,9 +54,8 @@ class Neighbours:
         centres: centres of the nodes, one part's joints after another's [K, W, 4].
         radii: their radii [P, K], radians.
         weights: sums of their moments' weights [P, K].
-        codes: orientations of each part's moments, in 127ths, one part after another and leaf after leaf; of a leaf of
-            n moments one number of one joint after another, for all of them [m * 4 * n]. None of corpora that were
-            learned before these were kept.
+        codes: orientations of each part's moments, in 127ths, one part after another and leaf after leaf; a leaf of n
+            moments and m joints has 4 m rows of n numbers. Empty in corpora that were learned before these were kept.
     """
 
     parts: tuple[Ints, ...]
@@ -69,8 +69,9 @@ class Neighbours:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays, by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "parts"}
+        """The arrays that there are, by name."""
+        names = [field.name for field in fields(self) if field.name != "parts"]
+        return {name: getattr(self, name) for name in names if name != "codes" or len(self.codes)}
 
     def centres_of(self, number: int) -> Singles:
         """Return the centres of the nodes of a part's tree [K, m, 4]."""

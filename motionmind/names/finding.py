@@ -20,11 +20,11 @@ from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggest
 from motionmind.formats import read_motion
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
 from motionmind.notation import compose
-from motionmind.notation.read import read_score, read_scores
+from motionmind.notation.read import read_scores
 from motionmind.notation.score import Score
 
 _MOST = 60  # names in a message
-_POSTURES = 256  # that are kept
+_POSTURES = 64  # that are kept, each with its whole score
 _SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # as names of files end
 
 
@@ -88,7 +88,7 @@ class _ScoreCollection(Collection):
 
     def __init__(self, path: str, home: Path | None) -> None:
         super().__init__(path)
-        self._score = read_score(locate_score(path, home))
+        (self._score,) = _read_once((locate_score(path, home),))
         self._clips = {clip.name: clip for clip in self._score.clips}
 
     @property
@@ -100,7 +100,7 @@ class _ScoreCollection(Collection):
         return {name: clip.about for name, clip in self._clips.items()}
 
     def posture(self, name: str) -> Posture:
-        return compose.posture(self._score, name)
+        return _posture(self._score, name)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         return compose.motions(self._score, [self._clips[name] for name in names])

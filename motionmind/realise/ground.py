@@ -192,7 +192,7 @@ def _set_down(
     drifts = np.diff(natural_spline(half_steps, places, times), axis=0)
     clear = np.maximum(heights - floor, 0.0)
     fps, feet = 1.0 / (times[1] - times[0]), find_free_feet(skeleton, fixed)
-    easily = steps_easily(_feet_above(skeleton, rotations, feet), fps)
+    easily = steps_easily(foot_heights(skeleton, rotations, np.zeros((len(times), 3)), feet), fps)
     root = root_trajectory(skeleton, rotations, clear, held, drifts, *ends, times[-1], easily)
     root = stand(skeleton, rotations, _with_rates(root, times, rates), heights)
     root[0], root[-1] = ends
@@ -279,13 +279,6 @@ def _reach_floor(
     planted = bend_legs(skeleton, posed, feet, eased, np.zeros(soft.shape))
     out[1:-1, joints] = within_limits(skeleton, planted, rotations[[0, -1]], loose, joints)[1:-1, joints]
     return out, root + shift
-
-
-def _feet_above(skeleton: Skeleton, rotations: Floats, feet: list[Foot]) -> Floats:
-    """Return the height of each foot above the body's lowest point [N, feet], metres."""
-    still = np.zeros((len(rotations), 3))
-    low = lowest_height(skeleton, rotations, still)
-    return foot_heights(skeleton, rotations, still, feet) - low[:, None]
 
 
 def _with_rates(root: Floats, times: Floats, rates: tuple[Floats | None, Floats | None]) -> Floats:

@@ -14,9 +14,9 @@ GRIP = 0.015  # metres above the floor at which a foot's hold on it has fallen t
 SLIP = 0.15  # weight of the corpus's own travel, that of a standing foot being 1
 WALKS = 0.3  # metres a second of missing travel that is made up evenly by half
 STARTS = 0.3  # seconds in which even travel starts and stops
-RAISED = 0.1, 0.25  # metres above the lowest point: from the second foot there on, a body travels less, and least
+RAISED = 0.1, 0.25  # metres by which the second foot is above the first: from there a body travels less, and least
 LEAST = 0.3  # share of even travel that is left then: no dancer walks with a leg in the air
-GATHERS = 0.2  # seconds around within which travel changes so
+GATHERS = 0.2  # seconds over which travel becomes less, and more again
 BEARS = 4  # a limb bears the body by this power of how much it stands: of two feet, mostly the one that stands firmer
 
 
@@ -37,8 +37,8 @@ def root_trajectory(
     `drift`: the displacements v minimise sum_p w_p |v + v_p|^2 + SLIP |v - drift|^2, with v_p the motion of point p
     relative to the root and w_p = exp(-height / GRIP) stands^BEARS of its limb, under the condition that they add up to
     b - a. So v = (SLIP drift - sum_p w_p v_p + l) / (SLIP + sum_p w_p), with one multiplier l for all: the distance
-    missing to `b` is made up where the body stands least. If it is far, it is made up evenly, where the body steps
-    `easily`.
+    missing to `b` is made up where the body stands least; if it is far, in proportion to `easily`, but for its start
+    and its end.
 
     Args:
         skeleton: the body.
@@ -49,7 +49,7 @@ def root_trajectory(
         a: first position of the root [3], metres.
         b: last position of the root [3], metres.
         seconds: duration of the whole.
-        easily: how easily the body steps between frames [N - 1], from 0 to 1 (`steps_easily`).
+        easily: how easily the body steps between frames [N - 1], from LEAST to 1 (`steps_easily`).
     """
     points = skeleton.positions_and_tips(rotations, np.zeros((len(rotations), 3)))
     height = points[..., 1] - points[..., 1].min(axis=-1, keepdims=True) + clearance[:, None]
@@ -67,19 +67,18 @@ def root_trajectory(
     return np.asarray(a + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 
-def steps_easily(above: Floats, fps: float) -> Floats:
-    """Return how easily a body steps between frames [N - 1], from LEAST to 1.
-
-    With one foot high up it would hop there.
+def steps_easily(heights: Floats, fps: float) -> Floats:
+    """Return how easily a body steps between frames [N - 1], from LEAST to 1: with one foot high up it would hop.
 
     Args:
-        above: height of each foot above the lowest point [N, feet], metres.
+        heights: of each foot's lowest point, above any floor [N, feet], metres.
         fps: frames a second.
     """
-    if above.shape[1] < 2:
-        return np.ones(len(above) - 1)
+    if heights.shape[1] < 2:
+        return np.ones(len(heights) - 1)
+    first, second = np.sort(heights, axis=1)[:, :2].T
     low, high = RAISED
-    s = np.clip((np.sort(above, axis=1)[:, 1] - low) / (high - low), 0.0, 1.0)
+    s = np.clip((second - first - low) / (high - low), 0.0, 1.0)
     easily = smoothed(1.0 - (1.0 - LEAST) * s * s * (3.0 - 2.0 * s), 0.5 * GATHERS, fps)
     return np.asarray(0.5 * (easily[1:] + easily[:-1]))
 

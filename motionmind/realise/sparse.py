@@ -5,7 +5,7 @@ are taken over a few thousand moments, which are found by the tree of the part (
 
 - those nearest to the first posture, where walks begin, and those that follow on them in the clips; those nearest to
   the last, where walks end, and those that lead there; those nearest to every other posture of a path to follow, and
-  those that follow on them up to the next;
+  those that follow on them within a move;
 - for all others, one moment of each of a few hundred balls into which the tree is cut.
 
 What is nearest stands for itself. All else that is chosen in a ball stands for the rest of it, and has its weight. So
@@ -33,6 +33,7 @@ ALONG = 8  # steps for which these are followed
 NEAREST = 24  # of those at the ends, that are followed half the way
 BY_PATH = 16  # moments near every other posture of a path, that are followed to the next
 PATH_LEAVES = 12  # of a tree that are searched for these
+KEPT = 32  # look-ups of parts that are kept: of a body of 16 parts those of a guide, and of its motion
 HARDLY = 1e-200  # of the likeliest moment: sums of such chances might be 0
 
 
@@ -118,7 +119,7 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
-@lru_cache(maxsize=18)  # of all parts; the guide of a search and its motion ask for the same
+@lru_cache(maxsize=KEPT)  # of all parts; the guide of a search and its motion ask for the same
 def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
     """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
     the last, some steps on; `ends` are the bytes of those of `choose`."""
@@ -129,7 +130,7 @@ def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints
     return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
 
 
-@lru_cache(maxsize=9)
+@lru_cache(maxsize=KEPT)
 def _balls(trees: Neighbours, number: int) -> Ints:
     """Return the nodes of the balls that a part's tree is cut into, in its order [B]."""
     return _cut(trees.bounds, trees.radii[number], trees.weights[number])

@@ -50,21 +50,23 @@ def follow(moments: Ints, ahead: bool, steps: int, begins: Ints, ends: Ints, pos
     """Return moments and those to which so many steps lead from them; or from which they lead there, if not `ahead`."""
     moves = len(begins) // 2
     turns = _backward(begins, ends, moves)
-    out, found = [0][:0], 0
+    out, found = [0][:0], np.zeros(2, np.int64)
     for moment in moments:
         here = [int(moment)]
         for _ in range(steps):
             on = [0][:0]
             for one in here:
                 if one >= postures:
-                    on.append(ends[moves + one - postures] if ahead else begins[one - postures])
+                    there = ends[moves + one - postures] if ahead else begins[one - postures]
+                    if there not in on:  # where clips are gone both ways, ways there double with each move
+                        on.append(there)
                     continue
-                for first, last in ((0, turns), (turns, moves)):
-                    numbers = begins[:moves] if ahead else ends[moves:]
-                    move = _edges(numbers, first, last, one, found)
+                numbers = begins[:moves] if ahead else ends[moves:]
+                for way, (first, last) in enumerate(((0, turns), (turns, moves))):
+                    move = _edges(numbers, first, last, one, found[way])
                     if move >= 0:
+                        found[way] = move
                         on.append(postures + move)
-                        found = move
             here = on
             out.extend(on)
     return np.array(out, np.int64)
@@ -77,7 +79,7 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
     moves = len(begins) // 2
     turns = _backward(begins, ends, moves)
     at, other, steps = np.empty((3, 2 * len(moments)), np.int64)
-    count = found = 0
+    count, found = 0, np.zeros(2, np.int64)
     for k in range(len(moments)):
         one = moments[k]
         if one >= postures:
@@ -85,10 +87,10 @@ def steps_at(moments: Ints, ahead: bool, begins: Ints, ends: Ints, postures: int
             at[count], other[count], steps[count] = k, ends[step] if ahead else begins[step], step
             count += 1
             continue
-        for first, last in ((0, turns), (turns, moves)):
-            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one, found)
+        for way, (first, last) in enumerate(((0, turns), (turns, moves))):
+            move = _edges(begins[:moves] if ahead else ends[moves:], first, last, one, found[way])
             if move >= 0:
-                found = move
+                found[way] = move
                 at[count], other[count], steps[count] = k, postures + move, move + (0 if ahead else moves)
                 count += 1
     return at[:count], other[:count], steps[:count]

@@ -129,6 +129,10 @@ def test_a_corpus_that_keeps_no_codes_is_searched_by_its_orientations(
     assert len(loaded.trees.codes) == 0
     posture = loaded.orientations[7]
     assert postures_near(loaded.trees, loaded.orientations, posture, 5, len(engine.corpus))[0] == 7
+    persistence.save(replace(learned, carriage=loaded), tmp_path / "again")
+    again = persistence.load(str(tmp_path / "again")).carriage
+    assert again.trees is not None
+    assert len(again.trees.codes) == 0
     manifest["arrays"]["neighbours.codes"] = [size[0], size[1] - 1]
     np.save(store.load(folder).place / "neighbours.codes.npy", trees.codes[1:])
     (folder / store.MANIFEST).write_text(json.dumps(manifest))

@@ -141,6 +141,8 @@ def test_steps_are_found_from_their_ends(both_ways: tuple[Corpus, Carriage]) -> 
         reached = follow(some[:1], ahead, 2, begins, ends, postures)
         once = there[here == some[0]]
         assert set(reached) == {*once, *there[np.isin(here, once)]}
+        # From a posture at most a moment more to either side with each step, by however many ways one comes there.
+        assert len(follow(some[:1], ahead, 40, begins, ends, postures)) <= 41 * 42
 
 
 def test_velocities_in_some_moments_are_those_in_all(both_ways: tuple[Corpus, Carriage]) -> None:
