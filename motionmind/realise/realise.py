@@ -29,7 +29,7 @@ from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import ENDS_AT, HEADROOM, JUMPS_AT, LONGER, jump_in_time, keep_pace, slow_down
+from motionmind.realise.retime import ENDS_AT, HEADROOM, JOINTS_AT, JUMPS_AT, LONGER, jump_in_time, keep_pace, slow_down
 from motionmind.realise.settling import keeper, settled
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
@@ -184,7 +184,10 @@ def realise(
     )
     motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock, fps)
     if most is not None:
-        slowed, later = slow_down(motion, clock, ENDS_AT * most, moving)
+        quickest, joints = ENDS_AT * most, len(a.skeleton)
+        if quick is not None:
+            quickest[:joints] = np.minimum(quickest[:joints], JOINTS_AT * quick[:joints])
+        slowed, later = slow_down(motion, clock, quickest, moving)
         if later is not clock:  # limbs may meet between frames, and who is slower has to be in balance
             motion, clock = settle(slowed, later, fps), later
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)

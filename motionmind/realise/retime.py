@@ -6,8 +6,9 @@ way a joint may go there and back. Where that would be faster than all but the c
 the clock slows down: all of the body, so that joints stay together, and smoothly, over a few half steps.
 
 Then feet, knees and the weight take what they need, and some of it is quick. So the clock slows down once more where
-the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), but
-not in the air, where the body falls as it does. One that dips as fast with its feet on the floor can be slower.
+the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), or a
+joint is much faster than in nearly all of the corpus's moments, but not in the air, where the body falls as it does.
+One that dips as fast with its feet on the floor can be slower.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from motionmind.realise.timeline import Timeline, stretch
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
 ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05
+JOINTS_AT = 1.13  # times as fast as all but a hundredth of the corpus's moments: as joints are in the end; on ballet
 JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way at most
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long

@@ -18,6 +18,7 @@ from motionmind.formats import read_posture
 from motionmind.geometry import rotations as rot
 from motionmind.learned.pace import way_between, way_of
 from motionmind.realise.detour import detour
+from motionmind.realise.retime import JOINTS_AT
 from motionmind.tween.engine import Engine
 from motionmind.tween.pacing import usual_times
 from motionmind.tween.report import read_report
@@ -218,6 +219,16 @@ def test_what_takes_its_own_time_is_not_faster_than_the_corpus(engine: Engine) -
                 fast.append(speeds[:, : len(motion.skeleton)] > engine.pace.fastest[: len(motion.skeleton)])
         shares.append(np.concatenate(fast).mean())
     assert shares[0] < 0.01 < 0.5 * shares[1]
+
+
+def test_no_joint_is_much_faster_than_nearly_all_of_the_corpus(ballet: Engine) -> None:
+    """Of the adagio's postures, between which steps that the feet take are quick."""
+    corpus, (start,) = ballet.corpus, [clip.start for clip in ballet.corpus.clips if clip.name == "adagio"]
+    for pair in ((56, 43), (39, 22), (20, 39), (54, 43)):
+        a, b = (Posture(corpus.skeleton, corpus.rotations[start + k], corpus.root[start + k]) for k in pair)
+        motion = ballet.tween(a, b).motion
+        speeds = way_of(motion).parts / np.diff(motion.times)[:, None]
+        assert (speeds / ballet.pace.fastest)[:, : len(corpus.skeleton)].max() < 1.02 * JOINTS_AT
 
 
 def test_who_has_too_much_time_fills_it_as_the_corpus_does(engine: Engine) -> None:
