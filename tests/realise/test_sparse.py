@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -45,6 +46,16 @@ def walk(engine: Engine, carriage: Carriage, start: int, path: bool) -> Expectat
     stops = {0: stop_at(engine.corpus, motion.posture(0)), MOVES: stop_at(engine.corpus, motion.posture(-1))}
     chains = engine.corpus.to_chains(motion.rotations)[:, : len(motion.skeleton)]
     return expect(engine.corpus, carriage, stops, np.linspace(0.0, 1.8, 2 * MOVES + 1), chains if path else None)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept() -> Iterator[None]:
+    """Look-ups are kept by what is looked for; some tests change how much is looked up."""
+    for keeps in (sparse._near_ends, sparse._balls):
+        keeps.cache_clear()
+    yield
+    for keeps in (sparse._near_ends, sparse._balls):
+        keeps.cache_clear()
 
 
 @pytest.mark.parametrize("path", [False, True])
