@@ -200,7 +200,7 @@ def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
 
 @lru_cache(_POSTURES)
 def _posture(score: Score, name: str) -> Posture:
-    """Return a posture of a score that is kept; to bring its weight over its feet takes half as long as a tween."""
+    """Return a posture of a score that is kept; bringing its weight over its feet takes half as long as a tween."""
     return compose.posture(score, name)
 
 
