@@ -35,7 +35,7 @@ from motionmind.realise.timeline import Timeline, stretch
 
 HEADROOM = 0.9  # share of the fastest speeds that is kept to: fine detail, and what holds the feet, come later
 ENDS_AT = 0.92  # share of the peaks that is kept to in the end; chosen on cmu-05
-JOINTS_AT = 1.13  # times as fast as all but a hundredth of the corpus's moments: as joints are at most; chosen on ballet
+JOINTS_AT = 1.13  # times as fast as all but a hundredth of the corpus's moments, as joints are at most; for ballet
 JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way at most
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
