@@ -293,6 +293,7 @@ def _realise(engine: Engine, carriage: Carriage) -> None:
         leaving=Velocity.at_start(clip),
         fastest=engine.pace.fastest,
         peaks=engine.pace.peaks_in,
+        slides=float(engine.plausibility.slides[0]),
     )
 
 

@@ -274,12 +274,8 @@ def moved_in(motion: Motion) -> Floats:
 
 def _danced(clip: Sampled) -> Ints:
     """Return the stretches of a clip's steps of which nothing was reconstructed, from and to a step [n, 2]."""
-    known = np.ones(len(clip) + 1, dtype=np.bool_)
-    known[[0, -1]] = False
-    for repair in clip.clip.repairs:
-        if not repair.exact:
-            first, last = repair.seconds
-            known[1:-1] &= (clip.times[1:] < first) | (clip.times[:-1] > last)
+    known = np.zeros(len(clip) + 1, dtype=np.bool_)
+    known[1:-1] = clip.danced(clip.times)
     return np.flatnonzero(np.diff(known)).reshape(-1, 2)
 
 

@@ -180,8 +180,8 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     carriage = replace(_part(Carriage, "carriage", arrays), trees=_trees(arrays, corpus.skeleton))
-    pace = _part(Pace, "pace", arrays)
-    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", arrays))
+    pace, shown = _part(Pace, "pace", arrays), {"plausibility.slides": np.array([np.nan]), **arrays}
+    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", shown))
 
 
 def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpace, States]:

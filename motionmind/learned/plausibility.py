@@ -9,6 +9,9 @@ To the measures of `motionmind.body.plausibility` come two:
 
 The limit of each is the 99.5th percentile, over all stretches of a second of the corpus's clips, of the greatest that
 each shows. Shorter clips are a stretch each.
+
+How fast feet are near the floor is no measure, but what tweens keep to: as fast as in all but a twentieth of these
+stretches. A few kicks are much faster in every corpus, and steps as fast as those are not how it walks.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +42,8 @@ ABOUT = {  # the unit of each, and what it is
 }
 STRETCH = 1.0  # seconds
 BEYOND = 99.5  # percentile of the corpus's own stretches
+SELDOM = 95.0  # the same, of the speed of feet near the floor
+EVERYDAY = 1.5  # heights/s, than which that is not less: somebody who walks slowly has feet as fast
 # What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, times as fast, and a share.
 TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
 _TALL = 1.0  # metres; how far a foot may move is known of bodies at least as tall
@@ -78,10 +84,13 @@ class Plausibility:
     Attributes:
         fastest: fastest speeds of the joints, rad/s, of the body's turning and of its travel, heights/s [J + 2].
         most: what its stretches show at most, in the order of `MEASURES` [M]; NaN where the corpus never shows it.
+        slides: speed of a foot near the floor that they seldom exceed, heights/s [1]; NaN of bodies without feet, and
+            of corpora that were built before it was learned.
     """
 
     fastest: Floats
     most: Floats
+    slides: Floats
 
     def shown(self, motion: Motion) -> dict[str, Sighting]:
         """Return what a movement on the corpus's joints shows a viewer, by the names of the measures."""
@@ -100,13 +109,13 @@ def learn_plausibility(corpus: Corpus, fastest: Floats) -> Plausibility:
         corpus: the movement.
         fastest: see `Plausibility`.
     """
-    shown = [_greatest_of_stretches(values) for values in _frames_of(corpus, fastest)]
-    most = np.full(len(MEASURES), np.nan)
-    for column in range(len(MEASURES)):
-        known = np.concatenate([values[:, column] for values in shown])
+    stretches = [_greatest_of_stretches(values) for values in _frames_of(corpus, fastest)]
+    most = np.full(len(MEASURES) + 1, np.nan)
+    for column, percent in enumerate((*[BEYOND] * len(MEASURES), SELDOM)):
+        known = np.concatenate([values[:, column] for values in stretches])
         if np.isfinite(known).any():
-            most[column] = np.percentile(known[np.isfinite(known)], BEYOND)
-    return Plausibility(fastest, most)
+            most[column] = np.percentile(known[np.isfinite(known)], percent)
+    return Plausibility(fastest, most[:-1], np.maximum(most[-1:], EVERYDAY))
 
 
 def summarise_shown(motion: Motion, fastest: Floats, floor: float) -> Floats:
@@ -122,40 +131,60 @@ def _summarise(motion: Motion, fastest: Floats, floor: float | None) -> tuple[Fl
     sampled = at_rate(motion)
     if floor is None:
         floor = floor_of(sampled.skeleton, sampled.rotations, sampled.root)
-    frames, speeds = _show(sampled, fastest, floor)
-    parts = (*motion.skeleton.names, FACING, "travel")
-    return greatest(frames), parts[int(speeds.max(axis=0).argmax())] if len(speeds) else ""
+    shown = _show(sampled, fastest, floor)
+    parts, speeds = (*motion.skeleton.names, FACING, "travel"), shown.speeds
+    return greatest(shown.frames), parts[int(speeds.max(axis=0).argmax())] if len(speeds) else ""
 
 
 def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _show(sampled: Motion, fastest: Floats, floor: float) -> tuple[Floats, Floats]:
-    """Return what movement shows in each frame at 30 a second [T, M], above a floor at a height in metres, and how many
-    times as fast as its fastest each part is between frames [T - 1, J + 2]."""
+class _Shown(NamedTuple):
+    """What movement of T frames, at 30 a second, shows.
+
+    Attributes:
+        frames: in each frame [T, M].
+        speeds: how many times as fast as its fastest each part is between frames [T - 1, J + 2].
+        slides: the speed of the fastest foot near the floor up to each frame [T], heights/s; NaN of bodies that have no
+            feet or are small.
+    """
+
+    frames: Floats
+    speeds: Floats
+    slides: Floats
+
+
+def _show(sampled: Motion, fastest: Floats, floor: float) -> _Shown:
+    """Return what movement shows above a floor at a height in metres, at 30 frames a second."""
     frames = implausibility(sampled.skeleton, sampled.rotations, sampled.root, RATE, floor)
     pace = np.full((len(sampled), 1), np.nan)
     speeds = RATE * way_of(sampled).parts / fastest
     pace[1:, 0] = speeds.max(axis=1)
-    return np.concatenate([frames, pace, _sliding(sampled, floor)[:, None]], axis=1), speeds
+    sliding, slides = _sliding(sampled, floor)
+    return _Shown(np.concatenate([frames, pace, sliding[:, None]], axis=1), speeds, slides)
 
 
-def _sliding(motion: Motion, floor: float) -> Floats:
-    """Return the share of the second up to each frame in which a foot slides [T], at 30 frames a second.
+def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
+    """Return the share of the second up to each frame in which a foot slides, and how fast one does (see `_Shown`) [T].
 
-    What comes before the movement does not slide. It is NaN for bodies that have no feet or are small.
+    What comes before the movement does not slide.
     """
     body = motion.skeleton
     if body.height < _TALL or not find_feet(body):
-        return np.full(len(motion), np.nan)
-    slides = (foot_slides(body, motion.rotations, motion.root, floor) > FAR).any(axis=-1)
-    so_far = np.concatenate([np.zeros(round(RATE) + 1), np.cumsum(slides)])
-    return np.asarray((so_far[round(RATE) :] - so_far[: len(motion)]) / RATE)
+        return np.full(len(motion), np.nan), np.full(len(motion), np.nan)
+    slides = foot_slides(body, motion.rotations, motion.root, floor)
+    so_far = np.concatenate([np.zeros(round(RATE) + 1), np.cumsum((slides > FAR).any(axis=-1))])
+    share = (so_far[round(RATE) :] - so_far[: len(motion)]) / RATE
+    return np.asarray(share), np.append(0.0, RATE * slides.max(axis=-1) / body.height)
 
 
 def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
-    """Yield what clips of a corpus show in each frame [T, M]; of very long ones evenly spread pieces, _MOST in all."""
+    """Yield what clips of a corpus show in each frame, and how fast feet are there, infinitely where nobody knows, for
+    it was reconstructed [T, M + 1].
+
+    Of very long clips they are evenly spread pieces, _MOST frames in all.
+    """
     seconds = sum(corpus.times[clip.stop - 1] - corpus.times[clip.start] for clip in corpus.clips)
     every = int(np.ceil(RATE * seconds / _MOST))
     pieces = 0
@@ -167,7 +196,10 @@ def _frames_of(corpus: Corpus, fastest: Floats) -> Iterator[Floats]:
         pieces += many
         if len(chosen):  # else its floor is of no use, which takes all of its frames to find
             kept, floor = _pieces_of(recording, size, chosen)
-            yield from (_show(piece, fastest, floor)[0] for piece in kept)
+            for piece in kept:
+                shown, danced = _show(piece, fastest, floor), recording.danced(piece.times)
+                slides = np.where(np.append(True, danced), shown.slides, np.inf)
+                yield np.column_stack([shown.frames, slides])
 
 
 def _pieces_of(recording: Sampled, size: int, chosen: range) -> tuple[list[Motion], float]:

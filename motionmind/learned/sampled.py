@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from motionmind._typing import Floats, Ints
+from motionmind._typing import Bools, Floats, Ints
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Clip, Corpus
 from motionmind.geometry.splines import natural_spline, rotation_spline
@@ -69,6 +69,15 @@ class Sampled:
             part = self.frames(int(first), int(numbers[here[-1]]) + 1)
             rotations[here], root[here] = part.rotations[numbers[here] - first], part.root[numbers[here] - first]
         return rotations, root
+
+    def danced(self, times: Floats) -> Bools:
+        """Return in which steps from one of some times [T] to the next nothing was reconstructed [T - 1]."""
+        known = np.ones(len(times) - 1, dtype=np.bool_)
+        for repair in self.clip.repairs:
+            if not repair.exact:
+                first, last = repair.seconds
+                known &= (times[1:] < first) | (times[:-1] > last)
+        return known
 
     @cached_property
     def _whole(self) -> Motion:

@@ -109,6 +109,8 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.codes": _Form("i1", "codes"),
 }
 
+LATER = {"plausibility.slides": _Form("f8", "1", 0.0, or_nan=True)}  # may lack in corpora that were built before
+
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
 ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions
 
@@ -124,7 +126,7 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
     sizes = {"J": len(skeleton), "L": len(skeleton) + (facing == "free"), "P": len(capsules_of(skeleton).pairs())}
     sizes |= {"parts": len(parts_of(skeleton)), "limbs": len(limbs_of(skeleton))}
     sizes["joints"] = sum(map(len, parts_of(skeleton)))
-    for name, form in (FORMS | TREES).items():
+    for name, form in (FORMS | TREES | LATER).items():
         if name not in arrays:
             continue
         array = arrays[name]

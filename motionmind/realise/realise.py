@@ -76,6 +76,7 @@ def realise(
     pace: float = 1.0,
     fastest: Floats | None = None,
     peaks: Callable[[float, float], Floats] | None = None,
+    slides: float = np.inf,
 ) -> Realised:
     """Return the motion from posture `a` to posture `b` in the moves of a path, on the body of `a`.
 
@@ -113,6 +114,7 @@ def realise(
             `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
         peaks: returns what the greatest of movement of so many seconds keep to at a pace [J + 4], as
             `motionmind.learned.pace.Pace.peaks_in` does; None where there is a `length`.
+        slides: speed of a foot near the floor, heights/s, that movement with `peaks` keeps to at a pace of 1.
     """
     if len(path) == 1:
         still = Motion(a.skeleton, a.rotations[None], a.root[None], np.zeros(1), "tween", (Insertion(np.zeros(1)),))
@@ -173,6 +175,7 @@ def realise(
     )
     settle = partial(
         settled,
+        fps=fps,
         stops=[*stops],
         moving=moving,
         fixed=fixed,
@@ -182,14 +185,12 @@ def realise(
         fastest=None if fastest is None else pace * fastest[: len(a.skeleton)],
         without=without,
     )
-    motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock, fps)
+    motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
     if most is not None:
         quickest, joints = ENDS_AT * most, len(a.skeleton)
         if quick is not None:
             quickest[:joints] = np.minimum(quickest[:joints], JOINTS_AT * quick[:joints])
-        slowed, later = slow_down(motion, clock, quickest, moving)
-        if later is not clock:  # limbs may meet between frames, and who is slower has to be in balance
-            motion, clock = settle(slowed, later, fps), later
+        motion, clock = slow_down(motion, clock, quickest, moving, pace * slides, settle)
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 

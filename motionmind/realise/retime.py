@@ -7,18 +7,18 @@ the clock slows down: all of the body, so that joints stay together, and smoothl
 
 Then feet, knees and the weight take what they need, and some of it is quick. So the clock slows down once more where
 the movement as it is made shows more than the corpus's own of that length (`motionmind.learned.pace.Pace.peaks`), or a
-joint is much faster than in nearly all of the corpus's moments, but not in the air, where the body falls as it does.
-One that dips as fast with its feet on the floor can be slower.
+joint is much faster than in nearly all of the corpus's moments, or a foot near the floor than it seldom is there. But
+not in the air, where the body falls as it does. One that dips as fast with its feet on the floor can be slower.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import LOW, lowest_height
+from motionmind.body.contact import LOW, foot_slides, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
@@ -40,6 +40,7 @@ JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way 
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
+AGAIN = 3  # times at most that it slows down and settles
 SLIGHT = 1e-3  # by which a clock is not worth slowing
 LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
 SITS = 0.1  # metres, of a person: a body that leaves the floor no lower than that under where it could is not hurried
@@ -142,11 +143,18 @@ def jump_in_time(
     return out
 
 
-def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool, bool]) -> tuple[Motion, Timeline]:
+def slow_down(
+    motion: Motion,
+    clock: Timeline,
+    most: Floats,
+    moving: tuple[bool, bool],
+    slides: float = np.inf,
+    settle: Callable[[Motion, Timeline], Motion] | None = None,
+) -> tuple[Motion, Timeline]:
     """Return a movement and its clock, slower where a part of the body is faster than the most, or the root starts so.
 
-    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that. Where they show
-    what the corpus does not, it is done again.
+    Frames of the slower movement fall elsewhere on what was quick in it, and may show more of that; so does what has to
+    settle in it. Where they show what the corpus does not, it is done again.
 
     Args:
         motion: the movement, at the clock's frames.
@@ -154,25 +162,36 @@ def slow_down(motion: Motion, clock: Timeline, most: Floats, moving: tuple[bool,
         most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s, and the root's
             acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
+        slides: speed of a foot near the floor, heights/s.
+        settle: returns a slower movement in which limbs do not meet and who is slower is in balance; None for as it is.
     """
-    for number in range(ROUNDS):
-        slower = _slower(motion, most, moving)
-        if slower.max() < (1.0 / ENDS_AT if number else 1.0 + SLIGHT):
+    for again in range(AGAIN if settle else 1):
+        before = clock
+        for number in range(ROUNDS):
+            slower = _slower(motion, most, slides, moving)
+            if slower.max() < (1.0 / ENDS_AT if again or number else 1.0 + SLIGHT):
+                break
+            motion, clock = _slowed(motion, clock, slower)
+        if settle is None or clock is before:
             break
-        motion, clock = _slowed(motion, clock, slower)
+        motion = settle(motion, clock)
     return motion, clock
 
 
-def _slower(motion: Motion, most: Floats, moving: tuple[bool, bool]) -> Floats:
+def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, bool]) -> Floats:
     """Return how many times longer each step of a movement is to take [N - 1]; arguments are those of `slow_down`."""
-    times = motion.times
+    times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
+    low = lowest_height(body, motion.rotations, motion.root)
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
-    free = _away(middles, [*ends, *times[1:-1][_falls(motion, fps)]], fps)
+    free = _away(middles, [*ends, *times[1:-1][_falls(motion, low, fps)]], fps)
     slower = np.maximum((fps * steps_of(motion) / most[:-1]).max(axis=1), 1.0)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
     changes = np.sqrt(accelerations(moved_in(motion), fps) / most[-1])
     slower[1:], slower[:-1] = np.maximum(slower[1:], changes), np.maximum(slower[:-1], changes)
+    if np.isfinite(slides):
+        slid = foot_slides(body, motion.rotations, motion.root, _floor(times, low, times))
+        slower = np.maximum(slower, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
     slower[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)
@@ -191,11 +210,22 @@ def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Ti
     )
     # A spline between frames may lead a little deeper into the floor than they do.
     low = lowest_height(motion.skeleton, motion.rotations, motion.root)
-    floor = np.interp(was, times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
-    deep = np.minimum(np.interp(was, times, low), floor) - lowest_height(motion.skeleton, rotations, root)
+    lowest = np.minimum(np.interp(was, times, low), _floor(times, low, was))
+    deep = lowest - lowest_height(motion.skeleton, rotations, root)
     root[:, 1] += np.maximum(deep, 0.0)
     rotations[[0, -1]], root[[0, -1]] = motion.rotations[[0, -1]], motion.root[[0, -1]]
     return Motion(motion.skeleton, rotations, root, later.frames), later
+
+
+def _floor(times: Floats, low: Floats, at: Floats) -> Floats:
+    """Return the height of the floor at some times [M], metres: 0, or lower under ends whose lowest points are lower.
+
+    Args:
+        times: of the movement [N], seconds.
+        low: heights of its lowest points [N], metres.
+        at: the times [M].
+    """
+    return np.interp(at, times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
 
 
 def _away(middles: Floats, times: Sequence[float], fps: float) -> Floats:
@@ -206,8 +236,8 @@ def _away(middles: Floats, times: Sequence[float], fps: float) -> Floats:
     return np.clip((since - 0.5 / fps) / SETTLES, 0.0, 1.0)
 
 
-def _falls(motion: Motion, fps: float) -> Bools:
-    """Return in which frames between the first and the last a body falls, off the floor [N - 2]."""
-    low = lowest_height(motion.skeleton, motion.rotations, motion.root)
+def _falls(motion: Motion, low: Floats, fps: float) -> Bools:
+    """Return in which frames between the first and the last a body falls, off the floor [N - 2]; its lowest points are
+    so `low` [N], metres."""
     up = low[1:-1] > low.min() + LOW * size_of(motion.skeleton)
     return np.asarray(up & (fps**2 * np.diff(motion.root[:, 1], 2) < -FALLING * GRAVITY))

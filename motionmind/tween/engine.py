@@ -239,6 +239,7 @@ class Engine(LearnedCorpus):
             request.pace,
             self.pace.fastest if paced else None,
             self.pace.peaks_in if paced else None,
+            float(self.plausibility.slides[0]) if paced else np.inf,
         )
 
     def _account_for(

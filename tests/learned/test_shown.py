@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,12 @@ import pytest
 
 from motionmind import Engine, Motion
 from motionmind._typing import Floats
+from motionmind.body.contact import floor_height, foot_slides, lowest_height
+from motionmind.body.human import human23
 from motionmind.body.plausibility import at_rate
-from motionmind.learned.plausibility import MEASURES, Plausibility, learn_plausibility
+from motionmind.corpus import store
+from motionmind.corpus.corpus import JointRepair
+from motionmind.learned.plausibility import EVERYDAY, MEASURES, Plausibility, learn_plausibility
 
 BALLET = Engine.load("ballet")
 
@@ -80,6 +85,53 @@ def test_limits_survive_the_disk(tmp_path: Path) -> None:
     opened = Engine.load(str(tmp_path / "ballet")).plausibility
     np.testing.assert_array_equal(opened.most, BALLET.plausibility.most)
     np.testing.assert_array_equal(opened.fastest, BALLET.plausibility.fastest)
+    np.testing.assert_array_equal(opened.slides, BALLET.plausibility.slides)
+
+
+def test_a_corpus_that_was_built_before_feet_were_measured_is_read(tmp_path: Path) -> None:
+    BALLET.save(tmp_path / "ballet")
+    path = tmp_path / "ballet" / store.MANIFEST
+    manifest = json.loads(path.read_text("utf-8"))
+    manifest["arrays"].pop("plausibility.slides")
+    path.write_text(json.dumps(manifest), "utf-8")
+    for again in ("ballet", "again"):
+        opened = Engine.load(str(tmp_path / again))
+        assert np.isnan(opened.plausibility.slides).tolist() == [True]
+        opened.save(tmp_path / "again")
+    first, last = (opened.corpus.motion(opened.corpus.clips[0]).posture(frame) for frame in (0, 9))
+    assert len(opened.tween(first, last).motion) > 9
+
+
+def test_feet_are_seldom_faster_near_the_floor_than_was_learned() -> None:
+    engine = Engine.load("karate")
+    limit = float(engine.plausibility.slides[0]) * human23().height
+    seconds = []
+    for clip in engine.corpus.clips:
+        whole = at_rate(engine.corpus.recording(clip))
+        floor = floor_height(lowest_height(whole.skeleton, whole.rotations, whole.root))
+        quick = 30.0 * foot_slides(whole.skeleton, whole.rotations, whole.root, floor).max(axis=1) > limit
+        seconds.extend(np.lib.stride_tricks.sliding_window_view(quick, 30).any(axis=1))
+    assert 0.03 < np.mean(seconds) < 0.07
+
+
+def test_what_was_reconstructed_is_no_measure_of_feet() -> None:
+    """Somebody walks, and slides 9 m in a second that was interpolated."""
+    motion = stretches(BALLET, 1)[0]
+    times = np.arange(300) / 30.0
+    way = np.cumsum(np.where((times > 5.0) & (times < 6.0), 0.3, 0.02 + 0.03 * np.sin(times)))
+    still = Motion(motion.skeleton, np.tile(motion.rotations[:1], (300, 1, 1)), np.zeros((300, 3)), times, "slides")
+    low = float(lowest_height(still.skeleton, still.rotations, still.root).min())
+    gathered = Engine.fit([replace(still, root=way[:, None] * [1.0, 0.0, 0.0] - [0.0, low, 0.0])], rate=30.0).corpus
+    mended = JointRepair("left_knee", 150, 180, (5.0, 6.0), exact=False)
+    fastest = BALLET.plausibility.fastest
+    for repairs, quick in (((), True), ((mended,), False), ((replace(mended, exact=True),), True)):
+        corpus = replace(gathered, clips=tuple(replace(clip, repairs=repairs) for clip in gathered.clips))
+        slides = float(learn_plausibility(corpus, fastest).slides[0]) * still.skeleton.height
+        assert slides == pytest.approx(9.0 if quick else EVERYDAY * still.skeleton.height, rel=0.02)
+
+
+def test_bodies_without_feet_have_no_limit_for_them() -> None:
+    assert np.isnan(Engine.load("walk-hexapod").plausibility.slides).tolist() == [True]
 
 
 def test_a_corpus_of_two_postures_has_limits() -> None:
@@ -100,7 +152,7 @@ def test_of_a_long_corpus_pieces_are_measured(monkeypatch: pytest.MonkeyPatch) -
 def test_trifles_are_not_told() -> None:
     motion = stretches(BALLET, 1)[0]
     still = replace(motion, rotations=np.tile(motion.rotations[:1], (31, 1, 1)), root=np.tile(motion.root[:1], (31, 1)))
-    limits = Plausibility(BALLET.plausibility.fastest, np.zeros(len(MEASURES)))
+    limits = Plausibility(BALLET.plausibility.fastest, np.zeros(len(MEASURES)), np.full(1, np.nan))
     trembles = raised(still, 0.0003 * np.sin(np.arange(31)))
     assert not limits.shown(trembles)["bounce"].is_beyond
     assert limits.shown(raised(still, 0.003 * np.sin(np.arange(31))))["bounce"].is_beyond

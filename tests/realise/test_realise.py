@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
@@ -520,7 +521,14 @@ def test_a_jump_of_the_corpus_is_jumped_and_its_floor_is_not_its_zero() -> None:
 
 
 def test_limbs_that_meet_as_the_clock_slows_come_apart(walking: Learned, monkeypatch: pytest.MonkeyPatch) -> None:
-    def slowed(motion: Motion, clock: Timeline, *_: object) -> tuple[Motion, Timeline]:
+    def slowed(
+        motion: Motion,
+        clock: Timeline,
+        most: Floats,
+        moving: tuple[bool, bool],
+        slides: float,
+        settle: Callable[[Motion, Timeline], Motion],
+    ) -> tuple[Motion, Timeline]:
         inward = np.zeros((len(motion), 3))
         inward[:, 2] = 0.35 * np.hanning(len(motion))
         rotations = motion.rotations.copy()
@@ -528,7 +536,7 @@ def test_limbs_that_meet_as_the_clock_slows_come_apart(walking: Learned, monkeyp
             hip = human23().index(f"{side}_hip")
             rotations[:, hip] = rot.mul(rotations[:, hip], rot.exp(sign * inward))
         assert legs_depth(human23(), rotations).max() > 0.035
-        return replace(motion, rotations=rotations), clock._replace()
+        return settle(replace(motion, rotations=rotations), clock), clock
 
     monkeypatch.setattr("motionmind.realise.realise.slow_down", slowed)
     known = replace(walking, carriage=replace(walking.carriage, touches=np.zeros_like(walking.carriage.touches)))

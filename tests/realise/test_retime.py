@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from motionmind._typing import Floats
+from motionmind.body.contact import foot_slides, lowest_height
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion
 from motionmind.geometry import rotations as rot
@@ -39,6 +40,10 @@ def quick(top: float, count: int = 91) -> Floats:
 
 def most(joints: float, acceleration: float = 900.0) -> Floats:
     return np.concatenate([np.full(len(BODY), joints), [9.0, 9.0, 9.0, acceleration]])
+
+
+def raised(motion: Motion, by: Floats) -> Motion:
+    return replace(motion, root=motion.root + by[:, None] * np.array([0.0, 1.0, 0.0]))
 
 
 def speeds(motion: Motion) -> Floats:
@@ -109,6 +114,47 @@ def test_what_shows_more_between_frames_is_slowed_again() -> None:
     slower, _ = slow_down(motion, clock, most(2.0), STILL)
     assert speeds(motion).max() > 3.5
     assert speeds(slower).max() < 2.0 * 1.06
+
+
+def test_a_foot_that_is_too_fast_near_the_floor_is_slowed_and_one_above_it_is_not() -> None:
+    motion, clock = bent(np.zeros(91))
+    low = float(lowest_height(BODY, motion.rotations, motion.root).min())
+    way = np.cumsum(0.1 + 1.4 * np.exp(-(((np.arange(91) - 45.0) / 6.0) ** 2))) / FPS
+    near = replace(motion, root=motion.root + way[:, None] * [1.0, 0.0, 0.0] - [0.0, low, 0.0])
+
+    def quickest(motion: Motion) -> float:  # heights a second
+        slides = foot_slides(BODY, motion.rotations, motion.root)
+        return float(slides.max() / (motion.times[1] - motion.times[0]) / BODY.height)
+
+    limit = 0.6 * quickest(near)
+    slower, later = slow_down(near, clock, most(9.0), STILL, limit)
+    assert 0.8 * limit < quickest(slower) < 1.1 * limit
+    assert later.moves[-1] == slower.times[-1] < 1.5 * near.times[-1]
+    for above, known in ((0.06, limit), (0.0, np.inf), (0.0, np.nan)):
+        lifted = raised(near, np.full(91, above))
+        assert slow_down(lifted, clock, most(9.0), STILL, known) == (lifted, clock)
+    # Under ends that are lower the floor is lower.
+    sunk = raised(near, np.where(np.abs(np.arange(91) - 45) < 25, -0.24, -0.3))
+    assert slow_down(sunk, clock, most(9.0), STILL, limit) == (sunk, clock)
+
+
+def test_what_is_too_fast_as_it_settles_is_slowed_once_more() -> None:
+    motion, clock = bent(quick(2.5))
+    times = []
+
+    def settle(motion: Motion, clock: Timeline) -> Motion:
+        times.append(clock.frames[-1])
+        made = motion.rotations.copy()
+        made[:, ELBOW + 1] = rot.from_axis_angle([1.0, 0.0, 0.0], quick(5.0 if len(times) == 1 else 2.0, len(motion)))
+        return replace(motion, rotations=made)
+
+    slower, later = slow_down(motion, clock, most(2.6), STILL, settle=settle)
+    assert len(times) == 2
+    assert motion.times[-1] < times[0] < times[1] == slower.times[-1] == later.frames[-1]
+    assert len(slower) == len(later.frames)
+    times.clear()
+    assert slow_down(motion, clock, most(9.0), STILL, settle=settle) == (motion, clock)
+    assert not times
 
 
 @pytest.mark.parametrize("end", [0, 1])
