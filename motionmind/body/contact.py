@@ -26,6 +26,7 @@ from motionmind.body.skeleton import Skeleton
 RATE = 30.0  # frames a second at which feet are measured
 LOW = 0.05  # metres above the floor below which a foot should stand
 FAR = 0.025  # metres that a standing foot may move from one frame to the next
+TALL = 1.0  # metres: of bodies at least as tall it is known how far a foot may move
 STAYS = 0.05  # metres that a foot which stays in its place may slide, as it rolls
 _SOFT = 0.025  # metres above the floor at which Zhang et al. stop counting a slide
 _NEAR = 0.1  # of the body's height: how near a leaf must end, at rest, to the lowest point to be a foot

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motionmind._typing import Floats
-from motionmind.body.contact import FAR, RATE, find_feet, floor_height, foot_slides, lowest_height
+from motionmind.body.contact import FAR, RATE, TALL, find_feet, floor_height, foot_slides, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import SEEN, at_rate, floor_of, greatest, implausibility
 from motionmind.corpus.corpus import FACING, Corpus
@@ -46,7 +46,6 @@ SELDOM = 95.0  # the same, of the speed of feet near the floor
 EVERYDAY = 1.5  # heights/s, than which that is not less: somebody who walks slowly has feet as fast
 # What counts for nothing, whatever the corpus: metres, m/s^2, shares of gravity, metres, times as fast, and a share.
 TRIFLES = np.array([0.02, 1.0, 0.2, 0.01, 1.0, 0.2])
-_TALL = 1.0  # metres; how far a foot may move is known of bodies at least as tall
 _MOST = 40_000  # frames of a corpus that are measured, about
 _PIECE = BLOCK // 32  # frames of each piece of a corpus that has more
 
@@ -171,7 +170,7 @@ def _sliding(motion: Motion, floor: float) -> tuple[Floats, Floats]:
     What comes before the movement does not slide.
     """
     body = motion.skeleton
-    if body.height < _TALL or not find_feet(body):
+    if body.height < TALL or not find_feet(body):
         return np.full(len(motion), np.nan), np.full(len(motion), np.nan)
     slides = foot_slides(body, motion.rotations, motion.root, floor)
     so_far = np.concatenate([np.zeros(round(RATE) + 1), np.cumsum((slides > FAR).any(axis=-1))])

@@ -24,7 +24,7 @@ from motionmind.discretize import StateSpace
 from motionmind.files import give_back
 from motionmind.learned.neighbours import node_bounds
 from motionmind.learned.peaks import LENGTHS
-from motionmind.learned.plausibility import MEASURES
+from motionmind.learned.plausibility import EVERYDAY, MEASURES
 
 _MOST = 1e6  # metres, seconds, rad/s, nats: far beyond any movement, and far below where sums overflow
 _SMALL, _TINY = 1e-9, 1e-300
@@ -109,7 +109,7 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.codes": _Form("i1", "codes"),
 }
 
-LATER = {"plausibility.slides": _Form("f8", "1", 0.0, or_nan=True)}  # may lack in corpora that were built before
+LATER = {"plausibility.slides": _Form("f8", "1", EVERYDAY, or_nan=True)}  # may lack in corpora that were built before
 
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
 ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions

@@ -207,20 +207,32 @@ def fall_freely(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bool
         given: frames that must not change, the first and the last among them [N].
         fps: frames a second.
     """
-    low = lowest_height(skeleton, rotations, root)
-    off_floor = low > low.min() + LOW * size_of(skeleton)
-    up = ~given & off_floor
-    mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
-    if mass is None:
-        return root
-    out, fall = root.copy(), np.zeros(len(root))
-    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
-    for start, stop in _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps)):
+    mass, falls = find_falls(skeleton, rotations, root, given, fps)
+    out = root.copy()
+    for start, stop in falls:
         seconds = np.arange(stop - start + 2) / fps
         line = np.linspace(mass[start - 1, 1], mass[stop, 1], len(seconds))
         fallen = line + 0.5 * GRAVITY * seconds * (seconds[-1] - seconds)
         out[start:stop, 1] += fallen[1:-1] - mass[start:stop, 1]
     return out
+
+
+def find_falls(
+    skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float
+) -> tuple[Floats, list[tuple[int, int]]]:
+    """Return the centre of mass [N, 3], metres, and the first frame of each fall, and the one after its last.
+
+    Where masses are not known there are no falls. Arguments are those of `fall_freely`.
+    """
+    low = lowest_height(skeleton, rotations, root)
+    off_floor = low > low.min() + LOW * size_of(skeleton)
+    up = ~given & off_floor
+    mass = centre_of_mass(skeleton, rotations, root) if up.any() else None
+    if mass is None:
+        return root, []
+    fall = np.zeros(len(root))
+    fall[1:-1] = -(fps**2) * np.diff(mass[:, 1], 2) / GRAVITY
+    return mass, _falls(fall, up, (bool(off_floor[0]), bool(off_floor[-1])), round(PAUSES * fps))
 
 
 def _falls(fall: Floats, up: Bools, in_air: tuple[bool, bool], pauses: int) -> list[tuple[int, int]]:

@@ -29,7 +29,17 @@ from motionmind.realise.ground import Stance, ends_in_air, set_on_floor
 from motionmind.realise.headings import correct_headings, travel_along
 from motionmind.realise.legs import find_legs
 from motionmind.realise.minimal import departure
-from motionmind.realise.retime import ENDS_AT, HEADROOM, JOINTS_AT, JUMPS_AT, LONGER, jump_in_time, keep_pace, slow_down
+from motionmind.realise.retime import (
+    ENDS_AT,
+    HEADROOM,
+    JOINTS_AT,
+    JUMPS_AT,
+    LONGER,
+    jump_in_time,
+    keep_pace,
+    land_between,
+    slow_down,
+)
 from motionmind.realise.settling import keeper, settled
 from motionmind.realise.stops import Stop, stop_at
 from motionmind.realise.timeline import Timeline, stretch, timeline
@@ -123,6 +133,8 @@ def realise(
     postures = {0: a, **through, len(path) - 1: b}
     stops = {move: stop_at(corpus, posture) for move, posture in postures.items()}
     slower = 1.0 if length else 1.0 / pace  # the walk is made at a pace of 1, and then taken faster
+    # Steps and the weight take their time at any pace: who is slower may take them as fast as the corpus does.
+    pace = max(pace, 1.0)
     stops[0] = stop_at(corpus, a, _times(slower, leaving))
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
@@ -255,7 +267,8 @@ def _for_jumps(
     moving: tuple[bool, bool],
     fastest: Floats,
 ) -> Floats:
-    """Return how many times as long each half step is to take [2 T] for jumps into given postures (`jump_in_time`).
+    """Return how many times as long each half step is to take [2 T] for jumps into given postures (`jump_in_time`), or
+    from one into another (`land_between`).
 
     Args:
         walk: the movement at its half steps.
@@ -267,13 +280,18 @@ def _for_jumps(
         moving: whether the first and the last posture are passed at a given velocity.
         fastest: speeds of the joints first [J], rad/s.
     """
-    in_air, above = ends_in_air(stance, low, size_of(skeleton))
+    (in_air, above), seconds = ends_in_air(stance, low, size_of(skeleton)), longer * np.diff(walk.half_steps)
+    if (
+        in_air.all()
+        and len(low) == 2
+        and (lands := land_between(seconds, above, size_of(skeleton), moving)).max() > 1.0
+    ):
+        return lands
     in_air &= ~np.array(moving)
     if not in_air.any():
         return np.ones(len(longer))
     moves = [*low]
     reach = 2 * (moves[1] - moves[0]), 2 * (moves[-1] - moves[-2])
-    seconds = longer * np.diff(walk.half_steps)
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
     return jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, reach, fastest[: len(skeleton)])
 

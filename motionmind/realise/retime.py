@@ -13,12 +13,12 @@ not in the air, where the body falls as it does. One that dips as fast with its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from motionmind._typing import Bools, Floats
-from motionmind.body.contact import LOW, foot_slides, lowest_height
+from motionmind.body.contact import TALL, foot_slides, lowest_height
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.skeleton import Skeleton
@@ -29,7 +29,7 @@ from motionmind.geometry.splines import natural_spline, rotation_spline
 from motionmind.learned.pace import moved_in, steps_of, ways
 from motionmind.learned.peaks import accelerations
 from motionmind.realise.expectation import Expectation
-from motionmind.realise.flight import FALLING
+from motionmind.realise.flight import PUSHES, find_falls
 from motionmind.realise.knees import bell
 from motionmind.realise.timeline import Timeline, stretch
 
@@ -143,6 +143,27 @@ def jump_in_time(
     return out
 
 
+def land_between(seconds: Floats, heights: Floats, size: float, moving: tuple[bool, bool]) -> Floats:
+    """Return how many times as long each half step is to take [2 T], at least 1, so that a body that is in the air at
+    both ends comes down between, unless one leap of no great height leads from the one to the other.
+
+    Args:
+        seconds: how long half steps take [2 T].
+        heights: of the lowest points above the floor at both ends [2], metres.
+        size: of the body (`motionmind.body.support.size_of`).
+        moving: whether the first and the last posture are passed at a given velocity.
+    """
+    takes = float(seconds.sum())
+    rate = (heights[1] - heights[0]) / takes + 0.5 * GRAVITY * takes
+    top = heights[0] + 0.5 * rate**2 / GRAVITY if 0.0 < rate < GRAVITY * takes else heights.max()
+    needs = np.sqrt(2.0 * heights / GRAVITY).sum() + 3.0 * PUSHES
+    if top <= heights.max() + LEFT * size or takes >= needs:
+        return np.ones(len(seconds))
+    middles = np.cumsum(seconds) - 0.5 * seconds
+    free = _away(middles, [at for at, given in zip((0.0, takes), moving, strict=True) if given], np.inf)
+    return np.asarray(1.0 + free * (needs - takes) / max(float(free @ seconds), 1e-9))
+
+
 def slow_down(
     motion: Motion,
     clock: Timeline,
@@ -162,7 +183,7 @@ def slow_down(
         most: speeds of the joints, rad/s, of the body's turning, of its travel and its rise, heights/s, and the root's
             acceleration, heights/s^2 [J + 4].
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
-        slides: speed of a foot near the floor, heights/s.
+        slides: speed of a foot near the floor, heights/s; of bodies at least as tall as people.
         settle: returns a slower movement in which limbs do not meet and who is slower is in balance; None for as it is.
     """
     for again in range(AGAIN if settle else 1):
@@ -182,14 +203,14 @@ def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, boo
     """Return how many times longer each step of a movement is to take [N - 1]; arguments are those of `slow_down`."""
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
-    low = lowest_height(body, motion.rotations, motion.root)
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
-    free = _away(middles, [*ends, *times[1:-1][_falls(motion, low, fps)]], fps)
+    free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(motion, fps)], fps, PUSHES))
     slower = np.maximum((fps * steps_of(motion) / most[:-1]).max(axis=1), 1.0)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
     changes = np.sqrt(accelerations(moved_in(motion), fps) / most[-1])
     slower[1:], slower[:-1] = np.maximum(slower[1:], changes), np.maximum(slower[:-1], changes)
-    if np.isfinite(slides):
+    if np.isfinite(slides) and body.height >= TALL:
+        low = lowest_height(body, motion.rotations, motion.root)
         slid = foot_slides(body, motion.rotations, motion.root, _floor(times, low, times))
         slower = np.maximum(slower, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
     slower[free < SLIGHT] = 1.0
@@ -228,16 +249,19 @@ def _floor(times: Floats, low: Floats, at: Floats) -> Floats:
     return np.interp(at, times[[0, -1]], np.minimum(low[[0, -1]], 0.0))
 
 
-def _away(middles: Floats, times: Sequence[float], fps: float) -> Floats:
-    """Return how far steps are from some times, by their middles [N]: from 0 beside one to 1 from SETTLES on."""
+def _away(middles: Floats, times: Iterable[float], fps: float, beside: float = 0.0) -> Floats:
+    """Return how far steps are from some times, by their middles [N]: from 0 up to `beside` seconds from one to 1 from
+    SETTLES more on."""
     since = np.full(len(middles), np.inf)
     for time in times:
         since = np.minimum(since, np.abs(middles - time))
-    return np.clip((since - 0.5 / fps) / SETTLES, 0.0, 1.0)
+    return np.clip((since - 0.5 / fps - beside) / SETTLES, 0.0, 1.0)
 
 
-def _falls(motion: Motion, low: Floats, fps: float) -> Bools:
-    """Return in which frames between the first and the last a body falls, off the floor [N - 2]; its lowest points are
-    so `low` [N], metres."""
-    up = low[1:-1] > low.min() + LOW * size_of(motion.skeleton)
-    return np.asarray(up & (fps**2 * np.diff(motion.root[:, 1], 2) < -FALLING * GRAVITY))
+def _falling(motion: Motion, fps: float) -> Bools:
+    """Return in which frames the mass of a body falls, off the floor [N]."""
+    ends, out = np.zeros(len(motion), dtype=np.bool_), np.zeros(len(motion), dtype=np.bool_)
+    ends[[0, -1]] = True
+    for start, stop in find_falls(motion.skeleton, motion.rotations, motion.root, ends, fps)[1]:
+        out[start:stop] = True
+    return out
