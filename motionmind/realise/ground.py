@@ -41,6 +41,7 @@ from motionmind.realise.root import root_trajectory, stand, steps_easily
 
 SPREADS = 0.03, 0.04  # metres, standard deviation: how high walks are that stand at a given posture, and that are aloft
 LEAPS = 0.18  # metres above those that stand from which it is in the air, though no walk is
+UNEVEN = 0.015  # metres by which feet that stand are above the floor of a recording
 SINKS = 0.003  # metres by which a part may be under the floor, but for rounding
 
 
@@ -320,10 +321,11 @@ def _floor_under(half_steps: Floats, clearance: Floats, ends: Floats, hovering: 
     """Return the floor's height at the half steps [2 T + 1], metres: 0, or as the `ends`' lowest points [2] show.
 
     A recording's own zero is often off: where an end is below 0 so is its floor, and where it is higher than bodies
-    that stand so are in the corpus, its floor is higher. An end in the air, `hovering` [2], shows nothing of its floor,
-    which is then the other's.
+    that stand so are in the corpus, its floor is higher. What these have their feet above the floor, up to UNEVEN, is
+    the floor's too: a body that stands there would sink as it leaves the end. An end in the air, `hovering` [2], shows
+    nothing of its floor, which is then the other's.
     """
-    above = np.maximum(np.minimum(ends, 0.0), ends - clearance[[0, -1]])
+    above = np.maximum(np.minimum(ends, 0.0), ends - np.maximum(clearance[[0, -1]] - UNEVEN, 0.0))
     above = np.where(hovering, np.minimum(ends, 0.0 if hovering.all() else above[::-1]), above)
     return np.asarray(np.interp(half_steps, half_steps[[0, -1]], above))
 

@@ -17,7 +17,8 @@ from motionmind.body.skeleton import Skeleton
 from motionmind.learned.carriage import Carriage
 from motionmind.realise.corrections import Correction
 from motionmind.realise.flight import fall_freely
-from motionmind.realise.knees import smoothed
+from motionmind.realise.ground import SINKS
+from motionmind.realise.knees import cover, smoothed
 from motionmind.realise.leaning import shift_weight
 from motionmind.realise.legs import find_legs
 from motionmind.realise.limbs_apart import keep_limbs_apart
@@ -86,6 +87,7 @@ def settled(
     if "balance" not in without:
         joints = fixed[: len(skeleton)]
         rotations, root = shift_weight(skeleton, rotations, root, overhang, given, carriage.loose, joints, fps, fastest)
+    root = _lifted(skeleton, rotations, root, given, fps)
     if "flight" not in without:
         root = fall_freely(skeleton, rotations, root, given, fps)
     return replace(motion, rotations=rotations, root=root)
@@ -106,6 +108,27 @@ def _with_its_legs(motion: Motion, rotations: Floats, given: Bools, fps: float) 
     since = np.abs(frames[:, None] - np.flatnonzero(given)).min(axis=1) / fps
     out = root.copy()
     out[:, 1] -= smoothed(lifted, FOLLOWS, fps) * np.minimum(since / FOLLOWS, 1.0)
+    return out
+
+
+def _lifted(skeleton: Skeleton, rotations: Floats, root: Floats, given: Bools, fps: float) -> Floats:
+    """Return positions of the root [N, 3], metres, with which nothing is in the floor: at 0, or lower under ends that
+    are lower.
+
+    Args:
+        skeleton: the body.
+        rotations: local rotations [N, J, 4].
+        root: positions of the root before [N, 3], metres.
+        given: frames that must not change [N].
+        fps: frames a second.
+    """
+    low = lowest_height(skeleton, rotations, root)
+    floor = np.linspace(min(low[0], 0.0), min(low[-1], 0.0), len(low))
+    sunk = np.where(given, 0.0, np.maximum(floor - low - SINKS, 0.0))
+    if not sunk.any():
+        return root
+    out = root.copy()
+    out[:, 1] += np.where(given, 0.0, cover(sunk, fps))
     return out
 
 
