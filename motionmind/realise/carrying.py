@@ -119,6 +119,8 @@ def carry(
     above = root[[0, -1], 1] - standing[[0, -1]]
     staying = find_staying(shape, root[:, [0, 2]]) if above.max() < TIPTOE else None
     hovering = [staying is None and known.aloft[end] > SURELY and above[end] > HOVERS for end in (0, -1)]
+    steps = fps * np.diff(mass[:, 1])[[0, -1]]  # the mass moves in the body, too
+    rates = tuple(None if rate is None else rate + float(own) for rate, own in zip(known.rates, steps, strict=True))
     flights = []
     if "flight" not in without and staying is None:
         flights = find_flights(
@@ -127,7 +129,7 @@ def carry(
             standing + mass[:, 1],
             root[[0, -1], 1] + mass[[0, -1], 1],
             (hovering[0], hovering[1]),
-            known.rates,
+            (rates[0], rates[1]),
             gravity,
             fps,
         )

@@ -198,10 +198,11 @@ def _set_down(
     root = stand(skeleton, rotations, _with_rates(root, times, rates), heights)
     root[0], root[-1] = ends
     first, last = rates  # what is in the air goes on as it goes; elsewhere what stands says how high it is
+    fallen = 0.5 * gravity / fps**2
     if hovering[0] and first is not None:
-        root[1, 1] = root[0, 1] + first[1] / fps
+        root[1, 1] = root[0, 1] + first[1] / fps - fallen
     if hovering[1] and last is not None:
-        root[-2, 1] = root[-1, 1] - last[1] / fps
+        root[-2, 1] = root[-1, 1] - last[1] / fps - fallen
     firm = np.stack([np.interp(times, half_steps, limb) for limb in stance.stands.T], axis=1)
     aloft, leaps = (np.interp(times, half_steps, one) for one in (aloft, stance.leaps))
     frames, fine, rotations = fps * half_steps[given], not np.array_equal(plain, rotations), rotations.copy()

@@ -14,7 +14,9 @@ from motionmind.body.human import human23
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
 from motionmind.geometry import rotations as rot
-from motionmind.realise.retime import HURRIES, jump_in_time
+from motionmind.realise.flight import PUSHES, find_falls
+from motionmind.realise.retime import HURRIES, jump_in_time, land_between, slow_down
+from motionmind.realise.timeline import Timeline
 
 BODY, FPS = human23(), 30.0
 CROUCH = 0.6  # metres: below this no dancer has the pelvis before a leap or after it; in a split it is at 0.3
@@ -79,6 +81,64 @@ def test_from_leap_to_leap_the_body_lands_on_its_feet_between(ballet: Engine) ->
     motion = ballet.tween(a, b, fps=FPS).motion
     check_leap(motion)
     assert lowest_height(BODY, motion.rotations, motion.root).min() < 0.02
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_who_leaves_in_the_air_at_a_velocity_goes_on_with_it(ballet: Engine, number: int) -> None:
+    clip = next(clip for clip in ballet.corpus.clips if clip.name == "grand-jete")
+    recorded = ballet.corpus.recording(clip).resample(FPS)
+    low = lowest_height(BODY, recorded.rotations, recorded.root)
+    up = np.flatnonzero(low > 0.3)
+    frame = int(up[(number + 1) * len(up) // 4])
+    stands = standing(ballet, 0)[number]
+    before = recorded.slice(frame - 2, frame + 1)
+    motion = ballet.tween(before.posture(2), in_place(stands, before.posture(2)), before=before, fps=FPS).motion
+    mass = centre_of_mass(BODY, motion.rotations, motion.root)
+    assert mass is not None
+    rates = FPS * np.diff(mass[:, 1])
+    falling = np.flatnonzero(off_floor(motion))
+    assert len(falling) > 2
+    assert np.mean(np.abs(FPS * np.diff(rates)[falling] / GRAVITY + 1.0) < 0.3) > 0.75  # legs whip down from a split
+    assert falling.max() < 0.6 * FPS  # it comes down, and does not hover
+    gone = FPS * (recorded.root[frame, 1] - recorded.root[frame - 1, 1])
+    assert FPS * (motion.root[1, 1] - motion.root[0, 1]) == pytest.approx(gone, abs=0.7)
+
+
+def test_legs_that_come_down_fast_do_not_hide_a_fall(ballet: Engine) -> None:
+    """The root of a body that closes a split does not fall as its mass does."""
+    motion = ballet.tween(leap(ballet, 1), in_place(standing(ballet, 1)[0], leap(ballet, 1)), fps=FPS).motion
+    ends = np.arange(len(motion)) % (len(motion) - 1) == 0
+    _, falls = find_falls(BODY, motion.rotations, motion.root, ends, FPS)
+    assert [first for first, _ in falls] == [1]
+    slow = np.full(len(BODY) + 4, 1e-3)  # all of it is too fast
+    slower, _ = slow_down(motion, Timeline(motion.times[[0, -1]], motion.times, 1), slow, (False, False))
+    last = falls[0][1]
+    np.testing.assert_allclose(np.diff(slower.root[:last, 1]), np.diff(motion.root[:last, 1]), atol=0.02)
+    assert len(slower) > 3 * len(motion)
+
+
+@pytest.mark.parametrize("moving", [(False, False), (True, True)])
+def test_who_is_in_the_air_twice_has_the_time_to_come_down(moving: tuple[bool, bool]) -> None:
+    seconds = np.full(12, 0.05)
+    longer = land_between(seconds, np.array([0.25, 0.5]), 1.0, moving)
+    falls = np.sqrt(2.0 * 0.25 / GRAVITY) + np.sqrt(2.0 * 0.5 / GRAVITY)
+    assert float(longer @ seconds) > falls + 2.0 * PUSHES
+    assert longer.min() >= 1.0
+    assert (longer[0] < 1.2 * longer.min()) == moving[0] or not any(moving)
+    # One leap leads from the one to the other, or there is time enough.
+    for takes, heights in ((0.02, [0.25, 0.5]), (0.2, [0.25, 0.5])):
+        unchanged = land_between(np.full(12, takes), np.array(heights), 1.0, moving)
+        np.testing.assert_array_equal(unchanged, np.ones(12))
+
+
+def test_from_one_jump_into_a_higher_one_the_body_lands(ballet: Engine) -> None:
+    a = leap(ballet, 1)
+    lower = replace(a, root=a.root - [0.0, 0.15, 0.0])
+    for there, back in ((lower, a), (a, lower)):
+        motion = ballet.tween(there, back, fps=FPS).motion
+        low = lowest_height(BODY, motion.rotations, motion.root)
+        assert low.min() < 0.02
+        assert low.max() < max(low[0], low[-1]) + 0.15
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(1.05, 30.0), (2.05, 30.0), (2.0, 7.3)])

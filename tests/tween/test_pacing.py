@@ -141,6 +141,18 @@ def test_pace_scales_the_time_and_not_the_moves(engine: Engine, pace: float) -> 
     assert seconds(given) == pytest.approx(seconds(engine.tween(*ends(engine), moves=4)) / pace, abs=FRAMES)
 
 
+@pytest.mark.parametrize("pace", [0.5, 0.3, 0.15])
+@pytest.mark.parametrize("name", ["karate", "ballet"])
+def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float) -> None:
+    """Feet, falls and the weight are as quick at any pace: they do not make a slow movement slower still."""
+    known = Engine.load(name)
+    drawn = np.random.default_rng(3).integers(len(known.corpus), size=(4, 2))
+    for pair in drawn:
+        a, b = (Posture(known.corpus.skeleton, known.corpus.rotations[k], known.corpus.root[k]) for k in pair)
+        own, other = (seconds(known.tween(a, b, pace=one)) for one in (1.0, pace))
+        assert 0.85 < other * pace / own < 1.1
+
+
 @pytest.mark.parametrize("asked", [{"pace": 0.0}, {"pace": -1.0}, {"pace": np.inf}, {"pace": 1.2, "duration": 2.0}])
 def test_a_pace_that_cannot_be_is_refused(asked: dict[str, float]) -> None:
     with pytest.raises(MotionMindError, match="pace"):
