@@ -25,6 +25,7 @@ from motionmind.notation.score import Score
 
 _MOST = 60  # names in a message
 _POSTURES = 64  # that are kept, each with its whole score
+_SCORES = 16  # files, or corpora, whose scores are kept
 _SUFFIX = re.compile(r"\.[a-z]\w{1,4}", re.IGNORECASE | re.ASCII)  # as names of files end
 
 
@@ -192,10 +193,19 @@ _kept: dict[tuple[Path, ...], tuple[_Stamps, Sequence[Score]]] = {}
 
 def _read_once(places: tuple[Path, ...]) -> Sequence[Score]:
     """Return scores; they are read anew once a file has changed."""
-    if places not in _kept or _stamps(_kept[places][0]) != _kept[places][0]:
-        scores, files = read_scores(places)
-        _kept[places] = _stamps(files), scores
-    return _kept[places][1]
+    known = _kept.get(places)
+    if known is not None and _stamps(known[0]) == known[0]:
+        return known[1]
+    before = _stamps(places)
+    scores, files = read_scores(places)
+    stamps = _stamps(files)
+    _kept.pop(places, None)
+    # What was written while it was read may have been read in part, or not at all: it is read again next time.
+    if _stamps(places) == before:
+        while len(_kept) >= _SCORES:
+            _kept.pop(next(iter(_kept)))
+        _kept[places] = stamps, scores
+    return scores
 
 
 @lru_cache(_POSTURES)

@@ -119,8 +119,6 @@ def carry(
     above = root[[0, -1], 1] - standing[[0, -1]]
     staying = find_staying(shape, root[:, [0, 2]]) if above.max() < TIPTOE else None
     hovering = [staying is None and known.aloft[end] > SURELY and above[end] > HOVERS for end in (0, -1)]
-    steps = fps * np.diff(mass[:, 1])[[0, -1]]  # the mass moves in the body, too
-    rates = tuple(None if rate is None else rate + float(own) for rate, own in zip(known.rates, steps, strict=True))
     flights = []
     if "flight" not in without and staying is None:
         flights = find_flights(
@@ -129,7 +127,7 @@ def carry(
             standing + mass[:, 1],
             root[[0, -1], 1] + mass[[0, -1], 1],
             (hovering[0], hovering[1]),
-            (rates[0], rates[1]),
+            _rates_of_mass(known.rates, mass, fps),
             gravity,
             fps,
         )
@@ -266,6 +264,18 @@ def _mass(skeleton: Skeleton, rotations: Floats) -> Floats:
     still = np.zeros((len(rotations), 3))
     mass = centre_of_mass(skeleton, rotations, still)
     return still if mass is None else mass
+
+
+def _rates_of_mass(
+    rates: tuple[float | None, float | None], mass: Floats, fps: float
+) -> tuple[float | None, float | None]:
+    """Return vertical velocities of the centre of mass, from those of the root in the first and in the last frame, and
+    where it is relative to that [N, 3]; None where they are unknown."""
+    first, last = (
+        None if rate is None else rate + float(step)
+        for rate, step in zip(rates, fps * np.diff(mass[:, 1])[[0, -1]], strict=True)
+    )
+    return first, last
 
 
 def _falls(

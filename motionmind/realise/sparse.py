@@ -16,8 +16,10 @@ no walk is lost.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Concatenate, Generic, NamedTuple, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -119,7 +121,39 @@ def steps_on(chosen: Chosen, near: Floats) -> tuple[Ints, Ints, Floats]:
     return begins, goals, np.concatenate([chosen.shares, np.ones(len(ends))])
 
 
-@lru_cache(maxsize=KEPT)  # of all parts; the guide of a search and its motion ask for the same
+_Owner = TypeVar("_Owner")
+_Asked = ParamSpec("_Asked")
+_Found = TypeVar("_Found")
+
+
+class _Kept(Generic[_Owner, _Asked, _Found]):
+    """A function whose last results for each first argument are kept for as long as that is in use, and no longer."""
+
+    def __init__(self, function: Callable[Concatenate[_Owner, _Asked], _Found]) -> None:
+        self._function = function
+        self._kept: WeakKeyDictionary[_Owner, Callable[_Asked, _Found]] = WeakKeyDictionary()
+
+    def __call__(self, owner: _Owner, /, *asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
+        if owner not in self._kept:
+            self._kept[owner] = self._keeping(ref(owner))
+        return self._kept[owner](*asked, **named)
+
+    def _keeping(self, owner: ref[_Owner]) -> Callable[_Asked, _Found]:
+        """Return the function for an owner that what is kept does not keep in use."""
+
+        def look(*asked: _Asked.args, **named: _Asked.kwargs) -> _Found:
+            here = owner()
+            assert here is not None
+            return self._function(here, *asked, **named)
+
+        kept: Callable[_Asked, _Found] = lru_cache(maxsize=KEPT)(look)  # type: ignore[assignment]
+        return kept
+
+    def cache_clear(self) -> None:
+        self._kept.clear()
+
+
+@_Kept  # of all parts; the guide of a search and its motion ask for the same
 def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints, Ints]:
     """Return the moments near both ends in one part of the body [2, n], and those that follow on the first or lead to
     the last, some steps on; `ends` are the bytes of those of `choose`."""
@@ -130,7 +164,7 @@ def _near_ends(carriage: Carriage, number: int, ends: bytes) -> tuple[Ints, Ints
     return near, follow(near[0], True, ALONG, *chain), follow(near[1], False, ALONG, *chain)
 
 
-@lru_cache(maxsize=KEPT)
+@_Kept
 def _balls(trees: Neighbours, number: int) -> Ints:
     """Return the nodes of the balls that a part's tree is cut into, in its order [B]."""
     return _cut(trees.bounds, trees.radii[number], trees.weights[number])

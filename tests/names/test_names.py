@@ -272,3 +272,32 @@ def test_what_names_nothing_is_told_with_what_there_is(word: str, message: str) 
     with pytest.raises(MotionMindError, match=message) as raised:
         find_posture(word)
     assert "\n" not in str(raised.value)
+
+
+def test_a_score_that_is_saved_while_it_is_read_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "mine.score"
+    text = (BALLET / "vocabulary.score").read_text("utf-8")
+    path.write_text(text, "utf-8")
+    read = finding.read_scores
+
+    def saved_meanwhile(places: tuple[Path, ...]) -> tuple[list[Score], list[Path]]:
+        found = read(places)
+        path.write_text(text + "\n# and more\n", "utf-8")
+        return found
+
+    monkeypatch.setattr(finding, "read_scores", saved_meanwhile)
+    first = finding._read_once((path,))
+    monkeypatch.setattr(finding, "read_scores", read)
+    again = finding._read_once((path,))
+    assert again is not first
+    assert finding._read_once((path,)) is again
+
+
+def test_scores_of_few_files_are_kept(tmp_path: Path) -> None:
+    text = (BALLET / "vocabulary.score").read_text("utf-8")
+    for number in range(finding._SCORES + 5):
+        path = tmp_path / f"{number}.score"
+        path.write_text(text, "utf-8")
+        finding._read_once((path,))
+        path.unlink()
+    assert len(finding._kept) <= finding._SCORES

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -193,3 +195,18 @@ def test_a_tween_of_a_corpus_with_trees_is_near_that_without(engine: Engine, car
         )
         assert few.report()["left_out"] == few.left_out >= 0.0 == whole.left_out
         assert np.sqrt(np.mean(rot.angle(few.motion.rotations, whole.motion.rotations) ** 2)) < 0.15
+
+
+def test_look_ups_are_kept_as_long_as_the_corpus_and_no_longer(engine: Engine, carriage: Carriage) -> None:
+    own = replace(carriage)
+    assert own.trees is not None
+    own = replace(own, trees=replace(own.trees))
+    ends = own.orientations[:2][:, own.trees.parts[0]].tobytes()
+    first = sparse._near_ends(own, 0, ends)
+    assert sparse._near_ends(own, 0, ends) is first
+    assert sparse._near_ends(carriage, 0, ends) is not first
+    assert sparse._balls(own.trees, 0) is sparse._balls(own.trees, 0)
+    alive, trees = weakref.ref(own), weakref.ref(own.trees)
+    del own
+    gc.collect()
+    assert alive() is trees() is None
