@@ -140,7 +140,7 @@ def _or_none(value: float) -> float | None:
 
 
 class _Shown(NamedTuple):
-    """What movement of T frames, at 30 a second, shows.
+    """Movement of T frames as it is seen, at 30 a second.
 
     Attributes:
         frames: in each frame [T, M].

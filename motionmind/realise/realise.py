@@ -121,9 +121,10 @@ def realise(
         without: corrections to leave out.
         pace: how many times as fast as the corpus to move, where there is no `length`.
         fastest: speeds that the joints, the body's turning and its travel keep to [J + 2], as in
-            `motionmind.learned.pace`, at a pace of 1 and where there is no `length`; None for any speed.
+            `motionmind.learned.pace`, at a pace of 1; None for any speed. Where there is a `length`, as far as slower
+            parts of the movement have the time for it.
         peaks: returns what the greatest of movement of so many seconds keep to at a pace [J + 4], as
-            `motionmind.learned.pace.Pace.peaks_in` does; None where there is a `length`.
+            `motionmind.learned.pace.Pace.peaks_in` does; None for any.
         slides: speed of a foot near the floor, heights/s, that movement with `peaks` keeps to at a pace of 1.
     """
     if len(path) == 1:
@@ -135,6 +136,9 @@ def realise(
     slower = 1.0 if length else 1.0 / pace  # the walk is made at a pace of 1, and then taken faster
     # Steps and the weight take their time at any pace: who is slower may take them as fast as the corpus does.
     pace = max(pace, 1.0)
+    speeds, windows = fastest, peaks
+    if length is not None:  # what is faster than that then takes its time from the rest, in the end
+        fastest = peaks = None
     stops[0] = stop_at(corpus, a, _times(slower, leaving))
     stops[len(path) - 1] = stop_at(corpus, b, _times(slower, arriving))
     states = grammar.centres[grammar.transitions.starts[: path.shape[1]] + path]
@@ -164,7 +168,6 @@ def realise(
     keep_apart = keeper(clock, [*stops], fixed, wished, carriage, a.skeleton, without)
     rotations = _limit(keep_apart(rotations, None), postures, carriage.loose)
 
-    most = None
     if peaks is not None:
         most = peaks(LONGER * float(clock.frames[-1]), pace)
         high = np.sqrt(2.0 * GRAVITY * stance.leaps) > JUMPS_AT * most[-2] * a.skeleton.height
@@ -198,11 +201,9 @@ def realise(
         without=without,
     )
     motion = settle(Motion(a.skeleton, rotations, root, clock.frames), clock)
-    if most is not None:
-        quickest, joints = ENDS_AT * most, len(a.skeleton)
-        if quick is not None:
-            quickest[:joints] = np.minimum(quickest[:joints], JOINTS_AT * quick[:joints])
-        motion, clock = slow_down(motion, clock, quickest, moving, pace * slides, settle)
+    if windows is not None:
+        quickest = _quickest(windows(LONGER * float(clock.frames[-1]), pace), speeds, pace, len(a.skeleton))
+        motion, clock = slow_down(motion, clock, quickest, moving, pace * slides, settle, lasts=length is not None)
     return Realised(replace(motion, name="tween", insertions=(Insertion(clock.moves),)), detailed, walk.left_out)
 
 
@@ -294,6 +295,15 @@ def _for_jumps(
     reach = 2 * (moves[1] - moves[0]), 2 * (moves[-1] - moves[-2])
     rotations = rot.normalise(corpus.from_chains(walk.chains(corpus, walk.half_steps)))
     return jump_in_time(skeleton, rotations, seconds, stance.clearance, above, in_air, reach, fastest[: len(skeleton)])
+
+
+def _quickest(most: Floats, speeds: Floats | None, pace: float, joints: int) -> Floats:
+    """Return what movement keeps to in the end [J + 4]: a little less than `most`; of its joints, not much more than
+    their speeds in all but a hundredth of the corpus's moments [J + 2], at a pace."""
+    out = ENDS_AT * most
+    if speeds is not None:
+        out[:joints] = np.minimum(out[:joints], JOINTS_AT * pace * speeds[:joints])
+    return out
 
 
 def _bounds(chains: Floats, path: Int32s, grammar: Grammar, tolerances: Floats, wished: Bools) -> Floats:

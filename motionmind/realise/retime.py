@@ -40,6 +40,7 @@ JUMPS_AT = 0.95  # share of the fastest rise with which a body jumps on the way 
 AROUND = 1.0 / 6.0  # seconds about what is too quick, in which the clock is slower
 LONGER = 1.1  # times as long as it was a movement is taken to be at most, when it is compared with others as long
 ROUNDS = 3  # of slowing down at most
+SPARES = 0.5  # share of the time that slow parts could do without, which fast ones may take
 AGAIN = 3  # times at most that it slows down and settles
 SLIGHT = 1e-3  # by which a clock is not worth slowing
 LEFT = 0.1  # metres, of a person: walks that are no higher have not left the floor
@@ -171,6 +172,7 @@ def slow_down(
     moving: tuple[bool, bool],
     slides: float = np.inf,
     settle: Callable[[Motion, Timeline], Motion] | None = None,
+    lasts: bool = False,
 ) -> tuple[Motion, Timeline]:
     """Return a movement and its clock, slower where a part of the body is faster than the most, or the root starts so.
 
@@ -185,11 +187,14 @@ def slow_down(
         moving: whether the first and the last posture are passed at a given velocity, which is not to change.
         slides: speed of a foot near the floor, heights/s; of bodies at least as tall as people.
         settle: returns a slower movement in which limbs do not meet and who is slower is in balance; None for as it is.
+        lasts: whether it is to last as long as before: then what is slower takes its time from where nothing is fast.
     """
     for again in range(AGAIN if settle else 1):
         before = clock
         for number in range(ROUNDS):
-            slower = _slower(motion, most, slides, moving)
+            slower, slack = _slower(motion, most, slides, moving)
+            if lasts:
+                slower = _within(slower, slack, np.diff(motion.times))
             if slower.max() < (1.0 / ENDS_AT if again or number else 1.0 + SLIGHT):
                 break
             motion, clock = _slowed(motion, clock, slower)
@@ -199,25 +204,45 @@ def slow_down(
     return motion, clock
 
 
-def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, bool]) -> Floats:
-    """Return how many times longer each step of a movement is to take [N - 1]; arguments are those of `slow_down`."""
+def _slower(motion: Motion, most: Floats, slides: float, moving: tuple[bool, bool]) -> tuple[Floats, Floats]:
+    """Return how many times longer each step of a movement is to take [N - 1], at least 1, and what share of its time
+    it could do without [N - 1]; arguments are those of `slow_down`."""
     times, body = motion.times, motion.skeleton
     middles, fps = 0.5 * (times[1:] + times[:-1]), 1.0 / float(times[1] - times[0])
     ends = [time for fixed, time in zip(moving, times[[0, -1]], strict=True) if fixed]
     free = np.minimum(_away(middles, ends, fps), _away(middles, times[_falling(motion, fps)], fps, PUSHES))
-    slower = np.maximum((fps * steps_of(motion) / most[:-1]).max(axis=1), 1.0)
+    shown = (fps * steps_of(motion) / most[:-1]).max(axis=1)
     # Twice as slow a movement has a quarter of its accelerations; each is between two steps.
     changes = np.sqrt(accelerations(moved_in(motion), fps) / most[-1])
-    slower[1:], slower[:-1] = np.maximum(slower[1:], changes), np.maximum(slower[:-1], changes)
+    shown[1:], shown[:-1] = np.maximum(shown[1:], changes), np.maximum(shown[:-1], changes)
     if np.isfinite(slides) and body.height >= TALL:
         low = lowest_height(body, motion.rotations, motion.root)
         slid = foot_slides(body, motion.rotations, motion.root, _floor(times, low, times))
-        slower = np.maximum(slower, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
-    slower[free < SLIGHT] = 1.0
+        shown = np.maximum(shown, fps * slid.max(axis=1, initial=0.0) / (slides * body.height))
+    shown[free < SLIGHT] = 1.0
     reach = max(1, round(AROUND * fps))
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(slower, reach, mode="edge"), 2 * reach + 1).max(axis=1)
-    around = np.convolve(np.pad(around, reach, mode="edge"), bell(reach), "valid")
-    return np.asarray(1.0 + free * (around - 1.0))
+
+    def around(values: Floats) -> Floats:
+        greatest = np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1).max(
+            axis=1
+        )
+        return np.convolve(np.pad(greatest, reach, mode="edge"), bell(reach), "valid")
+
+    slower = 1.0 + free * (around(np.maximum(shown, 1.0)) - 1.0)
+    return slower, free * (1.0 - around(np.minimum(shown, 1.0)))
+
+
+def _within(slower: Floats, slack: Floats, seconds: Floats) -> Floats:
+    """Return how many times as long each step is to take [N - 1] so that all of them take as long as before.
+
+    Args:
+        slower: how many times longer each is to take [N - 1].
+        slack: what share of its time each could do without [N - 1]; up to SPARES of that is taken.
+        seconds: how long each takes [N - 1].
+    """
+    more, spare = float((slower - 1.0) @ seconds), float(slack @ seconds)
+    share = min(1.0, SPARES * spare / more) if more > 0.0 else 0.0
+    return np.asarray(1.0 + share * (slower - 1.0) - slack * (share * more / max(spare, 1e-9)))
 
 
 def _slowed(motion: Motion, clock: Timeline, slower: Floats) -> tuple[Motion, Timeline]:

@@ -219,7 +219,7 @@ class Engine(LearnedCorpus):
     def _realise(self, formulation: Formulation, certificate: Certificate) -> Realised:
         """Return the motion of a path."""
         request = formulation.request
-        paced = request.paced and not request.fixes_length
+        paced = request.paced and request.moves is None
         return realise(
             places(formulation.searched.model, certificate.path),
             formulation.a,

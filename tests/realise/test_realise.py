@@ -528,7 +528,9 @@ def test_limbs_that_meet_as_the_clock_slows_come_apart(walking: Learned, monkeyp
         moving: tuple[bool, bool],
         slides: float,
         settle: Callable[[Motion, Timeline], Motion],
+        lasts: bool,
     ) -> tuple[Motion, Timeline]:
+        assert not lasts
         inward = np.zeros((len(motion), 3))
         inward[:, 2] = 0.35 * np.hanning(len(motion))
         rotations = motion.rotations.copy()

@@ -157,6 +157,19 @@ def test_what_is_too_fast_as_it_settles_is_slowed_once_more() -> None:
     assert not times
 
 
+@pytest.mark.parametrize("top", [2.5, 4.0])
+def test_what_is_too_fast_takes_its_time_from_the_rest_where_the_whole_lasts_as_long(top: float) -> None:
+    motion, clock = bent(quick(top))
+    slower, later = slow_down(motion, clock, most(2.0), STILL, lasts=True)
+    assert (len(slower), slower.times[-1], later.moves[-1]) == (91, motion.times[-1], motion.times[-1])
+    assert speeds(slower).max() < 2.0 * 1.06 < speeds(motion).max()
+    assert speeds(slower)[0] > speeds(motion)[0]
+    np.testing.assert_array_equal(slower.rotations[[0, -1]], motion.rotations[[0, -1]])
+    # Who has no time to spare stays as fast.
+    hurries, clock = bent(np.linspace(0.0, 9.0, 91))
+    assert slow_down(hurries, clock, most(2.0), STILL, lasts=True) == (hurries, clock)
+
+
 @pytest.mark.parametrize("end", [0, 1])
 def test_an_end_that_is_passed_at_a_velocity_keeps_it(end: int) -> None:
     angles = np.concatenate([[0.0], np.cumsum(np.linspace(6.0, 0.5, 90)) / FPS])

@@ -153,6 +153,14 @@ def test_who_is_slower_takes_no_longer_than_in_proportion(name: str, pace: float
         assert 0.85 < other * pace / own < 1.1
 
 
+@pytest.mark.parametrize("long", [7.0, 12.0, 20.0, 30.0, 60.0])
+def test_who_has_time_is_nowhere_faster_than_the_corpus(ballet: Engine, long: float) -> None:
+    tween = ballet.tween(*ENDS, duration=long)
+    assert tween.motion.times[-1] == pytest.approx(long)
+    speeds = way_of(tween.motion).parts / np.diff(tween.motion.times)[:, None]
+    assert np.all(speeds.max(axis=0) < 1.05 * ballet.pace.greatest)
+
+
 @pytest.mark.parametrize("asked", [{"pace": 0.0}, {"pace": -1.0}, {"pace": np.inf}, {"pace": 1.2, "duration": 2.0}])
 def test_a_pace_that_cannot_be_is_refused(asked: dict[str, float]) -> None:
     with pytest.raises(MotionMindError, match="pace"):
