@@ -9,24 +9,27 @@ files it is a body that stands upright, with arms and legs in some position:
   the parent joint: arms hang, or legs are spread, by such rotations;
 - feet stand flat, so an ankle is rotated about the shank only, and toes as the ankle.
 
-Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.frames`).
+Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.frames`), or show them in the movement
+(`motionmind.retarget.standing`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.joint_mapping import in_a_row, joint_mapping, known_rig
 from motionmind.retarget.rigs import Rig
+from motionmind.retarget.standing import align_by_movement, standing_pose, stands
 
 _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "fingers"}
 _SHAPES = 64  # bodies whose fit is known again: a collection's files are of a few
@@ -46,6 +49,8 @@ class Fit:
         alignment: orientation of human23's axes in the frames of those joints, quaternions [23, 4].
         skeleton: human23 with the file's proportions.
         up: direction of the trunk in the frame of the pelvis's source [3].
+        stands: whether the zero pose stands, or its alignment is known from the rig.
+        unclear: joints whose turn about their bones neither the zero pose nor the movement shows.
     """
 
     turns: Indices
@@ -53,6 +58,8 @@ class Fit:
     alignment: Floats
     skeleton: Skeleton
     up: Floats
+    stands: bool = True
+    unclear: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +105,22 @@ class _Shape:
     skeleton: Skeleton = field(compare=False)
 
 
-def fit_human23(skeleton: Skeleton, joints: Mapping[str, str] | None) -> Fit:
-    """Fit human23 to a file's skeleton; SkeletonError if its joints do not map there."""
+def fit_human23(movement: Motion | Posture, joints: Mapping[str, str] | None) -> Fit:
+    """Fit human23 to a file's skeleton; SkeletonError if its joints do not map there.
+
+    The movement counts where the skeleton's zero pose does not stand.
+    """
+    skeleton = movement.skeleton
     shape = _Shape(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes(), skeleton)
-    return _fit_shape(shape, None if joints is None else tuple(joints.items()))
+    sources, alignment = _align_shape(shape, None if joints is None else tuple(joints.items()))
+    if alignment is None:
+        return _fit_movement(sources, movement)
+    return _fit(sources, alignment, sources)
 
 
 @lru_cache(_SHAPES)
-def _fit_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> Fit:
+def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tuple[_Sources, Floats | None]:
+    """Return the sources of human23's joints, and their alignments [23, 4]; None if the zero pose shows none."""
     skeleton, joints = shape.skeleton, None if given is None else dict(given)
     rig: Rig | None = None
     if joints is not None:
@@ -117,14 +132,33 @@ def _fit_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> Fit:
         rig, mapping = known
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
-        alignment = _inherit_alignments({name: rig.frames[name] for name in rig.frames if name in mapping.values()})
-    else:
-        alignment = _align_standing(sources, _body_axes(sources), rig)
+        frames = {name: rig.frames[name] for name in rig.frames if name in mapping.values()}
+        return sources, _inherit_alignments(frames)
+    if not stands([sources.place(name) for name in human23().names]):
+        return sources, None
+    return sources, _align_standing(sources, _body_axes(sources), rig)
+
+
+def _fit_movement(sources: _Sources, movement: Motion | Posture) -> Fit:
+    """Fit human23 to a rig whose zero pose does not stand, by how it moves."""
+    skeleton, rotations = sources.skeleton, movement.rotations
+    alignment, unclear = align_by_movement(skeleton, rotations, movement.root, sources.stands, sources.turns)
+    pose = standing_pose(skeleton, rotations, sources.turns, alignment)
+    above = [max(parent, 0) for parent in skeleton.parents]
+    offsets, tips = rot.mul_vec(pose[above], skeleton.offsets), rot.mul_vec(pose, skeleton.tips)
+    upright = replace(skeleton, offsets=offsets, tips=tips)
+    standing = replace(sources, skeleton=upright, zero=upright.rest[: len(upright)])
+    return replace(_fit(sources, alignment, standing), stands=False, unclear=tuple(unclear))
+
+
+def _fit(sources: _Sources, alignment: Floats, standing: _Sources) -> Fit:
+    """Return the fit with these alignments [23, 4]; its proportions are those of `standing`."""
     turns = list(sources.turns)
     for i, parent in enumerate(human23().parents):
         turns[i] = turns[parent] if turns[i] < 0 else turns[i]
-    body, up = _proportions(sources, alignment), rot.mul_vec(alignment[0], _UP)
-    return Fit(np.array(turns), sources.stands[0], alignment, body, up)
+    axes = alignment if standing is sources else np.tile(rot.IDENTITY, (len(alignment), 1))
+    up = rot.mul_vec(alignment[0], _UP)
+    return Fit(np.array(turns), sources.stands[0], alignment, _proportions(standing, axes), up)
 
 
 def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:

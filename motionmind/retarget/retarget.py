@@ -9,7 +9,8 @@ The fit of the two bodies is `motionmind.retarget.fitting`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -20,7 +21,7 @@ from motionmind.arguments import check_mapping, check_text, check_type
 from motionmind.body.human import human23
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import MotionMindError
+from motionmind.errors import MotionMindError, MotionMindWarning, enumerated
 from motionmind.geometry import rotations as rot
 from motionmind.retarget.fitting import Fit, fit_human23, unit
 from motionmind.retarget.joint_mapping import (
@@ -63,6 +64,7 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
 
     Raises:
         SkeletonError: the skeleton does not map to human23, or its zero pose does not show how the body stands.
+        MotionMindWarning: the zero pose does not stand, and the movement does not show how limbs are turned.
         MotionMindError: `up` is neither "y" nor "z".
 
     >>> import numpy as np
@@ -83,7 +85,9 @@ def to_human23(movement: Movement, joints: Mapping[str, str] | None = None, *, u
         and not _lies(movement.skeleton)
     ):
         return movement
-    fit = fit_human23(movement.skeleton, joints)
+    fit = fit_human23(movement, joints)
+    if fit.unclear:
+        warnings.warn(_describe_unclear(movement.skeleton.name, fit.unclear), MotionMindWarning, stacklevel=2)
     renamed: dict[str, Any] = {}
     if isinstance(movement, Motion) and movement.insertions:
         mapping = joint_mapping(movement.skeleton, joints) or {}
@@ -113,7 +117,7 @@ def from_human23(motion: Motion, like: Posture, joints: Mapping[str, str] | None
         SkeletonError: the rig does not map to human23, or its zero pose does not show how the body stands.
     """
     rig = like.skeleton
-    fit = fit_human23(rig, joints)
+    fit = fit_human23(like, joints)
     source = dict(zip(reversed(fit.turns.tolist()), reversed(range(len(fit.turns))), strict=True))  # parents win
     turned = rot.mul_inv(motion.skeleton.global_rotations(motion.rotations), fit.alignment)
     placed = np.empty((len(motion), len(rig), 4))
@@ -157,13 +161,21 @@ def own_skeleton(movement: Movement, joints: Mapping[str, str] | None = None) ->
     return to_human23(movement, joints) if known or joints is not None else movement
 
 
+def _describe_unclear(name: str, joints: Sequence[str]) -> str:
+    """Say that movement does not show how joints of human23 are turned about their bones."""
+    return (
+        f"{name}: with all rotations 0 it does not stand, and {enumerated(joints)} bend too little to show how they "
+        "are turned about their bones: they may be turned wrongly"
+    )
+
+
 def _vertical(fit: Fit, movement: Motion | Posture, turned: Floats) -> str:
     """Return "z" if the zero pose or the movement stands along z, as `to_human23` says, else "y".
 
     The pelvis's source is `turned` [..., 4] in the world.
     """
     mean = rot.mul_vec(turned, fit.up).reshape(-1, 3).mean(axis=0)
-    if fit.up[2] >= _STANDS:
+    if fit.stands and fit.up[2] >= _STANDS:
         return "y" if mean[1] > 0.5 and mean[1] > mean[2] else "z"
     if mean[2] < _STANDS:
         return "y"

@@ -14,7 +14,7 @@ from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError, SkeletonError
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning, SkeletonError
 from motionmind.formats.asf_amc import read_amc
 from motionmind.formats.bvh import read_bvh, write_bvh
 from motionmind.geometry import rotations as rot
@@ -409,6 +409,83 @@ def test_a_body_half_as_large_keeps_its_size() -> None:
     found = to_human23(disguise(motion, rig_names("Biovision"), spread()))
     np.testing.assert_allclose(found.skeleton.offsets, small.offsets, atol=1e-12)  # the fingers' too
     assert found.skeleton.height == pytest.approx(small.height)
+
+
+# --- zero poses that do not stand ----------------------------------------------------------------------------------
+
+
+@cache
+def stroll(bends: float = 1.0, frames: int = 120) -> Motion:
+    """A body that steps on the spot: knees, elbows and toes bend as hinges do, all else sways; without toes' tips down.
+
+    `bends` is the share of the hinges' usual bends.
+    """
+    rng = np.random.default_rng(7)
+    phase = np.linspace(0.0, 8.0 * np.pi, frames)
+    sway = 0.1 * np.sin(
+        phase[:, None, None] * rng.uniform(0.5, 2.0, (len(BODY), 3)) + rng.uniform(0, 6, (len(BODY), 3))
+    )
+    angles = dict(zip(BODY.names, np.moveaxis(sway, 1, 0), strict=True))
+    for side, sign in SIDES:
+        lift = bends * np.maximum(0.0, sign * np.sin(phase))
+        angles[f"{side}_hip"] = angles[f"{side}_hip"] * [1.0, 0.5, 0.5] - np.outer(0.7 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_knee"] = np.outer(0.05 * bends + 1.2 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_ankle"] = np.outer(-0.5 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_toes"] = np.outer(-0.3 * lift, [1.0, 0.0, 0.0])
+        angles[f"{side}_shoulder"] = angles[f"{side}_shoulder"] + [0.0, 0.0, -sign * 1.2]
+        angles[f"{side}_elbow"] = np.outer(-sign * (0.3 * bends + 0.5 * lift), [0.0, 1.0, 0.0])
+    turns = rot.exp(np.stack([angles[name] for name in BODY.names], axis=1))
+    low = BODY.positions_and_tips(turns, np.zeros((frames, 3)))[..., 1].min(axis=1)
+    return Motion(BODY, turns, np.stack([0.0 * low, -low, 0.0 * low], axis=1), np.arange(frames) / 30.0)
+
+
+def along_bones(axis: str, roll: float, world: tuple[str, ...] = ()) -> dict[str, Floats]:
+    """Where human23's axes lie in joints whose own axis is along their bones, turned about them by `roll` degrees."""
+    first = {BODY.names[parent]: child for child, parent in reversed([*enumerate(BODY.parents)]) if parent >= 0}
+    first |= {"pelvis": BODY.index("lumbar"), "thorax": BODY.index("cervical")}
+    sign = -1.0 if axis[0] == "-" else 1.0
+    along = sign * np.eye(3)["xyz".index(axis[-1])]
+    out = {}
+    for i, name in enumerate(BODY.names):
+        bone = BODY.offsets[first[name]] if name in first else BODY.tips[i]
+        out[name] = rot.mul(rot.from_axis_angle(along, np.radians(roll)), rot.between(bone, along))
+    return out | dict.fromkeys(world, rot.IDENTITY)
+
+
+@pytest.mark.parametrize(
+    ("axis", "roll", "world"),
+    [("x", 0.0, ()), ("y", 0.0, ()), ("-x", 90.0, ()), ("y", 37.0, ()), ("x", 0.0, ("pelvis",)), ("x", 180.0, ())],
+)
+@pytest.mark.parametrize("rig", ["Mixamo", "Biovision"])
+def test_a_zero_pose_along_its_bones_is_seen_through(rig: str, axis: str, roll: float, world: tuple[str, ...]) -> None:
+    source = disguise(stroll(), rig_names(rig), {}, along_bones(axis, roll, world))
+    found = to_human23(source)
+    off = np.degrees(
+        np.median(rot.angle(*(m.skeleton.global_rotations(m.rotations) for m in (found, stroll()))), axis=0)
+    )
+    hands = [i for i, name in enumerate(BODY.names) if name.endswith(("wrist", "fingers"))]
+    assert np.max(np.delete(off, hands)) < 10.0
+    assert np.max(off[hands]) < 25.0  # nothing but habit tells how a hand is turned
+    kept = [i for i, name in enumerate(BODY.names) if not name.endswith("fingers")]
+    here = found.skeleton.positions(found.rotations, found.root)
+    np.testing.assert_allclose(here[:, kept], BODY.positions(stroll().rotations, stroll().root)[:, kept], atol=1e-9)
+    back = from_human23(found, source.posture(0)) if rig == "Mixamo" and not world else None
+    assert back is None or back.skeleton is source.skeleton
+
+
+def test_limbs_that_hardly_bend_do_not_show_how_they_are_turned() -> None:
+    source = disguise(stroll(0.0), rig_names("Mixamo"), {}, along_bones("x", 0.0))
+    with pytest.warns(MotionMindWarning, match="it does not stand, and left_hip, left_knee.* bend too little to show"):
+        to_human23(source)
+
+
+def test_left_and_right_exchanged_in_a_zero_pose_along_its_bones() -> None:
+    names = {name: f"j_{name}" for name in BODY.names}
+    source = disguise(stroll(), names, {}, along_bones("x", 0.0))
+    swap = {"left": "right", "right": "left"}
+    mapping = {f"j_{name}": re.sub("left|right", lambda m: swap[m[0]], name) for name in BODY.names}
+    with pytest.raises(SkeletonError, match="left_knee bends forwards; are left and right swapped"):
+        to_human23(source, mapping)
 
 
 # --- what programs export ------------------------------------------------------------------------------------------
