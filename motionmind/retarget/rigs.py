@@ -100,6 +100,7 @@ _HUMANIK = {
         "{side}leg": "knee",
         "{side}foot": "ankle",
         "{side}toebase": "toes",
+        "{side}toe": "toes",  # LaFAN1's
         "{side}shoulder": "clavicle",
         "{side}arm": "shoulder",
         "{side}forearm": "elbow",
@@ -409,7 +410,7 @@ RIGS: tuple[Rig, ...] = (
     Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
     Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
     Rig("SMPL, models", _SMPL_MODELS, (), frozenset({"spine3", "lcollar"}), frames=_OWN_FRAMES),
-    Rig("Rokoko", _ROKOKO, ("spine1", "spine2", "spine3", "spine4")),
+    Rig("Rokoko", _ROKOKO, ("spine", "spine1", "spine2", "spine3", "spine4")),
     Rig("Xsens MVN", _XSENS, ("l5", "l3", "t12", "t8")),
     Rig("Unreal", _UNREAL, ("spine01", "spine02", "spine03", "spine04", "spine05")),
     Rig("VRM", _VRM, ("spine", "chest", "upperchest")),

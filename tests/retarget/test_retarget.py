@@ -699,6 +699,31 @@ def test_namespaces_do_not_count(prefix: str) -> None:
     assert joint_mapping(source.skeleton) == {name: joint for joint, name in names.items()}
 
 
+def test_toes_of_lafan() -> None:
+    names = {joint: name.removeprefix("mixamorig:") for joint, name in rig_names("Mixamo").items()}
+    names |= {f"{side}_toes": f"{side.title()}Toe" for side, _ in SIDES}
+    source = disguise(dance(), names, spread())
+    assert to_rig(source.skeleton) == "Mixamo"
+    same_movement(to_human23(source), dance())
+
+
+def test_a_spine_of_two_in_rokokos_names() -> None:
+    words = ("Thigh", "Shin", "Foot", "Toe", "Shoulder", "Arm", "ForeArm", "Hand", "Finger3Proximal")
+    names = dict(
+        zip(
+            ("pelvis", "lumbar", "thorax", "cervical", "atlantal"),
+            ["Hips", "Spine", "Spine4", "Neck", "Head"],
+            strict=True,
+        )
+    )
+    names |= {
+        f"{side}_{j}": side.title() + word for side, _ in SIDES for j, word in zip(LIMB_JOINTS, words, strict=True)
+    }
+    source = disguise(dance(), names, spread())
+    assert to_rig(source.skeleton) == "Rokoko"
+    same_movement(to_human23(source), dance())
+
+
 def test_case_does_not_count() -> None:
     names = {joint: name.upper() for joint, name in rig_names("Bandai-Namco").items()}
     source = disguise(dance(), names, spread())
