@@ -35,6 +35,7 @@ _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist",
 _SHAPES = 64  # bodies whose fit is known again: a collection's files are of a few
 _SAME_PLACE = 1e-6  # metres below which two joints coincide
 _LEANS = np.radians(25.0)  # the largest lean of a trunk that counts as upright
+_FACES = np.radians(3.0)  # the largest turn about the vertical that counts as straight ahead
 _POINTED = 0.4  # the share of a foot's length that lies across the shank if the foot stands on its sole
 _UP = np.array([0.0, 1.0, 0.0])
 
@@ -235,13 +236,22 @@ def _body_axes(sources: _Sources) -> Floats:
         raise SkeletonError(
             f"{sources.skeleton.name}: with all rotations 0, hips and shoulders do not show where up and left are"
         )
-    up, ahead = unit(up), unit(ahead)
-    axes = np.stack([np.cross(up, ahead), up, ahead], axis=-1)
-    # A lean of a few degrees in the zero pose is the rig's: the axes are then the nearest of the world's.
-    square = np.where(np.abs(axes) == np.max(np.abs(axes), axis=0), np.sign(axes), 0.0)
-    if np.linalg.det(square) > 0.5 and np.trace(square.T @ axes) > 1.0 + 2.0 * np.cos(_LEANS):
-        axes = square
-    return rot.from_matrix(axes)
+    # A lean of a few degrees in the zero pose is the rig's: up is then the nearest of the world's axes. Which way the
+    # body faces is its own, but for what hips and shoulders are off by themselves.
+    up, axis = unit(up), _nearest_axis(up)
+    if up @ axis > np.cos(_LEANS):
+        up, ahead = axis, np.cross(left, axis)
+        axis = _nearest_axis(ahead)
+        ahead = axis if unit(ahead) @ axis > np.cos(_FACES) else ahead
+    ahead = unit(ahead)
+    return rot.from_matrix(np.stack([np.cross(up, ahead), up, ahead], axis=-1))
+
+
+def _nearest_axis(direction: Floats) -> Floats:
+    """Return the axis of the world [3] nearest to a direction [3]."""
+    axis, longest = np.zeros(3), int(np.argmax(np.abs(direction)))
+    axis[longest] = np.sign(direction[longest])
+    return axis
 
 
 def _align_standing(sources: _Sources, body_axes: Floats, rig: Rig | None) -> Floats:

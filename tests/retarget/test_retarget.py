@@ -295,10 +295,19 @@ def test_z_up_in_the_zero_pose_but_not_in_the_movement() -> None:
     same_movement(to_human23(source), dance())
 
 
-@pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, 33.0])
+@pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, 33.0, 10.0, -20.0, 65.0])
 def test_a_zero_pose_may_face_anywhere(turn: float) -> None:
     source = disguise(dance(), rig_names("Mixamo"), spread(pelvis=about("y", turn)))
     same_movement(to_human23(source), dance())
+
+
+def test_a_zero_pose_that_leans_and_faces_elsewhere_is_taken_as_upright() -> None:
+    turn = about("y", 20.0)
+    lean = rot.mul(rot.mul(turn, about("x", 8.0)), rot.inv(turn))
+    spine = {"pelvis": turn, "lumbar": rot.mul(rot.mul(rot.inv(turn), lean), turn)}
+    source = disguise(dance(), rig_names("Mixamo"), spread() | spine)
+    at_zero = Motion(source.skeleton, np.tile(rot.IDENTITY, (1, 23, 1)), np.zeros((1, 3)), np.zeros(1))
+    np.testing.assert_allclose(rot.angle(to_human23(at_zero).rotations[0, 0], turn), 0.0, atol=1e-3)
 
 
 def test_a_zero_pose_that_leans_a_little_is_taken_as_upright() -> None:
