@@ -51,6 +51,9 @@ class Fit:
         skeleton: human23 with the file's proportions.
         up: direction of the trunk in the frame of the pelvis's source [3].
         stands: whether the zero pose stands, or its alignment is known from the rig.
+        chest: joints of human23 that show where the thorax ends, each with the index of the file's joint at its place;
+            empty unless several joints of the file's spine became one. Rigs with a table of frames have none: their
+            joints keep their orientations, in the spine too.
         unclear: joints whose turn about their bones neither the zero pose nor the movement shows.
     """
 
@@ -60,6 +63,7 @@ class Fit:
     skeleton: Skeleton
     up: Floats
     stands: bool = True
+    chest: tuple[tuple[int, int], ...] = ()
     unclear: tuple[str, ...] = ()
 
 
@@ -113,15 +117,18 @@ def fit_human23(movement: Motion | Posture, joints: Mapping[str, str] | None) ->
     """
     skeleton = movement.skeleton
     shape = _Shape(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes(), skeleton)
-    sources, alignment = _align_shape(shape, None if joints is None else tuple(joints.items()))
+    sources, alignment, has_frames = _align_shape(shape, None if joints is None else tuple(joints.items()))
     if alignment is None:
         return _fit_movement(sources, movement)
-    return _fit(sources, alignment, sources)
+    return _fit(sources, alignment, sources, () if has_frames else _find_chest(sources))
 
 
 @lru_cache(_SHAPES)
-def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tuple[_Sources, Floats | None]:
-    """Return the sources of human23's joints, and their alignments [23, 4]; None if the zero pose shows none."""
+def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tuple[_Sources, Floats | None, bool]:
+    """Return the sources of human23's joints, their alignments [23, 4], and whether these are of the rig's table.
+
+    There are no alignments if the zero pose shows none.
+    """
     skeleton, joints = shape.skeleton, None if given is None else dict(given)
     rig: Rig | None = None
     if joints is not None:
@@ -134,10 +141,10 @@ def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tu
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
         frames = {name: rig.frames[name] for name in rig.frames if name in mapping.values()}
-        return sources, _inherit_alignments(frames)
+        return sources, _inherit_alignments(frames), True
     if not stands([sources.place(name) for name in human23().names]):
-        return sources, None
-    return sources, _align_standing(sources, _body_axes(sources), rig)
+        return sources, None, False
+    return sources, _align_standing(sources, _body_axes(sources), rig), False
 
 
 def _fit_movement(sources: _Sources, movement: Motion | Posture) -> Fit:
@@ -149,17 +156,30 @@ def _fit_movement(sources: _Sources, movement: Motion | Posture) -> Fit:
     offsets, tips = rot.mul_vec(pose[above], skeleton.offsets), rot.mul_vec(pose, skeleton.tips)
     upright = replace(skeleton, offsets=offsets, tips=tips)
     standing = replace(sources, skeleton=upright, zero=upright.rest[: len(upright)])
-    return replace(_fit(sources, alignment, standing), stands=False, unclear=tuple(unclear))
+    fit = _fit(sources, alignment, standing, _find_chest(sources))
+    return replace(fit, stands=False, unclear=tuple(unclear))
 
 
-def _fit(sources: _Sources, alignment: Floats, standing: _Sources) -> Fit:
-    """Return the fit with these alignments [23, 4]; its proportions are those of `standing`."""
+def _fit(sources: _Sources, alignment: Floats, standing: _Sources, chest: tuple[tuple[int, int], ...]) -> Fit:
+    """Return the fit with these alignments [23, 4] and this chest; its proportions are those of `standing`."""
     turns = list(sources.turns)
     for i, parent in enumerate(human23().parents):
         turns[i] = turns[parent] if turns[i] < 0 else turns[i]
     axes = alignment if standing is sources else np.tile(rot.IDENTITY, (len(alignment), 1))
     up = rot.mul_vec(alignment[0], _UP)
-    return Fit(np.array(turns), sources.stands[0], alignment, _proportions(standing, axes), up)
+    body = _proportions(standing, axes)
+    return Fit(np.array(turns), sources.stands[0], alignment, body, up, chest=chest)
+
+
+def _find_chest(sources: _Sources) -> tuple[tuple[int, int], ...]:
+    """Return the joints that show where the thorax ends, as `Fit.chest` has them."""
+    body = human23()
+    spine = [body.index(name) for name in ("lumbar", "thorax")]
+    if min(sources.stands[i] for i in spine) < 0 or all(sources.stands[i] == sources.turns[i] for i in spine):
+        return ()
+    arms = [body.index(f"{side}_clavicle") for side in ("left", "right")]
+    ends = next(i for i in (arms, [body.index("cervical")], spine[1:]) if min(sources.stands[j] for j in i) >= 0)
+    return tuple((i, sources.stands[i]) for i in ends)
 
 
 def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
