@@ -27,7 +27,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
-from motionmind.retarget.joint_mapping import in_a_row, joint_mapping, known_rig
+from motionmind.retarget.joint_mapping import describe_unknown_rig, in_a_row, joint_mapping, known_rig
 from motionmind.retarget.rigs import Rig
 from motionmind.retarget.standing import align_by_movement, standing_pose, stands
 
@@ -136,7 +136,7 @@ def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tu
     else:
         known = known_rig(skeleton)
         if known is None:
-            raise SkeletonError(f"the joints of {skeleton.name} do not map to human23: give a mapping")
+            raise SkeletonError(f"{describe_unknown_rig(skeleton)}; give a mapping (--joints)")
         rig, mapping = known
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):

@@ -506,6 +506,14 @@ def test_left_and_right_exchanged_in_a_zero_pose_along_its_bones() -> None:
 
 # Bones in the order of the file, each after the bone it hangs from, as "name<parent"; {s} stands for left and right. A
 # bone that maps to a joint of human23 is "name<parent=joint"; the others are rigid with what they hang from.
+REALLUSION = (
+    "CC_Base_{S}_Clavicle<CC_Base_Spine02=clavicle CC_Base_{S}_Upperarm<CC_Base_{S}_Clavicle=shoulder "
+    "CC_Base_{S}_UpperarmTwist01<CC_Base_{S}_Upperarm CC_Base_{S}_Forearm<CC_Base_{S}_Upperarm=elbow "
+    "CC_Base_{S}_Hand<CC_Base_{S}_Forearm=wrist CC_Base_{S}_Mid1<CC_Base_{S}_Hand=fingers "
+    "CC_Base_{S}_Thigh<CC_Base_Pelvis=hip CC_Base_{S}_ThighTwist01<CC_Base_{S}_Thigh "
+    "CC_Base_{S}_Calf<CC_Base_{S}_Thigh=knee CC_Base_{S}_Foot<CC_Base_{S}_Calf=ankle "
+    "CC_Base_{S}_ToeBase<CC_Base_{S}_Foot=toes"
+)
 EXPORTS = {
     "Rokoko": (
         "root Hips<root=pelvis Spine1<Hips=lumbar Spine2<Spine1=lumbar Spine3<Spine2=thorax Spine4<Spine3=thorax "
@@ -572,6 +580,60 @@ EXPORTS = {
         "forearm.{S}<upper_arm.{S}=elbow hand.{S}<forearm.{S}=wrist palm.02.{S}<hand.{S} "
         "f_middle.01.{S}<palm.02.{S}=fingers thigh.{S}<spine=hip shin.{S}<thigh.{S}=knee foot.{S}<shin.{S}=ankle "
         "toe.{S}<foot.{S}=toes heel.02.{S}<foot.{S} breast.{S}<spine.003",
+    ),
+    "OptiTrack": (
+        "Skeleton1_Hip=pelvis Skeleton1_Ab<Skeleton1_Hip=lumbar Skeleton1_Chest<Skeleton1_Ab=thorax "
+        "Skeleton1_Neck<Skeleton1_Chest=cervical Skeleton1_Head<Skeleton1_Neck=atlantal",
+        "Skeleton1_{S}Shoulder<Skeleton1_Chest=clavicle Skeleton1_{S}UArm<Skeleton1_{S}Shoulder=shoulder "
+        "Skeleton1_{S}FArm<Skeleton1_{S}UArm=elbow Skeleton1_{S}Hand<Skeleton1_{S}FArm=wrist "
+        "Skeleton1_{S}Thigh<Skeleton1_Hip=hip Skeleton1_{S}Shin<Skeleton1_{S}Thigh=knee "
+        "Skeleton1_{S}Foot<Skeleton1_{S}Shin=ankle Skeleton1_{S}Toe<Skeleton1_{S}Foot=toes",
+    ),
+    "Biped": (
+        "Bip01 Bip01_Pelvis<Bip01=pelvis Bip01_Spine<Bip01_Pelvis=lumbar Bip01_Spine1<Bip01_Spine=lumbar "
+        "Bip01_Spine2<Bip01_Spine1=thorax Bip01_Neck<Bip01_Spine2=cervical Bip01_Head<Bip01_Neck=atlantal",
+        "Bip01_{S}_Clavicle<Bip01_Spine2=clavicle Bip01_{S}_UpperArm<Bip01_{S}_Clavicle=shoulder "
+        "Bip01_{S}_Forearm<Bip01_{S}_UpperArm=elbow Bip01_{S}_Hand<Bip01_{S}_Forearm=wrist "
+        "Bip01_{S}_Finger0<Bip01_{S}_Hand Bip01_{S}_Finger2<Bip01_{S}_Hand=fingers Bip01_{S}_Thigh<Bip01_Pelvis=hip "
+        "Bip01_{S}_Calf<Bip01_{S}_Thigh=knee Bip01_{S}_Foot<Bip01_{S}_Calf=ankle Bip01_{S}_Toe0<Bip01_{S}_Foot=toes",
+    ),
+    "Reallusion": (
+        "CC_Base_BoneRoot CC_Base_Hip<CC_Base_BoneRoot=pelvis CC_Base_Pelvis<CC_Base_Hip=pelvis "
+        "CC_Base_Waist<CC_Base_Hip=lumbar CC_Base_Spine01<CC_Base_Waist=lumbar CC_Base_Spine02<CC_Base_Spine01=thorax "
+        "CC_Base_NeckTwist01<CC_Base_Spine02=cervical CC_Base_NeckTwist02<CC_Base_NeckTwist01=cervical "
+        "CC_Base_Head<CC_Base_NeckTwist02=atlantal",
+        REALLUSION,
+    ),
+    "Reallusion, named in full": (
+        "RL_BoneRoot CC_Base_Hip<RL_BoneRoot=pelvis CC_Base_Waist<CC_Base_Hip=lumbar "
+        "CC_Base_Spine01<CC_Base_Waist=lumbar CC_Base_Spine02<CC_Base_Spine01=thorax "
+        "CC_Base_NeckTwist01<CC_Base_Spine02=cervical CC_Base_Head<CC_Base_NeckTwist01=atlantal",
+        REALLUSION.replace("CC_Base_Pelvis", "CC_Base_Hip"),
+    ),
+    "Move.ai": (
+        "Root=pelvis Spine1<Root=lumbar Spine2<Spine1=lumbar Chest<Spine2=thorax Neck<Chest=cervical "
+        "Head<Neck=atlantal",
+        "{Side}_Shoulder<Chest=clavicle {Side}_UpperArm<{Side}_Shoulder=shoulder "
+        "{Side}_LowerArm<{Side}_UpperArm=elbow {Side}_Hand<{Side}_LowerArm=wrist {Side}_UpperLeg<Root=hip "
+        "{Side}_LowerLeg<{Side}_UpperLeg=knee {Side}_Foot<{Side}_LowerLeg=ankle {Side}_Toe<{Side}_Foot=toes",
+    ),
+    "MakeHuman": (
+        "root=pelvis spine05<root=lumbar spine04<spine05=lumbar spine03<spine04=lumbar spine02<spine03=thorax "
+        "spine01<spine02=thorax neck01<spine01=cervical neck02<neck01=cervical neck03<neck02=cervical "
+        "head<neck03=atlantal jaw<head",
+        "pelvis.{S}<root clavicle.{S}<spine01=clavicle shoulder01.{S}<clavicle.{S}=clavicle "
+        "upperarm01.{S}<shoulder01.{S}=shoulder upperarm02.{S}<upperarm01.{S}=shoulder "
+        "lowerarm01.{S}<upperarm02.{S}=elbow lowerarm02.{S}<lowerarm01.{S}=elbow wrist.{S}<lowerarm02.{S}=wrist "
+        "metacarpal2.{S}<wrist.{S} finger3-1.{S}<metacarpal2.{S}=fingers upperleg01.{S}<pelvis.{S}=hip "
+        "upperleg02.{S}<upperleg01.{S}=hip lowerleg01.{S}<upperleg02.{S}=knee lowerleg02.{S}<lowerleg01.{S}=knee "
+        "foot.{S}<lowerleg02.{S}=ankle metatarsal2.{S}<foot.{S} toe2-1.{S}<metatarsal2.{S}=toes",
+    ),
+    "DeepMotion": (
+        "hips_JNT=pelvis spine_JNT<hips_JNT=lumbar spine1_JNT<spine_JNT=lumbar spine2_JNT<spine1_JNT=thorax "
+        "neck_JNT<spine2_JNT=cervical head_JNT<neck_JNT=atlantal",
+        "{s}_shoulder_JNT<spine2_JNT=clavicle {s}_arm_JNT<{s}_shoulder_JNT=shoulder {s}_forearm_JNT<{s}_arm_JNT=elbow "
+        "{s}_hand_JNT<{s}_forearm_JNT=wrist {s}_handMiddle1_JNT<{s}_hand_JNT=fingers {s}_upleg_JNT<hips_JNT=hip "
+        "{s}_leg_JNT<{s}_upleg_JNT=knee {s}_foot_JNT<{s}_leg_JNT=ankle {s}_toebase_JNT<{s}_foot_JNT=toes",
     ),
     "DAZ Genesis": (  # 3 and 8
         "hip=pelvis pelvis<hip=pelvis abdomenLower<hip=lumbar abdomenUpper<abdomenLower=lumbar "
@@ -667,7 +729,7 @@ def exported(motion: Motion, rig: str, zero: Mapping[str, Floats]) -> Motion:
 @pytest.mark.parametrize("arms", [0.0, 50.0])
 @pytest.mark.parametrize("rig", EXPORTS)
 def test_what_programs_export(rig: str, arms: float) -> None:
-    without = {"Xsens MVN": ("fingers",), "Biovision": ("fingers",)}.get(rig, ())
+    without = ("fingers",) if rig in ("Xsens MVN", "Biovision", "OptiTrack", "Move.ai") else ()
     source = exported(dance(), rig, spread(5.0 if arms else 0.0, arms))
     known = known_rig(source.skeleton)
     assert known is not None
@@ -749,6 +811,7 @@ def test_plain_names() -> None:
     assert plain_names(["Bip_Hips", "Bip_Left_Leg"]) == ["hips", "leftleg"]
     assert plain_names(["Upper_Leg", "Upper_Arm"]) == ["leg", "arm"]
     assert plain_names(["Hips"]) == ["hips"]
+    assert plain_names(["Bip01", "Bip01 Pelvis", "Bip01 L Thigh"]) == ["bip01", "pelvis", "lthigh"]
 
 
 def test_shares_of_a_spine() -> None:
@@ -763,13 +826,23 @@ def test_an_insect_does_not_map() -> None:
     insect = Skeleton("insect", ("body", "leg1", "leg2"), (-1, 0, 0), np.eye(3))
     assert joint_mapping(insect) is None
     motion = Motion(insect, np.tile(rot.IDENTITY, (1, 3, 1)), np.zeros((1, 3)), np.zeros(1))
-    with pytest.raises(SkeletonError, match="joints of insect do not map to human23"):
+    with pytest.raises(SkeletonError, match="joints of insect do not map to human23: they have the names of no known"):
         to_human23(motion)
 
 
 def test_a_rig_that_lacks_an_essential_joint_does_not_map() -> None:
     names = {joint: name for joint, name in rig_names("Mixamo").items() if joint not in ("left_wrist", "left_fingers")}
-    assert joint_mapping(disguise(dance(), names, spread()).skeleton) is None
+    source = disguise(dance(), names, spread())
+    assert joint_mapping(source.skeleton) is None
+    with pytest.raises(SkeletonError, match=r"named as in Mixamo, they lack left_wrist; give a mapping \(--joints\)"):
+        to_human23(source)
+
+
+def test_a_rig_that_lacks_a_mark_does_not_map() -> None:
+    bones = {name: joint for name, _, joint in export("DAZ Genesis 9")}
+    names = {joint: name for name, joint in reversed(bones.items()) if joint} | {"pelvis": "hip"}
+    with pytest.raises(SkeletonError, match="named as in DAZ Genesis, they lack a joint called pelvis; give"):
+        to_human23(disguise(dance(), names, spread()))
 
 
 @pytest.fixture
