@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import Run
 
 from motionmind._typing import Floats
 from motionmind.body.human import human23, human44
@@ -491,6 +492,14 @@ def test_limbs_that_hardly_bend_do_not_show_how_they_are_turned() -> None:
     source = disguise(stroll(0.0), rig_names("Mixamo"), {}, along_bones("x", 0.0))
     with pytest.warns(MotionMindWarning, match="it does not stand, and left_hip, left_knee.* bend too little to show"):
         to_human23(source)
+
+
+def test_what_is_unclear_is_said_once(run: Run) -> None:
+    write_bvh(Path("in.bvh"), disguise(stroll(0.0), rig_names("Mixamo"), {}, along_bones("x", 0.0)))
+    ran = run("convert", "in.bvh", "out.json", "--skeleton", "human23")
+    assert ran.code == 0
+    assert ran.err.count("it does not stand") == 1
+    assert "it does not stand" not in run("convert", "in.bvh", "out.json").err
 
 
 def test_left_and_right_exchanged_in_a_zero_pose_along_its_bones() -> None:
