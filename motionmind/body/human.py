@@ -15,6 +15,9 @@ from motionmind.body.skeleton import Skeleton
 _Row = tuple[str, str, tuple[float, float, float]]
 
 
+# Metres, of people and of what is animated as people: a body beyond them has another unit.
+SHORTEST, TALLEST = 0.5, 2.6
+
 # human23: the tree of [I98] figure 4 with hands and toes. Segment lengths for a height of 1.70 m after Drillis and
 # Contini, "Body segment parameters" (1966), as given in Winter, "Biomechanics and Motor Control of Human Movement"
 # (2009), fig. 4.1: thigh .245 H, shank .246 H, ankle height .039 H, upper arm .186 H, forearm .146 H, hand .108 H, hips

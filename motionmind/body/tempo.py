@@ -20,7 +20,7 @@ import numpy as np
 
 from motionmind._typing import Bools, Floats
 from motionmind.body.contact import floor_height, lowest_height
-from motionmind.body.human import human23
+from motionmind.body.human import SHORTEST, TALLEST, human23
 from motionmind.body.motion import Motion
 from motionmind.body.plausibility import GRAVITY
 from motionmind.body.support import centre_of_mass
@@ -64,6 +64,8 @@ def question_tempo(motion: Motion) -> str:
     if human23().difference(motion.skeleton) is not None or motion.fps < _SLOWEST:
         return ""
     if motion.keyframed or motion.insertions:
+        return ""
+    if not SHORTEST <= motion.skeleton.height <= TALLEST:  # it is not the clock that is wrong
         return ""
     if np.ptp(np.diff(motion.times)) > _UNEVEN / motion.fps:  # each frame has a time of its own
         return ""

@@ -35,7 +35,9 @@ def question_clock(path: Path, motion: Motion) -> None:
     from motionmind.retarget.retarget import own_skeleton
 
     try:
-        doubt = question_tempo(own_skeleton(motion))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MotionMindWarning)  # whoever takes it onto human23 is warned then
+            doubt = question_tempo(own_skeleton(motion))
     except SkeletonError:  # its zero pose does not show how it stands
         return
     if doubt:

@@ -19,14 +19,16 @@ format cannot hold.
 
 from __future__ import annotations
 
+import warnings
 from numbers import Real
 from pathlib import Path
 
 from motionmind._moved import renamed
 from motionmind.arguments import check_integer, check_path, check_real, check_type
+from motionmind.body.human import SHORTEST, TALLEST
 from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, MotionMindError
+from motionmind.errors import FormatError, MotionMindError, MotionMindWarning
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats.added import added_suffixes, read_added, write_added
 from motionmind.formats.lossy import WRITABLE, lossy_fields
@@ -69,6 +71,9 @@ def read_motion(
     Raises:
         FormatError: the suffix is unknown, the file does not exist, or its content does not match its suffix.
 
+    Warns:
+        MotionMindWarning: something was repaired, or a person is shorter than 0.5 m or taller than 2.6 m.
+
     >>> import numpy as np
     >>> from motionmind import Motion, Posture, human23, read_motion, write_motion
     >>> at_rest = np.tile([0.0, 0.0, 0.0, 1.0], (23, 1))
@@ -106,7 +111,21 @@ def read_motion(
             motion = read_gltf(path, unit=unit)
         case _:
             motion = read_added(path, fps)
+    _question_height(path, motion.skeleton)
     return motion
+
+
+def _question_height(path: FilePath, skeleton: Skeleton) -> None:
+    """Warn if joints that are known as a person's make a body that no person has the height of."""
+    from motionmind.formats.units import person_height
+    from motionmind.retarget.joint_mapping import joint_mapping
+
+    mapping = joint_mapping(skeleton)
+    height = person_height(skeleton, mapping) if mapping else 0.0
+    if height > 0.0 and not SHORTEST <= height <= TALLEST:
+        remedy = "its ASF file states it" if Path(path).suffix.lower() == ".amc" else "--unit gives another"
+        message = f"{path}: a person {height:.3g} m tall; the unit seems wrong ({remedy})"
+        warnings.warn(message, MotionMindWarning, stacklevel=3)
 
 
 def _read_smpl(path: FilePath, suffix: str, fps: float | None) -> Motion:

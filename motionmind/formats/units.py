@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from motionmind._typing import Floats, Indices
+from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
 
@@ -66,6 +68,33 @@ def guess_unit(skeleton: Skeleton) -> tuple[str, float]:
         return "cm", UNITS["cm"]
     name = min(UNITS, key=lambda unit: abs(math.log(height * UNITS[unit] / PERSON_HEIGHT)))
     return name, UNITS[name]
+
+
+def person_height(skeleton: Skeleton, mapping: Mapping[str, str]) -> float:
+    """Estimate a person's height by the length of the legs, which no prop in a hand and no zero pose changes.
+
+    Args:
+        skeleton: the file's.
+        mapping: {file's joint: human23's joint}, as `joint_mapping` returns it.
+
+    Returns:
+        The height of a person of human23's proportions with such legs, metres.
+    """
+
+    def legs(body: Skeleton, of: Mapping[str, str]) -> float:
+        first: dict[str, int] = {}
+        for index, name in enumerate(body.names):
+            first.setdefault(of.get(name, ""), index)
+        length = 0.0
+        for side in ("left", "right"):
+            joint, hip = first[f"{side}_ankle"], first[f"{side}_hip"]
+            while joint > hip:
+                length += float(np.linalg.norm(body.offsets[joint]))
+                joint = body.parents[joint]
+        return length
+
+    body = human23()
+    return PERSON_HEIGHT * legs(skeleton, mapping) / legs(body, {name: name for name in body.names})
 
 
 def bone_span(parents: Indices, offsets: Floats, tips: Floats) -> float:

@@ -9,29 +9,33 @@ files it is a body that stands upright, with arms and legs in some position:
   the parent joint: arms hang, or legs are spread, by such rotations;
 - feet stand flat, so an ankle is rotated about the shank only, and toes as the ankle.
 
-Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.frames`).
+Rigs whose zero pose does not stand have their alignments in a table (`rigs.Rig.frames`), or show them in the movement
+(`motionmind.retarget.standing`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from motionmind._typing import Floats, Indices
 from motionmind.body.human import human23
+from motionmind.body.motion import Motion, Posture
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
-from motionmind.retarget.joint_mapping import in_a_row, joint_mapping, known_rig
+from motionmind.retarget.joint_mapping import describe_unknown_rig, in_a_row, joint_mapping, known_rig
 from motionmind.retarget.rigs import Rig
+from motionmind.retarget.standing import align_by_movement, standing_pose, stands
 
 _LIMBS = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "fingers"}
 _SHAPES = 64  # bodies whose fit is known again: a collection's files are of a few
 _SAME_PLACE = 1e-6  # metres below which two joints coincide
 _LEANS = np.radians(25.0)  # the largest lean of a trunk that counts as upright
+_FACES = np.radians(3.0)  # the largest turn about the vertical that counts as straight ahead
 _POINTED = 0.4  # the share of a foot's length that lies across the shank if the foot stands on its sole
 _UP = np.array([0.0, 1.0, 0.0])
 
@@ -46,6 +50,11 @@ class Fit:
         alignment: orientation of human23's axes in the frames of those joints, quaternions [23, 4].
         skeleton: human23 with the file's proportions.
         up: direction of the trunk in the frame of the pelvis's source [3].
+        stands: whether the zero pose stands, or its alignment is known from the rig.
+        chest: joints of human23 that show where the thorax ends, each with the index of the file's joint at its place;
+            empty unless several joints of the file's spine became one. Rigs with a table of frames have none: their
+            joints keep their orientations, in the spine too.
+        unclear: joints whose turn about their bones neither the zero pose nor the movement shows.
     """
 
     turns: Indices
@@ -53,6 +62,9 @@ class Fit:
     alignment: Floats
     skeleton: Skeleton
     up: Floats
+    stands: bool = True
+    chest: tuple[tuple[int, int], ...] = ()
+    unclear: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +110,25 @@ class _Shape:
     skeleton: Skeleton = field(compare=False)
 
 
-def fit_human23(skeleton: Skeleton, joints: Mapping[str, str] | None) -> Fit:
-    """Fit human23 to a file's skeleton; SkeletonError if its joints do not map there."""
+def fit_human23(movement: Motion | Posture, joints: Mapping[str, str] | None) -> Fit:
+    """Fit human23 to a file's skeleton; SkeletonError if its joints do not map there.
+
+    The movement counts where the skeleton's zero pose does not stand.
+    """
+    skeleton = movement.skeleton
     shape = _Shape(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), skeleton.tips.tobytes(), skeleton)
-    return _fit_shape(shape, None if joints is None else tuple(joints.items()))
+    sources, alignment, has_frames = _align_shape(shape, None if joints is None else tuple(joints.items()))
+    if alignment is None:
+        return _fit_movement(sources, movement)
+    return _fit(sources, alignment, sources, () if has_frames else _find_chest(sources))
 
 
 @lru_cache(_SHAPES)
-def _fit_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> Fit:
+def _align_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> tuple[_Sources, Floats | None, bool]:
+    """Return the sources of human23's joints, their alignments [23, 4], and whether these are of the rig's table.
+
+    There are no alignments if the zero pose shows none.
+    """
     skeleton, joints = shape.skeleton, None if given is None else dict(given)
     rig: Rig | None = None
     if joints is not None:
@@ -113,18 +136,50 @@ def _fit_shape(shape: _Shape, given: tuple[tuple[str, str], ...] | None) -> Fit:
     else:
         known = known_rig(skeleton)
         if known is None:
-            raise SkeletonError(f"the joints of {skeleton.name} do not map to human23: give a mapping")
+            raise SkeletonError(f"{describe_unknown_rig(skeleton)}; give a mapping (--joints)")
         rig, mapping = known
     sources = _find_sources(skeleton, mapping)
     if rig is not None and rig.frames and _zero_pose_matches(sources, rig.frames):
-        alignment = _inherit_alignments({name: rig.frames[name] for name in rig.frames if name in mapping.values()})
-    else:
-        alignment = _align_standing(sources, _body_axes(sources), rig)
+        frames = {name: rig.frames[name] for name in rig.frames if name in mapping.values()}
+        return sources, _inherit_alignments(frames), True
+    if not stands([sources.place(name) for name in human23().names]):
+        return sources, None, False
+    return sources, _align_standing(sources, _body_axes(sources), rig), False
+
+
+def _fit_movement(sources: _Sources, movement: Motion | Posture) -> Fit:
+    """Fit human23 to a rig whose zero pose does not stand, by how it moves."""
+    skeleton, rotations = sources.skeleton, movement.rotations
+    alignment, unclear = align_by_movement(skeleton, rotations, movement.root, sources.stands, sources.turns)
+    pose = standing_pose(skeleton, rotations, sources.turns, alignment)
+    above = [max(parent, 0) for parent in skeleton.parents]
+    offsets, tips = rot.mul_vec(pose[above], skeleton.offsets), rot.mul_vec(pose, skeleton.tips)
+    upright = replace(skeleton, offsets=offsets, tips=tips)
+    standing = replace(sources, skeleton=upright, zero=upright.rest[: len(upright)])
+    fit = _fit(sources, alignment, standing, _find_chest(sources))
+    return replace(fit, stands=False, unclear=tuple(unclear))
+
+
+def _fit(sources: _Sources, alignment: Floats, standing: _Sources, chest: tuple[tuple[int, int], ...]) -> Fit:
+    """Return the fit with these alignments [23, 4] and this chest; its proportions are those of `standing`."""
     turns = list(sources.turns)
     for i, parent in enumerate(human23().parents):
         turns[i] = turns[parent] if turns[i] < 0 else turns[i]
-    body, up = _proportions(sources, alignment), rot.mul_vec(alignment[0], _UP)
-    return Fit(np.array(turns), sources.stands[0], alignment, body, up)
+    axes = alignment if standing is sources else np.tile(rot.IDENTITY, (len(alignment), 1))
+    up = rot.mul_vec(alignment[0], _UP)
+    body = _proportions(standing, axes)
+    return Fit(np.array(turns), sources.stands[0], alignment, body, up, chest=chest)
+
+
+def _find_chest(sources: _Sources) -> tuple[tuple[int, int], ...]:
+    """Return the joints that show where the thorax ends, as `Fit.chest` has them."""
+    body = human23()
+    spine = [body.index(name) for name in ("lumbar", "thorax")]
+    if min(sources.stands[i] for i in spine) < 0 or all(sources.stands[i] == sources.turns[i] for i in spine):
+        return ()
+    arms = [body.index(f"{side}_clavicle") for side in ("left", "right")]
+    ends = next(i for i in (arms, [body.index("cervical")], spine[1:]) if min(sources.stands[j] for j in i) >= 0)
+    return tuple((i, sources.stands[i]) for i in ends)
 
 
 def _find_sources(skeleton: Skeleton, mapping: Mapping[str, str]) -> _Sources:
@@ -201,13 +256,22 @@ def _body_axes(sources: _Sources) -> Floats:
         raise SkeletonError(
             f"{sources.skeleton.name}: with all rotations 0, hips and shoulders do not show where up and left are"
         )
-    up, ahead = unit(up), unit(ahead)
-    axes = np.stack([np.cross(up, ahead), up, ahead], axis=-1)
-    # A lean of a few degrees in the zero pose is the rig's: the axes are then the nearest of the world's.
-    square = np.where(np.abs(axes) == np.max(np.abs(axes), axis=0), np.sign(axes), 0.0)
-    if np.linalg.det(square) > 0.5 and np.trace(square.T @ axes) > 1.0 + 2.0 * np.cos(_LEANS):
-        axes = square
-    return rot.from_matrix(axes)
+    # A lean of a few degrees in the zero pose is the rig's: up is then the nearest of the world's axes. Which way the
+    # body faces is its own, but for what hips and shoulders are off by themselves.
+    up, axis = unit(up), _nearest_axis(up)
+    if up @ axis > np.cos(_LEANS):
+        up, ahead = axis, np.cross(left, axis)
+        axis = _nearest_axis(ahead)
+        ahead = axis if unit(ahead) @ axis > np.cos(_FACES) else ahead
+    ahead = unit(ahead)
+    return rot.from_matrix(np.stack([np.cross(up, ahead), up, ahead], axis=-1))
+
+
+def _nearest_axis(direction: Floats) -> Floats:
+    """Return the axis of the world [3] nearest to a direction [3]."""
+    axis, longest = np.zeros(3), int(np.argmax(np.abs(direction)))
+    axis[longest] = np.sign(direction[longest])
+    return axis
 
 
 def _align_standing(sources: _Sources, body_axes: Floats, rig: Rig | None) -> Floats:

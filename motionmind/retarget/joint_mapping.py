@@ -11,7 +11,7 @@ from pathlib import Path
 from motionmind.arguments import check_path
 from motionmind.body.human import human23
 from motionmind.body.skeleton import Skeleton
-from motionmind.errors import FormatError, SkeletonError
+from motionmind.errors import FormatError, SkeletonError, enumerated
 from motionmind.files import parse_toml, read_bytes
 from motionmind.retarget.rigs import RIGS, Rig, plain_names, spine_shares
 
@@ -120,18 +120,36 @@ def _known_tree(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Rig, 
     """Recognise a rig as `known_rig`, of joints with these parents; all files of a collection have the same."""
     plain = plain_names(names)
     for rig in RIGS:
-        spine = spine_shares([name for name in rig.spine if name in plain])
-        table = dict(rig.joints) | spine
-        order = list(table)
-        found = sorted((order.index(name), i) for i, name in enumerate(plain) if name in table)
-        mapping: dict[int, str] = {}
-        for _, i in found:  # in the table's order: of two joints not in a row the first counts
-            target = table[plain[i]]
-            if all(_descends(parents, i, other) for other, taken in mapping.items() if taken == target):
-                mapping[i] = target
+        mapping = _map_by_names(rig, plain, parents)
         if rig.marks <= set(plain) and not _missing(mapping.values()):
             return rig, {names[i]: mapping[i] for i in sorted(mapping)}
     return None
+
+
+def _map_by_names(rig: Rig, plain: Sequence[str], parents: Sequence[int]) -> dict[int, str]:
+    """Map joints, of these plain names and parents, as a rig's: {joint's index: human23's joint}."""
+    table = dict(rig.joints) | spine_shares([name for name in rig.spine if name in plain])
+    order = list(table)
+    found = sorted((order.index(name), i) for i, name in enumerate(plain) if name in table)
+    mapping: dict[int, str] = {}
+    for _, i in found:  # in the table's order: of two joints not in a row the first counts
+        target = table[plain[i]]
+        if all(_descends(parents, i, other) for other, taken in mapping.items() if taken == target):
+            mapping[i] = target
+    return mapping
+
+
+def describe_unknown_rig(skeleton: Skeleton) -> str:
+    """Say why joints do not map to human23: what they lack of the rig that has most of their names."""
+    plain = plain_names(skeleton.names)
+    lacking = []
+    for rig in RIGS:
+        missing = _missing(_map_by_names(rig, plain, skeleton.parents).values())
+        lacking.append((missing + [f"a joint called {mark}" for mark in sorted(rig.marks - set(plain))], rig.name))
+    missing, name = min(lacking, key=lambda one: len(one[0]))
+    if len(missing) > len(_ESSENTIAL) // 2:
+        return f"the joints of {skeleton.name} do not map to human23: they have the names of no known rig"
+    return f"the joints of {skeleton.name} do not map to human23: named as in {name}, they lack {enumerated(missing)}"
 
 
 def _resolve(skeleton: Skeleton, joints: Mapping[str, str]) -> dict[str, str]:

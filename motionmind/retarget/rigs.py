@@ -9,7 +9,8 @@ Sources of the names: the CMU Motion Capture Database's ASF files and their conv
 namespace); Biovision's own names, in use since the format's first files, and in Xsens MVN's BVH; Xsens MVN's segments,
 as in the MVN User Manual (MV0319P) and in MVNX; Bandai-Namco-Research-Motiondataset; the published code of SMPL and its
 variants; Rokoko's Newton skeleton; Unreal Engine's mannequins; the humanoid bones of VRM (VRMC_vrm-1.0) and what VRoid
-Studio calls them; Blender's Rigify; DAZ Studio's Genesis figures.
+Studio calls them; Blender's Rigify; DAZ Studio's Genesis figures; OptiTrack Motive's skeletons; 3ds Max's Biped;
+Reallusion's Character Creator; MakeHuman's default rig; what Move.ai and DeepMotion export.
 """
 
 from __future__ import annotations
@@ -59,6 +60,8 @@ def plain_names(names: Sequence[str]) -> list[str]:
     # "Character1_Hips", "Character1_Spine": the common prefix, if it ends at a word's end.
     first = re.match(r".*[^A-Za-z0-9]", bare[0])
     prefix = first[0] if first and all(name.startswith(first[0]) for name in bare) else ""
+    if not prefix and len(bare) > 1 and all(re.match(re.escape(bare[0]) + "[^A-Za-z0-9]", name) for name in bare[1:]):
+        prefix = bare[1][: len(bare[0]) + 1]  # "Bip01", "Bip01 Pelvis", "Bip01 Spine"
     return [re.sub(r"[^a-z0-9]", "", name.removeprefix(prefix).lower()) for name in bare]
 
 
@@ -100,6 +103,7 @@ _HUMANIK = {
         "{side}leg": "knee",
         "{side}foot": "ankle",
         "{side}toebase": "toes",
+        "{side}toe": "toes",  # LaFAN1's
         "{side}shoulder": "clavicle",
         "{side}arm": "shoulder",
         "{side}forearm": "elbow",
@@ -383,6 +387,107 @@ _METARIG = {"spine": "pelvis", "spine004": "cervical", "spine005": "cervical", "
 )
 _METARIG_SPINE = ("spine001", "spine002", "spine003")
 
+_OPTITRACK = {"hip": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{s}thigh": "hip",
+        "{s}shin": "knee",
+        "{s}foot": "ankle",
+        "{s}toe": "toes",
+        "{s}shoulder": "clavicle",
+        "{s}uarm": "shoulder",
+        "{s}farm": "elbow",
+        "{s}hand": "wrist",
+        "{s}middle1": "fingers",
+    }
+)
+
+_BIPED = {"pelvis": "pelvis", "neck": "cervical", "neck1": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{s}thigh": "hip",
+        "{s}calf": "knee",
+        "{s}foot": "ankle",
+        "{s}toe0": "toes",
+        "{s}clavicle": "clavicle",
+        "{s}upperarm": "shoulder",
+        "{s}forearm": "elbow",
+        "{s}hand": "wrist",
+        "{s}finger2": "fingers",
+    }
+)
+
+# As in Genesis legs hang from a pelvis below the hip. Bones that only twist a limb are left out.
+_REALLUSION = {
+    "hip": "pelvis",
+    "pelvis": "pelvis",
+    "necktwist01": "cervical",
+    "necktwist02": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "{s}thigh": "hip",
+        "{s}calf": "knee",
+        "{s}foot": "ankle",
+        "{s}toebase": "toes",
+        "{s}clavicle": "clavicle",
+        "{s}upperarm": "shoulder",
+        "{s}forearm": "elbow",
+        "{s}hand": "wrist",
+        "{s}mid1": "fingers",
+    }
+)
+
+_MOVE_AI = {"root": "pelvis", "neck": "cervical", "head": "atlantal"} | _both_sides(
+    {
+        "{side}upperleg": "hip",
+        "{side}lowerleg": "knee",
+        "{side}foot": "ankle",
+        "{side}toe": "toes",
+        "{side}shoulder": "clavicle",
+        "{side}upperarm": "shoulder",
+        "{side}lowerarm": "elbow",
+        "{side}hand": "wrist",
+    }
+)
+
+_MAKEHUMAN = {
+    "root": "pelvis",
+    "neck01": "cervical",
+    "neck02": "cervical",
+    "neck03": "cervical",
+    "head": "atlantal",
+} | _both_sides(
+    {
+        "upperleg01{s}": "hip",
+        "upperleg02{s}": "hip",
+        "lowerleg01{s}": "knee",
+        "lowerleg02{s}": "knee",
+        "foot{s}": "ankle",
+        "toe21{s}": "toes",
+        "clavicle{s}": "clavicle",
+        "shoulder01{s}": "clavicle",
+        "upperarm01{s}": "shoulder",
+        "upperarm02{s}": "shoulder",
+        "lowerarm01{s}": "elbow",
+        "lowerarm02{s}": "elbow",
+        "wrist{s}": "wrist",
+        "finger31{s}": "fingers",
+    }
+)
+
+_DEEPMOTION = {"hipsjnt": "pelvis", "neckjnt": "cervical", "headjnt": "atlantal"} | _both_sides(
+    {
+        "{s}uplegjnt": "hip",
+        "{s}legjnt": "knee",
+        "{s}footjnt": "ankle",
+        "{s}toebasejnt": "toes",
+        "{s}shoulderjnt": "clavicle",
+        "{s}armjnt": "shoulder",
+        "{s}forearmjnt": "elbow",
+        "{s}handjnt": "wrist",
+        "{s}handmiddle1jnt": "fingers",
+    }
+)
+
 _OWN = {name.replace("_", ""): name for name in human23().names}
 _OWN_FRAMES = dict.fromkeys(human23().names, rot.IDENTITY)
 
@@ -409,11 +514,22 @@ RIGS: tuple[Rig, ...] = (
     Rig("Bandai-Namco", _BANDAI, ("spine", "chest", "upperchest"), frames=_BANDAI_FRAMES),
     Rig("SMPL", _SMPL, (), frozenset({"spine3", "leftcollar"}), frames=_OWN_FRAMES),
     Rig("SMPL, models", _SMPL_MODELS, (), frozenset({"spine3", "lcollar"}), frames=_OWN_FRAMES),
-    Rig("Rokoko", _ROKOKO, ("spine1", "spine2", "spine3", "spine4")),
+    Rig("Rokoko", _ROKOKO, ("spine", "spine1", "spine2", "spine3", "spine4")),
     Rig("Xsens MVN", _XSENS, ("l5", "l3", "t12", "t8")),
     Rig("Unreal", _UNREAL, ("spine01", "spine02", "spine03", "spine04", "spine05")),
     Rig("VRM", _VRM, ("spine", "chest", "upperchest")),
     Rig("VRoid", _VROID, ("jbipcspine", "jbipcchest", "jbipcupperchest")),
     Rig("Rigify", {f"def{name}": joint for name, joint in _METARIG.items()}, [f"def{name}" for name in _METARIG_SPINE]),
     Rig("Rigify, metarig", _METARIG, _METARIG_SPINE),
+    Rig("OptiTrack", _OPTITRACK, ("ab", "chest")),
+    Rig("Biped", _BIPED, ("spine", "spine1", "spine2", "spine3", "spine4")),
+    Rig("Reallusion", _REALLUSION, ("waist", "spine01", "spine02")),
+    Rig(  # below a root with another name, so that the prefix is not all joints'
+        "Reallusion, named in full",
+        {f"ccbase{name}": joint for name, joint in _REALLUSION.items()},
+        ("ccbasewaist", "ccbasespine01", "ccbasespine02"),
+    ),
+    Rig("Move.ai", _MOVE_AI, ("spine", "spine1", "spine2", "chest")),
+    Rig("MakeHuman", _MAKEHUMAN, ("spine05", "spine04", "spine03", "spine02", "spine01")),
+    Rig("DeepMotion", _DEEPMOTION, ("spinejnt", "spine1jnt", "spine2jnt")),
 )

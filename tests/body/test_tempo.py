@@ -99,6 +99,8 @@ def test_what_cannot_be_told() -> None:
     assert question_tempo(fast.resample(15.0)) == ""
     assert question_tempo(fast.slice(0, 20)) == ""
     assert question_tempo(fast.at(np.delete(fast.times, 9))) == ""
+    giant = replace(BODY, offsets=100.0 * BODY.offsets, tips=100.0 * BODY.tips)  # its unit is wrong, not its clock
+    assert question_tempo(replace(fast, skeleton=giant)) == ""
     other = Motion(human44(), np.tile(rot.IDENTITY, (len(fast), 44, 1)), fast.root, fast.times)
     assert question_tempo(other) == ""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,60 @@ def moving(skeleton: Skeleton, frames: int = 8, seed: int = 0) -> Motion:
 
 def taller(skeleton: Skeleton) -> Skeleton:
     return Skeleton(skeleton.name, skeleton.names, skeleton.parents, skeleton.offsets * 1.1, skeleton.tips * 1.1)
+
+
+# --- size -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("suffix", "unit", "said"),
+    [
+        ("bvh", "m", "170 m tall; the unit seems wrong (--unit gives another)"),
+        ("bvh", "mm", "0.17 m tall; the unit seems wrong"),
+        ("glb", "cm", "0.017 m tall; the unit seems wrong"),
+        ("bvh", "cm", ""),
+        ("glb", None, ""),
+    ],
+)
+def test_people_of_no_persons_height(suffix: str, unit: str | None, said: str, convert: Run) -> None:
+    write_motion(f"in.{suffix}", moving(human23()))
+    ran = convert(f"in.{suffix}", "out.json", *(("--unit", unit) if unit else ()))
+    assert ran.code == 0
+    assert (f"in.{suffix}: a person {said}" in ran.err) if said else ("a person" not in ran.err)
+
+
+def test_people_whose_asf_file_states_another_unit(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    names = ["femur", "tibia", "foot", "humerus", "radius", "hand"]
+    bones = {"thorax": "0 1 0", "head": "0 1 0"} | {f"{side}{name}": "0 -1 0" for side in "lr" for name in names}
+    lines = [
+        ":version 1.10",
+        ":name lost",
+        ":units",
+        "  length 1.0",
+        "  angle deg",
+        ":root",
+        "  order TX TY TZ RX RY RZ",
+    ]
+    lines += ["  axis XYZ", "  position 0 0 0", "  orientation 0 0 0", ":bonedata"]
+    for bone, direction in bones.items():
+        lines += ["  begin", f"    name {bone}", f"    direction {direction}", "    length 0.4", "    axis 0 0 0 XYZ"]
+        lines += ["    dof rx", "    limits (-180 180)", "  end"]
+    lines += [":hierarchy", "  begin", "    root thorax lfemur rfemur", "    thorax head lhumerus rhumerus"]
+    for side in "lr":
+        lines += [f"    {side}{upper} {side}{lower}" for upper, lower in pairwise(names) if lower != "humerus"]
+    (tmp_path / "a.asf").write_text("\n".join([*lines, "  end", ""]))
+    frame = [f"{bone} 0" for bone in bones]
+    (tmp_path / "a.amc").write_text("\n".join([":FULLY-SPECIFIED", ":DEGREES", "1", "root 0 0 0 0 0 0", *frame, ""]))
+    read_motion(tmp_path / "a.amc")
+    assert [str(one.message) for one in recwarn] == [
+        f"{tmp_path / 'a.amc'}: a person 0.0414 m tall; the unit seems wrong (its ASF file states it)"
+    ]
+
+
+def test_other_bodies_may_have_any_size(convert: Run) -> None:
+    insect = Skeleton("insect", ("body", "leg"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 0.002, 0.0]]))
+    write_motion("in.bvh", moving(insect))
+    assert "a person" not in convert("in.bvh", "out.json", "--unit", "cm").err
 
 
 # --- formats --------------------------------------------------------------------------------------------------------
