@@ -79,6 +79,9 @@ class Collection(ABC):
     def check(self, name: str) -> None:
         """Raise MotionMindError, which suggests one, if neither a posture nor a clip has this name."""
         if name not in self.postures and name not in self.clips:
+            place, at, moment = name.rpartition("@")
+            if at and (place in self.postures or place in self.clips):
+                raise MotionMindError(_no_moment(f"{self.word}/{place}", moment))
             known = [*self.postures, *self.clips]
             raise MotionMindError(f"{self.word}: no posture or clip {name!r}{suggestion(name, known)}")
 
@@ -286,6 +289,9 @@ def check_exists(source: Source, home: Path | None = None) -> None:
         return  # those who read files say what is wrong with one
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
+    place, at, moment = word.rpartition("@")
+    if at and is_file(place):
+        raise MotionMindError(_no_moment(place, moment))
     first, slash, _ = word.partition("/")
     corpora = list(store.list_corpora(home))
     if slash:
@@ -354,6 +360,11 @@ def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
     if last < first:
         raise MotionMindError(f"{clip}: the last frame, {end}, lies before the first, {start}")
     return range(first, last + 1)
+
+
+def _no_moment(word: str, moment: str) -> str:
+    """Say that what follows the @ after a movement's name is no moment of it."""
+    return f"{word}: @{moment} is neither a frame, such as @240, nor seconds, such as @2.0s"
 
 
 def _example(source: Source, collection: Collection) -> str:
