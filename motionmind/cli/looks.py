@@ -21,12 +21,18 @@ def explain(report: Path, as_json: bool) -> None:
     """Explain a tween, move by move.
 
     For each move: which joints move, how likely that is, and where it was seen. REPORT is a file that tween --report
-    wrote.
+    wrote; of one that found nothing, the reason is printed.
     """
-    from motionmind.tween.narrative import explain
-    from motionmind.tween.report import read_report
+    import msgspec
 
-    explanation = explain(read_report(report))
+    from motionmind.tween.narrative import explain
+    from motionmind.tween.report import NoPathReport, read_any_report
+
+    found = read_any_report(report)
+    if isinstance(found, NoPathReport):
+        click.echo(json.dumps(msgspec.to_builtins(found)) if as_json else found.message)
+        return
+    explanation = explain(found)
     click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
 
 
