@@ -21,7 +21,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import format_repairs, note, print_check, print_origins
+from motionmind.cli.printing import count, format_repairs, note, print_check, print_origins
 from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.warming import warm_once
@@ -236,7 +236,9 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         return
     for key in ("name", "title", "author", "source", "licence", "citation", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
-    click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    click.echo(
+        f"{'clips':10} {len(found['clips'])}, {count(found['postures'], 'posture')}, {count(found['moves'], 'move')}"
+    )
     if performers := {
         clip["performer"]: None for clip in found["clips"] if clip["performer"] not in ("", found["author"])
     }:

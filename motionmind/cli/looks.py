@@ -10,6 +10,7 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, output
+from motionmind.cli.printing import count
 from motionmind.cli.types import FILE
 from motionmind.display import displayed, displayed_path
 
@@ -62,6 +63,6 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     drawn = write_joint_graph(output, Engine.load(corpus, home), joint)
     alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
-        f"{displayed_path(output)}: {displayed(joint)}, {len(drawn)} states, {drawn.number_of_edges()} transitions; "
-        f"{alone} states that none joins to another"
+        f"{displayed_path(output)}: {displayed(joint)}, {count(len(drawn), 'state')}, "
+        f"{count(drawn.number_of_edges(), 'transition')}; {count(alone, 'state')} that none joins to another"
     )
