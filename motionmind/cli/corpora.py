@@ -106,7 +106,7 @@ def corpora(context: click.Context) -> None:
     help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
-@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that cannot be read.")
+@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that would be left out.")
 @option(
     "--workers",
     section=Section.WORKERS,
@@ -151,7 +151,8 @@ def build(
     """Learn a corpus from movement.
 
     It is learned from files, from other corpora (--mix), or from both. The files may be of any formats, scores
-    included, but must all be on the same joints. An earlier corpus of yours of the same name is replaced.
+    included. Those that cannot be read are left out, and those on other joints than most. An earlier corpus of yours of
+    the same name is replaced.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
