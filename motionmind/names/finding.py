@@ -16,6 +16,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
@@ -52,6 +53,10 @@ class Collection(ABC):
     def posture(self, name: str) -> Posture:
         """Return one of the postures."""
 
+    def credits_of(self, name: str) -> tuple[Credit, ...]:
+        """Return the credits of one of the postures; none where that is not known."""
+        return ()
+
     @abstractmethod
     def motions(self, names: Sequence[str]) -> list[Motion]:
         """Return some of the clips."""
@@ -74,7 +79,7 @@ class Collection(ABC):
         self.check(name)
         if name in self.clips and (as_clip or name not in self.postures):
             return self.motions([name])[0]
-        return replace(self.posture(name).as_motion(), name=name)
+        return replace(self.posture(name).as_motion(), name=name, recorded=self.credits_of(name))
 
     def check(self, name: str) -> None:
         """Raise MotionMindError, which suggests one, if neither a posture nor a clip has this name."""
@@ -160,6 +165,12 @@ class _CorpusCollection(Collection):
 
     def posture(self, name: str) -> Posture:
         return _posture(self._scores[name], name)
+
+    def credits_of(self, name: str) -> tuple[Credit, ...]:
+        if self._written is None:
+            return ()
+        of = self._written
+        return (credit_clip(Origin(of.name, of.title, of.author, of.source, of.licence, of.citation), name),)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         corpus = self._corpus
