@@ -107,6 +107,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
     faults: tuple[JointFlip, ...]
     pieces: tuple[Clip, ...]
     images: tuple[Clip, ...]
+    added: int
 
 
 class _Entry(msgspec.Struct, frozen=True):
@@ -359,7 +360,8 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
         split = len(one.pieces)
-        entries.append(_RecordingEntry(one.name, entry, one.rate, one.doubt, one.faults, clips[:split], clips[split:]))
+        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added
+        entries.append(_RecordingEntry(one.name, entry, *kept))
     about = msgspec.json.encode(_Entry(tuple(entries), said, read))
     out = io.BytesIO()
     np.savez(out, about=np.frombuffer(about, np.uint8), **arrays)
@@ -392,6 +394,5 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
             for clip in clips
         )
 
-    return Recording(
-        entry.name, skeleton, entry.rate, entry.doubt, entry.faults, pieces(entry.pieces), pieces(entry.images)
-    )
+    both = pieces(entry.pieces), pieces(entry.images)
+    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added)
