@@ -12,7 +12,7 @@ from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, output
 from motionmind.cli.printing import count
 from motionmind.cli.types import FILE
-from motionmind.display import displayed, displayed_path
+from motionmind.display import displayed, displayed_path, printable
 
 
 @command("motionmind explain report.json")
@@ -31,7 +31,7 @@ def explain(report: Path, as_json: bool) -> None:
 
     found = read_any_report(report)
     if isinstance(found, NoPathReport):
-        click.echo(json.dumps(msgspec.to_builtins(found)) if as_json else found.message)
+        click.echo(json.dumps(msgspec.to_builtins(found)) if as_json else printable(found.message))
         return
     explanation = explain(found)
     click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
