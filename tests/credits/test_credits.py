@@ -418,8 +418,10 @@ def test_a_clip_of_a_corpus_is_the_corpus_s_in_any_file(run: Run, tmp_path: Path
 
 def test_a_posture_of_a_corpus_is_the_corpus_s(run: Run, tmp_path: Path) -> None:
     assert "100%  ballet: arabesque, The MotionMind authors" in run("credits", "ballet/arabesque").out
-    assert run("convert", "ballet/arabesque", tmp_path / "a.json").code == 0
-    assert run("credits", tmp_path / "a.json").out == run("credits", "ballet/arabesque").out
+    for name in ("ballet/arabesque", "ballet/adagio@3"):
+        for words in (("convert", name, tmp_path / "a.json"), ("posture", name, "-o", tmp_path / "a.json")):
+            assert run(*words).code == 0
+            assert run("credits", tmp_path / "a.json").out == run("credits", name).out
 
 
 def test_given_movement_keeps_its_name_under_another(run: Run, tmp_path: Path) -> None:
