@@ -53,6 +53,7 @@ class Posture:
         skeleton: the body.
         rotations: unit quaternions x, y, z, w [J, 4], each local to the parent's frame.
         root: position of the root joint [3], metres.
+        recorded: credits of the movement that it was taken from, as of Motion.
 
     >>> import numpy as np
     >>> from motionmind import Posture, human23
@@ -65,10 +66,13 @@ class Posture:
     skeleton: Skeleton
     rotations: Floats
     root: Floats
+    recorded: tuple[Credit, ...] = ()
 
     def __post_init__(self) -> None:
         check_type("skeleton", self.skeleton, Skeleton)
         freeze_checked(self, (len(self.skeleton), 4), (3,))
+        check_items("recorded", self.recorded, "credits", Credit)
+        check_shares(self.recorded)
 
     def __repr__(self) -> str:
         x, y, z = self.root
@@ -79,7 +83,7 @@ class Posture:
 
     def as_motion(self) -> Motion:
         """This posture as a motion of one frame at time 0."""
-        return Motion(self.skeleton, self.rotations[None], self.root[None], np.zeros(1))
+        return Motion(self.skeleton, self.rotations[None], self.root[None], np.zeros(1), recorded=self.recorded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +206,8 @@ class Motion:
         if not -len(self) <= frame < len(self):
             name = self.name or "the motion"
             raise MotionMindError(f"{name} has frames 0 to {len(self) - 1}, no frame {frame}")
-        return Posture(self.skeleton, self.rotations[frame], self.root[frame])
+        recorded = () if self.insertions and self.inserted()[frame] else self.recorded
+        return Posture(self.skeleton, self.rotations[frame], self.root[frame], recorded)
 
     def slice(self, start: int, stop: int) -> Motion:
         """Return the frames from `start` up to, not including, `stop`, at unchanged times."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from motionmind._typing import Floats, Indices, Ints
 from motionmind.arguments import as_floats, check_integer, check_items, check_text, check_type
+from motionmind.body.everyday import suggest_joint
 from motionmind.display import displayed
-from motionmind.errors import SkeletonError, suggestion
+from motionmind.errors import SkeletonError
 from motionmind.geometry import rotations as rot
 
 
@@ -98,7 +99,9 @@ class Skeleton:
         """
         check_text("joint", joint)
         if joint not in self.names:
-            raise SkeletonError(f"no joint {joint!r} in {self.name}{suggestion(joint, self.names, 'its joints are')}")
+            raise SkeletonError(
+                f"no joint {joint!r} in {self.name}{suggest_joint(joint, self.names, 'its joints are')}"
+            )
         return self.names.index(joint)
 
     def children(self, joint: int) -> list[int]:

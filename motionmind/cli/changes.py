@@ -120,7 +120,9 @@ def remove(name: str, clips: tuple[str, ...], details: bool, home: Path | None) 
 def take_files(
     names: Mapping[Path, str], reading: Reading, folder: Path, team: Team, *, strict: bool
 ) -> Iterator[Recording]:
-    """Take files by workers, with a progress bar on a terminal; report those that cannot be read, or end with one.
+    """Take files by workers, with a progress bar on a terminal; report those that are left out, or end with one.
+
+    These are files that cannot be read, and files on another skeleton than most.
 
     After the last of them, what learning needs is compiled: a file that is not there does not wait for that.
 
@@ -129,7 +131,7 @@ def take_files(
         reading: how to read and take them.
         folder: where shards are kept until the corpus is built.
         team: the workers.
-        strict: whether a file that cannot be read is an error.
+        strict: whether a file that would be left out is an error.
     """
     from motionmind.corpus import shards
 
@@ -141,17 +143,20 @@ def take_files(
 
     def on_taken(taken: Taken) -> None:
         bar.update(1)
-        if taken.fault and strict:
-            raise MotionMindError(taken.fault)
         if taken.fault:
-            faults.append(taken.fault)
+            on_fault(taken.fault)
+
+    def on_fault(fault: str) -> None:
+        if strict:
+            raise MotionMindError(fault)
+        faults.append(fault)
 
     with click.progressbar(length=len(names), label="reading", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-        yield from shards.take_files(names, reading, folder, team, on_need=on_need, on_taken=on_taken)
+        yield from shards.take_files(names, reading, folder, team, on_need=on_need, on_taken=on_taken, on_odd=on_fault)
     for fault in faults:
         note(f"{fault}; left out")
     if faults:
-        note(f"{count(len(faults), 'file')} of {len(names)} cannot be read, and nothing is learned from them")
+        note(f"nothing is learned from {count(len(faults), 'file')} of {len(names)}")
     warm_once()
     progress("learning")
 

@@ -27,6 +27,7 @@ from motionmind.errors import MotionMindError
 from motionmind.render import PICTURES
 
 if TYPE_CHECKING:
+    from motionmind.body.motion import Motion
     from motionmind.formats.papers import Form
 
 
@@ -72,7 +73,7 @@ def posture(
     write_all(outputs, motion.posture(at))
     click.echo(
         f"{', '.join(map(displayed_path, outputs))}: frame {at} of {len(motion)}, on "
-        f"{displayed(motion.skeleton.name)} ({len(motion.skeleton)} joints)"
+        f"{displayed(motion.skeleton.name)} ({count(len(motion.skeleton), 'joint')})"
     )
 
 
@@ -158,9 +159,21 @@ def convert(
         write_motion(output, motion, unit=out_unit or "cm")
     note_licences(output, motion)
     note_lossy_fields(output, lossy_fields(motion, output, source=next(iter(named.source.paths), None)))
-    click.echo(
-        f"{displayed_path(output)}: {count(len(motion), 'frame')}, {len(motion.skeleton)} joints "
-        f"({displayed(motion.skeleton.name)})"
-    )
+    size, body = _written_body(suffix, motion)
+    click.echo(f"{displayed_path(output)}: {count(len(motion), 'frame')}, {count(size, 'joint')} ({displayed(body)})")
     if taker:
         click.echo(f"{taker.title}: {taker.advice[suffix]}")
+
+
+def _written_body(suffix: str, motion: Motion) -> tuple[int, str]:
+    """Return the number of joints, and the name, of the body that a file of a motion holds."""
+    if suffix == ".npz":
+        from motionmind.formats._smpl import smpl_body_for
+
+        body = smpl_body_for(motion.skeleton)
+        return len(body), body.name
+    if suffix == ".vrma":
+        from motionmind.formats.vrma import JOINTS
+
+        return JOINTS, "VRM"
+    return len(motion.skeleton), motion.skeleton.name

@@ -21,7 +21,7 @@ from motionmind.cli.options import (
     reading,
     show_help_without_command,
 )
-from motionmind.cli.printing import format_repairs, note, print_check, print_origins
+from motionmind.cli.printing import count, format_repairs, note, print_check, print_origins
 from motionmind.cli.registry import INDEX, fetch, print_index, publish
 from motionmind.cli.types import COUNT, FILE, NATURAL, RATE, Number
 from motionmind.cli.warming import warm_once
@@ -106,7 +106,7 @@ def corpora(context: click.Context) -> None:
     help="Treat postures that differ only in where they face as one (free), or as two (stage).",
 )
 @reading
-@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that cannot be read.")
+@option("--strict-files", section=Section.INPUT, is_flag=True, help="End with the first file that would be left out.")
 @option(
     "--workers",
     section=Section.WORKERS,
@@ -151,7 +151,8 @@ def build(
     """Learn a corpus from movement.
 
     It is learned from files, from other corpora (--mix), or from both. The files may be of any formats, scores
-    included, but must all be on the same joints. An earlier corpus of yours of the same name is replaced.
+    included. Those that cannot be read are left out, and those on other joints than most. An earlier corpus of yours of
+    the same name is replaced.
     """
     if not (files or mix):
         raise click.UsageError("Missing argument 'FILES...', or --mix.", click.get_current_context())
@@ -236,7 +237,9 @@ def info(name: str, as_json: bool, home: Path | None) -> None:
         return
     for key in ("name", "title", "author", "source", "licence", "citation", "skeleton", "facing", "rate"):
         click.echo(f"{key:10} {displayed(str(found[key]), _LINE) if found[key] not in (None, '') else '-'}")
-    click.echo(f"{'clips':10} {len(found['clips'])}, {found['postures']} postures, {found['moves']} moves")
+    click.echo(
+        f"{'clips':10} {len(found['clips'])}, {count(found['postures'], 'posture')}, {count(found['moves'], 'move')}"
+    )
     if performers := {
         clip["performer"]: None for clip in found["clips"] if clip["performer"] not in ("", found["author"])
     }:

@@ -10,8 +10,9 @@ import click
 from motionmind.cli import completion
 from motionmind.cli.files import check_outputs
 from motionmind.cli.options import CORPUS, HOME, JSON, Section, command, option, output
+from motionmind.cli.printing import count
 from motionmind.cli.types import FILE
-from motionmind.display import displayed, displayed_path
+from motionmind.display import displayed, displayed_path, printable
 
 
 @command("motionmind explain report.json")
@@ -21,12 +22,18 @@ def explain(report: Path, as_json: bool) -> None:
     """Explain a tween, move by move.
 
     For each move: which joints move, how likely that is, and where it was seen. REPORT is a file that tween --report
-    wrote.
+    wrote; of one that found nothing, the reason is printed.
     """
-    from motionmind.tween.narrative import explain
-    from motionmind.tween.report import read_report
+    import msgspec
 
-    explanation = explain(read_report(report))
+    from motionmind.tween.narrative import explain
+    from motionmind.tween.report import NoPathReport, read_any_report
+
+    found = read_any_report(report)
+    if isinstance(found, NoPathReport):
+        click.echo(json.dumps(msgspec.to_builtins(found)) if as_json else printable(found.message))
+        return
+    explanation = explain(found)
     click.echo(json.dumps(explanation.plain()) if as_json else str(explanation))
 
 
@@ -56,6 +63,6 @@ def graph(corpus: str, joint: str, output: Path, home: Path | None) -> None:
     drawn = write_joint_graph(output, Engine.load(corpus, home), joint)
     alone = sum(not any(other != state for other in (*drawn.succ[state], *drawn.pred[state])) for state in drawn)
     click.echo(
-        f"{displayed_path(output)}: {displayed(joint)}, {len(drawn)} states, {drawn.number_of_edges()} transitions; "
-        f"{alone} states that none joins to another"
+        f"{displayed_path(output)}: {displayed(joint)}, {count(len(drawn), 'state')}, "
+        f"{count(drawn.number_of_edges(), 'transition')}; {count(alone, 'state')} that none joins to another"
     )

@@ -55,8 +55,9 @@ def note(message: str) -> None:
 
 
 def count(number: int, noun: str) -> str:
-    """Format a number of things: "1 move", "2 moves"."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+    """Format a number of things: "1 move", "2 moves", "2 stretches"."""
+    plural = "es" if noun.endswith("ch") else "s"
+    return f"{number} {noun}{plural * (number != 1)}"
 
 
 class Interruption:
@@ -265,10 +266,8 @@ def print_check(check: dict[str, Any], *, with_states: bool = True, with_details
         with_details: whether to print a line for each recording with faults.
     """
     rate = f"{check['rate']:g} a second" if check["rate"] else "keyframes"
-    click.echo(
-        f"{displayed(check['name'])}: {count(len(check['clips']), 'clip')}, {check['postures']} postures ({rate}), "
-        f"{displayed(check['skeleton'])}"
-    )
+    size = f"{count(len(check['clips']), 'clip')}, {count(check['postures'], 'posture')}"
+    click.echo(f"{displayed(check['name'])}: {size} ({rate}), {displayed(check['skeleton'])}")
     print_origins(check)
     if with_states:
         width = max(len(displayed(joint)) for joint in check["states"])
@@ -285,15 +284,19 @@ def format_repairs(summary: dict[str, Any]) -> str:
     """Format how many stretches of a corpus's recordings were mended: "12 put back exactly, 30 reconstructed"."""
     exact = sum(one["exact"] for one in summary["repairs"])
     clips = count(len({one["clip"] for one in summary["repairs"]}), "clip")
-    return f"{clips}, {exact} stretches put back exactly, {len(summary['repairs']) - exact} reconstructed"
+    return f"{clips}, {count(exact, 'stretch')} put back exactly, {len(summary['repairs']) - exact} reconstructed"
 
 
 def _print_faults(faults: Sequence[dict[str, Any]], repairs: Sequence[dict[str, Any]], with_details: bool) -> None:
-    """Print how often joints jump in the recordings, and what became of it; with details for each recording."""
+    """Print how often joints jump in the recordings, and what became of it; with details for each recording.
+
+    Faults are of the corpus's own recordings; repairs are of mixed corpora, too, and these are left out.
+    """
     if not faults:
         return
     clips = list(dict.fromkeys(fault["clip"] for fault in faults))
-    total = _format_faults(faults, [one for one in repairs if not one["exact"]])
+    parts = re.compile(rf"({'|'.join(map(re.escape, clips))})(\.\d+)?")
+    total = _format_faults(faults, [one for one in repairs if not one["exact"] and parts.fullmatch(one["clip"])])
     more = ":" if with_details else " (--details lists them)"
     click.echo(f"{count(len(clips), 'recording')} with joints that turn too far in one frame, {total}{more}")
     for clip in clips if with_details else ():

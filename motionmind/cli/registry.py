@@ -12,7 +12,7 @@ import click
 
 from motionmind.cli import completion
 from motionmind.cli.options import HOME, Section, command, option, output
-from motionmind.cli.printing import progress
+from motionmind.cli.printing import count, progress
 from motionmind.cli.types import EXISTING_FILE, FOLDER
 from motionmind.cli.warming import warm_once
 from motionmind.display import displayed, displayed_path, printable
@@ -70,7 +70,9 @@ def _print_terms(entry: Entry) -> None:
     from motionmind.credits.licences import find_licence
 
     size = f"{entry.archive.size / 10**6:,.1f} MB"
-    click.echo(f"{displayed(entry.title, _LINE)} ({entry.clips} clips, {entry.postures} postures, {size})")
+    click.echo(
+        f"{displayed(entry.title, _LINE)} ({count(entry.clips, 'clip')}, {count(entry.postures, 'posture')}, {size})"
+    )
     rows = [
         ("performed by", ", ".join(entry.performers)),
         ("source", entry.source),

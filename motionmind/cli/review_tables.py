@@ -43,13 +43,15 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
     )
     if counts["inserted"]:
         click.echo(f"{counts['inserted_share']:.0%} of the time is inserted")
-    if report["limits"]:
-        own = f"the trajectory's own order leaves the piece in {course['departed']:.0%} of steps"
-        click.echo(f"{_format_limits(report['limits'])}; {own}")
-    if counts["stays"]:
-        click.echo(_format_stillness(counts))
     begins = [0, *(seam["at"] + 1 for seam in report["seams"])]
     ends = [*(seam["at"] for seam in report["seams"]), counts["postures"] - 1]
+    if report["limits"]:
+        shortest = min(end - begin + 1 for begin, end in zip(begins, ends, strict=True))
+        kept = _format_limits(report["limits"], counts["inserted_share"], shortest)
+        own = f"the trajectory's own order leaves the piece in {course['departed']:.0%} of steps"
+        click.echo(f"{kept}{own}")
+    if counts["stays"]:
+        click.echo(_format_stillness(counts))
     spans = [(report["order"][first], report["order"][last]) for first, last in zip(begins, ends, strict=True)]
     named = [_format_names(names[first], names[last]) for first, last in spans]
     width = max(map(len, named))
@@ -61,10 +63,20 @@ def print_review(report: dict[str, Any], names: Sequence[str]) -> None:
         click.echo(f"{row}  {decision:9}  {_format_transition(seam)}" if seam else row.rstrip())
 
 
-def _format_limits(limits: dict[str, Any]) -> str:
-    """Format what a variation was kept within: "kept within 30% inserted, in stretches of 4 postures at least"."""
-    share = "" if limits["inserted"] is None else f"within {limits['inserted']:.0%} inserted, "
-    return f"kept {share}in stretches of {count(limits['stretch'], 'posture')} at least"
+def _format_limits(limits: dict[str, Any], share: float, shortest: int) -> str:
+    """Format what a variation is kept within: "kept within 30% inserted, in stretches of 4 postures at least; ".
+
+    Args:
+        limits: those that its first order was kept within; edits may have gone beyond them.
+        share: share of the time that is inserted now.
+        shortest: postures of the shortest stretch now.
+    """
+    kept = []
+    if limits["inserted"] is not None and share <= limits["inserted"]:
+        kept.append(f"within {limits['inserted']:.0%} inserted")
+    if shortest >= limits["stretch"]:
+        kept.append(f"in stretches of {count(limits['stretch'], 'posture')} at least")
+    return f"kept {', '.join(kept)}; " if kept else ""
 
 
 def _format_stillness(counts: dict[str, Any]) -> str:

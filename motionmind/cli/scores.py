@@ -46,7 +46,9 @@ def compose(score: Path, outputs: tuple[Path, ...], clip: str | None, posture: s
     if posture:
         found = notation.posture(read_score(score), posture)
         write_all(outputs, found)
-        click.echo(f"{names}: {displayed(posture)}, {len(found.skeleton)} joints ({displayed(found.skeleton.name)})")
+        click.echo(
+            f"{names}: {displayed(posture)}, {count(len(found.skeleton), 'joint')} ({displayed(found.skeleton.name)})"
+        )
         return
     motion = notation.compose(score, clip)
     seconds = motion.times[-1]
@@ -90,6 +92,6 @@ def library(scores: tuple[Path, ...], output: Path, tolerance: tuple[str, ...], 
     found = name_states([read_score(place) for place in places], degrees, per_joint, stage=stage)
     write_library(output, found)
     click.echo(
-        f"{displayed_path(output)}: {sum(map(len, found.tables.values()))} states "
+        f"{displayed_path(output)}: {count(sum(map(len, found.tables.values())), 'state')} "
         f"of {count(len(found.tables), 'joint')}"
     )

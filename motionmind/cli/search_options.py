@@ -256,7 +256,7 @@ def request_options(options: Mapping[str, Any], home: Path | None) -> dict[str, 
     context = click.get_current_context()
     if given_option(context, ["memory"]) and given_option(context, ["node_budget"]):
         raise MotionMindError("--memory and --node-budget both limit the number of nodes; give one of them")
-    stops = [(_find_posture(posture, home), move) for posture, move in parse_vias(options["via"], home)]
+    stops = [(_find_via(posture, move, home), move) for posture, move in parse_vias(options["via"], home)]
     return {
         **options,
         "pin": parse_pins(options["pin"]),
@@ -271,7 +271,13 @@ def via_files(options: Mapping[str, Any], home: Path | None) -> list[Path]:
     return [path for posture, _ in parse_vias(options["via"], home) for path in posture.source.paths]
 
 
-def _find_posture(name: PostureName, home: Path | None) -> Posture:
-    from motionmind.names.finding import find_posture
+def _find_via(name: PostureName, move: int | None, home: Path | None) -> Posture:
+    from motionmind.names.finding import find_motion, find_posture
 
+    word = name.word
+    if name.moment is None and move is not None and (count := len(find_motion(name.source, home, as_clip=False))) > 1:
+        raise MotionMindError(
+            f"--via {word}@{move}: the last @ is a move, and {word} has {count} frames; write {word}@{move}@ for frame "
+            f"{move} at any move, or {word}@FRAME@{move}"
+        )
     return find_posture(name, home)

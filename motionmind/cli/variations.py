@@ -319,6 +319,7 @@ def _read_piece(
     **reading_options: Any,
 ) -> tuple[Piece, Engine | None]:
     """Read the piece to vary, and what was learned from the corpus that judges it, if there is one."""
+    from motionmind.corpus.recordings import posture_rate
     from motionmind.variation.piece import Piece
 
     source = named.source
@@ -339,6 +340,11 @@ def _read_piece(
                 f"{source.word}: begins at frame {begin}, as the recordings of {engine.corpus.name} do "
                 "(--from 0 for all of it)"
             )
+    if rate is None and source.kind == "file" and (usual := posture_rate(motion)) is not None:
+        note(
+            f"{source.word}: every frame is a posture, {motion.fps:.3g} a second: --rate {usual:g} takes as many as "
+            "corpus build does"
+        )
     frames = select_part(named, motion, begin, end)
     facing = _read_facing(own, home) if own else engine.corpus.facing if engine else "free"
     return Piece.of(motion.slice(frames.start, frames.stop), rate, facing), engine

@@ -38,6 +38,7 @@ from motionmind.corpus.recordings import (
     renamed,
     take,
     take_clip,
+    usually_added,
 )
 from motionmind.errors import CorpusError, MotionMindWarning, enumerated
 from motionmind.executors.workshop import Workshop
@@ -96,7 +97,8 @@ def gather(
             recording, which a log entry says (logger "motionmind.corpus.gather", level INFO), and every frame of
             keyframes: of a motion that says so, and of one with fewer than 15 frames a second. Corpora that are mixed
             in are then brought to the recordings' rate, or where there are none to the lowest rate that any has.
-        skip: frames to drop at each recording's start, such as an added T-pose.
+        skip: frames to drop at each recording's start, such as an added T-pose; a log entry says where most begin with
+            one, and none are dropped.
         facing: "free" removes the turn about the vertical from the root's state and makes it a joint chain of its own;
             "stage" leaves it there, and facing the wall is then another state than facing the audience.
         flips: treatment of a recording with flips (`find_flips`): `repair` mends them (`repair_flips`), and cuts the
@@ -163,6 +165,12 @@ def gather(
         _log.info(
             "corpus %s: %g postures a second of each recording (--rate, or rate=, for more or fewer)", name, taken
         )
+    if added := usually_added(own):
+        frames = "a frame" if added == 1 else f"{added} frames"
+        text = (
+            "corpus %s: most recordings begin with %s of another posture (a T-pose?): --skip %d (or skip=) drops that"
+        )
+        _log.info(text, name, frames, added)
     for other, _ in mix:
         body = body or other.skeleton
         difference = body.difference(other.skeleton)

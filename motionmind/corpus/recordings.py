@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -28,6 +29,9 @@ Rate = float | Literal["auto"] | None
 RECORDED_RATE = 5.0
 DETAIL_RATE = 30.0  # per second: the rate at which detail between postures is kept
 FAULT_DEGREES = 30.0  # a joint that departs by more between two postures was recorded badly
+_JUMPING = 3  # joints that jump at once after a posture that was added
+_MOVES = 0.05  # degrees in a frame: a joint that turns by less is still
+_ADDED_SECONDS = 2.0  # for which such a posture is added at most
 _COARSE = 20.0  # frames per second; a slower recording has no detail to keep
 
 
@@ -71,6 +75,7 @@ class Recording(NamedTuple):
         faults: the faults.
         pieces: its unbroken parts; none if it is left out.
         images: their mirror images, if they are wanted.
+        added: frames of one posture before the movement, as of `added_frames`; 0 where frames are skipped.
     """
 
     name: str
@@ -80,6 +85,7 @@ class Recording(NamedTuple):
     faults: tuple[JointFlip, ...]
     pieces: tuple[Piece, ...]
     images: tuple[Piece, ...]
+    added: int = 0
 
 
 class Source(NamedTuple):
@@ -104,6 +110,7 @@ def take(recording: Motion, taking: Taking) -> Recording:
         raise CorpusError(f"{recording.name} has {len(recording)} frames; skipping {skip} leaves none")
     motion = replace(recording.slice(skip, len(recording)), name=recording.name or "clip")
     doubt = question_tempo(motion) or ""
+    added = 0 if skip else added_frames(motion)
     found, cuts = find_flips(motion, taking.flip_degrees), list[int]()
     repairs: tuple[JointRepair, ...] = ()
     if found and taking.flips == "repair":
@@ -111,13 +118,35 @@ def take(recording: Motion, taking: Taking) -> Recording:
         cuts = sorted({flip.frame for flip in find_flips(motion, taking.flip_degrees)})
     faults = tuple(replace(flip, frame=flip.frame + skip) for flip in found)
     if found and taking.flips == "drop":
-        return Recording(motion.name, motion.skeleton, None, doubt, faults, (), ())
+        return Recording(motion.name, motion.skeleton, None, doubt, faults, (), (), added)
     rate = posture_rate(motion) if taking.rate == "auto" else taking.rate
     parts = _cut(motion, cuts, rate, Clip(motion.name, 0, 0, repairs=_later(repairs, skip)))
     between = frames_between(rate)
     pieces = tuple(as_piece(part, between) for part in parts)
     images = tuple(mirror_image(part, between) for part in parts) if taking.mirror else ()
-    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images)
+    return Recording(motion.name, motion.skeleton, rate, doubt, faults, pieces, images, added)
+
+
+def added_frames(recording: Motion) -> int:
+    """Return how many frames of one posture were added before the movement, such as a T-pose; 0 if none were.
+
+    Nothing moves in them, and then several joints jump at once.
+    """
+    if recording.keyframed or recording.fps < FILM_RATE:
+        return 0
+    stop = int(_ADDED_SECONDS * recording.fps) + 2
+    rotations = recording.rotations[:stop]
+    turned = np.degrees(rot.angle(rotations[:-1], rotations[1:]))
+    moving = np.flatnonzero(turned.max(axis=1) > _MOVES)
+    if not len(moving) or np.count_nonzero(turned[moving[0]] > FLIP_DEGREES) < _JUMPING:
+        return 0
+    return int(moving[0]) + 1
+
+
+def usually_added(taken: Sequence[Recording]) -> int:
+    """Return how many frames were added before most recordings, as of `added_frames`; 0 if to most none were."""
+    found = Counter(one.added for one in taken if one.added)
+    return found.most_common(1)[0][0] if 2 * found.total() > len(taken) else 0
 
 
 def renamed(taken: Recording, name: str) -> Recording:

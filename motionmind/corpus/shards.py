@@ -15,6 +15,7 @@ import io
 import shutil
 import threading
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -87,11 +88,13 @@ class Taken(NamedTuple):
         key: the shard's name; "" if there is none.
         size: its bytes.
         fault: why the file cannot be read or taken; "" if it was.
+        body: a hash of its joints' names and parents.
     """
 
     key: str
     size: int = 0
     fault: str = ""
+    body: str = ""
 
 
 class _RecordingEntry(msgspec.Struct, frozen=True):
@@ -104,6 +107,7 @@ class _RecordingEntry(msgspec.Struct, frozen=True):
     faults: tuple[JointFlip, ...]
     pieces: tuple[Clip, ...]
     images: tuple[Clip, ...]
+    added: int
 
 
 class _Entry(msgspec.Struct, frozen=True):
@@ -161,8 +165,11 @@ def take_files(
     *,
     on_need: Callable[[float], None],
     on_taken: Callable[[Taken], None],
+    on_odd: Callable[[str], None],
 ) -> Iterator[Recording]:
     """Yield the recordings in files, in their order; workers take them first, all that are not taken yet.
+
+    Files on another skeleton than most, or than the first where two are as many, are left out.
 
     Args:
         names: the clip's name for each file.
@@ -172,6 +179,7 @@ def take_files(
         on_need: is called with the bytes that the corpus and its shards will need on disk, as soon as that is known:
             when a file of each format was taken.
         on_taken: is called for each file; what it raises ends the work.
+        on_odd: is called with what is wrong with each file that is on another skeleton; what it raises ends the work.
 
     Warns:
         MotionMindWarning: what readers warn of.
@@ -209,8 +217,22 @@ def take_files(
     readable = [job for job in jobs if done[job.file].key]
     if jobs and not readable:
         raise CorpusError(done[jobs[0].file].fault)
+    bodies = Counter(done[job.file].body for job in readable)
+    usual = max(readable, key=lambda job: bodies[done[job.file].body], default=None)  # the first of them
     for job in readable:
-        yield from _recordings(job, done[job.file])
+        if usual and done[job.file].body != done[usual.file].body:
+            on_odd(_differs(job, usual, done))
+        else:
+            yield from _recordings(job, done[job.file])
+
+
+def _differs(job: Job, usual: Job, done: Mapping[Path, Taken]) -> str:
+    """Say how the skeleton of a file differs from that of another."""
+    body, other = (_shard(one, done[one.file])[0][0].body for one in (usual, job))
+    return (
+        f"{job.file}: is on another skeleton than {usual.file}: {body.difference(other)}; a corpus has one (a mapping "
+        "of joints may bring it there)"
+    )
 
 
 def _needed(names: Mapping[Path, str], samples: Mapping[Path, Taken]) -> float:
@@ -224,16 +246,21 @@ def _size(file: Path) -> int:
 
 
 def _recordings(job: Job, taken: Taken) -> Iterator[Recording]:
-    """Read a shard, written anew if it was lost or damaged since, and warn of what it warns of."""
+    """Read a shard, and warn of what it warns of."""
+    recordings, said = _shard(job, taken)
+    for text in said:
+        warnings.warn(text, MotionMindWarning, stacklevel=2)
+    yield from recordings
+
+
+def _shard(job: Job, taken: Taken) -> tuple[list[Recording], tuple[str, ...]]:
+    """Read a shard, written anew if it was lost or damaged since."""
     found = _open(job, taken.key)
     if found is None:
         found = _open(job, take_file(job).key)
     if found is None:
         raise CorpusError(f"{job.folder}: the shard of {job.file} is not there: workers must share this disk")
-    recordings, said = found
-    for text in said:
-        warnings.warn(text, MotionMindWarning, stacklevel=2)
-    yield from recordings
+    return found
 
 
 # --- a worker ---------------------------------------------------------------------------------------------------------
@@ -271,7 +298,8 @@ def take_file(job: Job) -> Taken:
                 read.pop(str(job.file.absolute()), None)  # formats from other packages may open it themselves
                 make_folder(path.parent)
                 replace_file(path, _encode(recordings, said, read))
-            return Taken(key, path.stat().st_size)
+            first = (found[0] if found else recordings)[:1]
+            return Taken(key, path.stat().st_size, body="".join(_body_key(one.body) for one in first))
         except OSError as error:
             raise UnfinishedError(
                 f"{path.parent}: cannot be written: {error.strerror or error}; what is done is kept, and the same "
@@ -305,6 +333,10 @@ def _key(job: Job) -> str:
     return hashlib.sha256(msgspec.json.encode(depends)).hexdigest()
 
 
+def _body_key(body: Skeleton) -> str:
+    return hashlib.sha256(msgspec.json.encode((body.names, body.parents))).hexdigest()
+
+
 def _place(folder: Path, key: str) -> Path:
     return folder / key[:2] / f"{key}.npz"
 
@@ -328,7 +360,8 @@ def _encode(recordings: Sequence[Recording], said: tuple[str, ...], read: dict[s
         body = one.body
         entry = BodyEntry(body.name, body.names, body.parents, body.offsets.tolist(), body.tips.tolist())
         split = len(one.pieces)
-        entries.append(_RecordingEntry(one.name, entry, one.rate, one.doubt, one.faults, clips[:split], clips[split:]))
+        kept = one.rate, one.doubt, one.faults, clips[:split], clips[split:], one.added
+        entries.append(_RecordingEntry(one.name, entry, *kept))
     about = msgspec.json.encode(_Entry(tuple(entries), said, read))
     out = io.BytesIO()
     np.savez(out, about=np.frombuffer(about, np.uint8), **arrays)
@@ -361,6 +394,5 @@ def _decode(entry: _RecordingEntry, number: int, arrays: Mapping[str, NDArray[An
             for clip in clips
         )
 
-    return Recording(
-        entry.name, skeleton, entry.rate, entry.doubt, entry.faults, pieces(entry.pieces), pieces(entry.images)
-    )
+    both = pieces(entry.pieces), pieces(entry.images)
+    return Recording(entry.name, skeleton, entry.rate, entry.doubt, entry.faults, *both, entry.added)

@@ -9,8 +9,9 @@ import numpy as np
 
 from motionmind._typing import Floats
 from motionmind.arguments import check_real
+from motionmind.body.everyday import suggest_joint
 from motionmind.discretize.states import StateSpace, checked_rotations
-from motionmind.errors import MotionMindError, SkeletonError, did_you_mean
+from motionmind.errors import MotionMindError, SkeletonError
 
 SIDES = ("left_", "right_")
 
@@ -113,8 +114,7 @@ def per_joint_values(names: Sequence[str], value: float, per_joint: Mapping[str,
         for name, own in per_joint.items():
             joints = joints_meant(name, names)
             if not joints:
-                hint = did_you_mean(name, nameable(names)) or f"; there are {', '.join(names)}"
-                raise SkeletonError(f"no joint {name!r} to set a value for{hint}")
+                raise SkeletonError(f"no joint {name!r} to set a value for{suggest_joint(name, nameable(names))}")
             if (name in names) is exact:
                 values[joints] = own
     return values

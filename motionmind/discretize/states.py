@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionmind._typing import Floats, Ints, States
+from motionmind.body.everyday import suggest_joint
 from motionmind.display import displayed
-from motionmind.errors import MotionMindError, SkeletonError, suggestion
+from motionmind.errors import MotionMindError, SkeletonError
 from motionmind.geometry import rotations as rot
 
 # Two orientations that turn into each other by less than this many radians are one state.
@@ -143,7 +144,7 @@ class StateSpace:
     def index(self, joint: str) -> int:
         """Return the index of the joint called `joint`; SkeletonError, which says which there are, if none is."""
         if joint not in self.names:
-            raise SkeletonError(f"no joint {joint!r} among the states{suggestion(joint, self.names)}")
+            raise SkeletonError(f"no joint {joint!r} among the states{suggest_joint(joint, self.names)}")
         return self.names.index(joint)
 
     def of(self, joint: int | str) -> Floats:

@@ -124,18 +124,22 @@ def to_smpl(motion: Motion) -> tuple[Skeleton, Floats, Floats]:
     Raises:
         SkeletonError: the skeleton maps to neither human44 nor human23.
     """
-    own = _smpl_body_of(motion.skeleton)
-    if own:
-        return own, motion.rotations.copy(), motion.root
+    body = smpl_body_for(motion.skeleton)
+    if body.difference(motion.skeleton) is None:
+        return body, motion.rotations.copy(), motion.root
     if human44().difference(motion.skeleton) is not None:
         motion = to_human23(motion)
-    body = smpl_bodies()["SMPL+H"]
     given = motion.skeleton.global_rotations(motion.rotations)
     turned = np.empty((len(motion), len(body), 4))
     for i, (joint, parent) in enumerate(zip(body.names, body.parents, strict=True)):
         source = _source(joint, motion.skeleton)
         turned[:, i] = turned[:, parent] if source is None else given[:, motion.skeleton.index(source)]
     return body, body.local_rotations(turned), motion.root
+
+
+def smpl_body_for(skeleton: Skeleton) -> Skeleton:
+    """Return the SMPL body that movement on a skeleton is brought onto: its own if it is one, else SMPL+H."""
+    return _smpl_body_of(skeleton) or smpl_bodies()["SMPL+H"]
 
 
 def _smpl_body_of(skeleton: Skeleton) -> Skeleton | None:

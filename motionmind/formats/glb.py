@@ -32,7 +32,7 @@ from motionmind._typing import Floats, Singles
 from motionmind.body.motion import Motion
 from motionmind.body.skeleton import Skeleton
 from motionmind.errors import MotionMindError
-from motionmind.files import FilePath, write_atomically
+from motionmind.files import FilePath, name_of, write_atomically
 from motionmind.formats._glb_body import COLOURS, Mesh, body_mesh
 from motionmind.formats._json import MARKS, MarksSchema, insertion_schema, rounded
 from motionmind.geometry import rotations as rot
@@ -91,7 +91,7 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     }
     if moving:
         document["animations"] = [animation_of(buffer, motion, name)]
-    document["nodes"][0]["extras"] = {MARKS: _marks(motion)}
+    document["nodes"][0]["extras"] = {MARKS: _marks(path, motion)}
     if has_root:
         document["scenes"][0]["nodes"] = [len(skeleton) + 1, len(skeleton)]
         document["nodes"].append({"name": "root", "children": [0]})
@@ -106,12 +106,14 @@ def write_glb(path: FilePath, motion: Motion, *, has_root: bool = False) -> None
     write_atomically(path, container(document, bytes(buffer.data), name))
 
 
-def _marks(motion: Motion) -> str:
+def _marks(path: FilePath, motion: Motion) -> str:
     """Return what glTF has no place for, as JSON of MarksSchema, times from the first frame's on; "{}" if nothing."""
+    # Movement is read under the file's name, and given movement is credited by its own.
+    recorded = motion.own_credits if motion.name and motion.name != name_of(path) else motion.recorded
     insertions = [insertion_schema(one, float(motion.times[0])) for one in motion.insertions]
     body = motion.skeleton
     tips = {name: rounded(tip).tolist() for name, tip in zip(body.names, body.tips, strict=True) if tip.any()}
-    return msgspec.json.encode(MarksSchema(insertions, motion.keyframed, list(motion.recorded), tips)).decode()
+    return msgspec.json.encode(MarksSchema(insertions, motion.keyframed, list(recorded), tips)).decode()
 
 
 class GlbBuffer:

@@ -185,7 +185,9 @@ def _rate(arrays: dict[str, Floats], fps: float | None, path: FilePath) -> float
     """Return `fps`, or the file's frames per second if it is None."""
     name = "fps" if fps is not None else next((name for name in _RATES if name in arrays), None)
     if name is None:
-        raise FormatError(f"no array {_RATES[0]!r}: say how many frames per second there are", path=path)
+        raise FormatError(
+            f"no array {_RATES[0]!r}: say how many frames per second there are (--source-fps, or fps=)", path=path
+        )
     rate = arrays.get(name, np.array(fps, dtype=np.float64))
     if rate.size != 1 or not 1.0 / LARGEST <= rate.item() <= FASTEST:
         raise FormatError(f"{name!r} must be one number of frames per second, not {in_one_line(rate)}", path=path)

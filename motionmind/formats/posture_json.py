@@ -12,6 +12,7 @@
       }
     }
 
+`recorded`, if it is there, holds the credits of the movement that it was taken from (`motionmind.credits.credit`).
 `root` is the root's place in metres, `rotations` each joint's quaternion x, y, z, w against its parent.
 `skeleton` is "human23", "human44", or a description in metres, parents before their children, `tip` optional:
 `{"name": ..., "joints": [{"name": ..., "parent": NAME or null, "offset": [x, y, z], "tip": [x, y, z]}, ...]}`.
@@ -23,7 +24,8 @@ import msgspec
 import numpy as np
 
 from motionmind.body.motion import Posture
-from motionmind.errors import FormatError
+from motionmind.credits.credit import Credit
+from motionmind.errors import FormatError, MotionMindError
 from motionmind.files import FilePath, write_atomically
 from motionmind.formats import _json
 
@@ -36,6 +38,7 @@ class PostureSchema(msgspec.Struct, forbid_unknown_fields=True):
     skeleton: str | _json.SkeletonSchema
     root: _json.Vector
     rotations: dict[str, _json.Quaternion]
+    recorded: list[Credit] = []
 
 
 def posture_from_json(data: bytes, path: FilePath) -> Posture:
@@ -61,7 +64,11 @@ def posture_from_json(data: bytes, path: FilePath) -> Posture:
     rotations = np.array([schema.rotations[name] for name in skeleton.names], dtype=np.float64)
     root = np.array(schema.root, dtype=np.float64)
     _json.check_lengths(root, "root", path)
-    return Posture(skeleton, _json.unit_rotations(rotations, skeleton.names, path), root)
+    turned = _json.unit_rotations(rotations, skeleton.names, path)
+    try:
+        return Posture(skeleton, turned, root, tuple(schema.recorded))
+    except MotionMindError as error:  # of the credits' shares
+        raise FormatError(str(error), path=path) from None
 
 
 def write_posture_json(path: FilePath, posture: Posture) -> None:
@@ -71,11 +78,13 @@ def write_posture_json(path: FilePath, posture: Posture) -> None:
         f"    {_json.text(name)}: {rotation}"
         for name, rotation in zip(skeleton.names, _json.rounded(posture.rotations).tolist(), strict=True)
     ]
+    shares = [f'  "recorded": {msgspec.json.encode(posture.recorded).decode()}'] if posture.recorded else []
     fields = [
         f'  "format": "{_json.POSTURE}"',
         f'  "version": {_json.VERSION}',
         f'  "skeleton": {_json.skeleton_text(skeleton, "  ")}',
         f'  "root": {_json.rounded(posture.root).tolist()}',
         '  "rotations": {\n' + ",\n".join(rows) + "\n  }",
+        *shares,
     ]
     write_atomically(path, ("{\n" + ",\n".join(fields) + "\n}\n").encode())

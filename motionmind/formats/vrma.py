@@ -42,6 +42,7 @@ _BONES = {
 }
 # human23's fingers stand for four: the others turn with the middle one, metres ahead of it (as in `_smpl`).
 _BESIDE = {"IndexProximal": 0.021, "RingProximal": -0.021, "LittleProximal": -0.042}
+JOINTS = len(_BONES) + 2 * len(_BESIDE)  # bones in a file
 
 
 def write_vrma(path: FilePath, motion: Motion) -> None:

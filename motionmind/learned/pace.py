@@ -21,10 +21,10 @@ SLOPE, PULL and SPREAD are those of the recorded corpora together (experiments/d
 knows the lull: it is that of the corpus's postures most like it.
 
 The fastest speeds are 99th percentiles of the corpus's frames at 30 a second, joint by joint. What hardly moves in the
-corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, and neither the body's
-turning nor its travel as slower than everyday movement. The *peaks* (`motionmind.learned.peaks`) are what the greatest
-of windows of 1 to 6 s keep to, accelerations of the root among them; none is less than the fastest speeds, or everyday
-movement.
+corpus is not forbidden to move: no joint counts as slower than a quarter of the median joint, or than everyday movement
+where that is at rest, and neither the body's turning nor its travel as slower than everyday movement. The *peaks*
+(`motionmind.learned.peaks`) are what the greatest of windows of 1 to 6 s keep to, accelerations of the root among them;
+none is less than the fastest speeds, or everyday movement.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ ALIKE = 5  # of the corpus's postures, whose lulls say that of a posture
 AS_MANY = 20.0  # windows that the prior is worth
 SLOWEST_USUAL = 0.3, 0.2, 0.1  # rad/s of the mean joint, rad/s of turning, heights/s of travel: no usual speed is less
 OF_MEDIAN = 0.25  # of the median joint's fastest speed: no joint's is less
-EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where none moves; the least of turning, rad/s, and of travel, heights/s
+EVERYDAY = 3.0, 2.0, 0.5  # rad/s of a joint where most rest; the least of turning, rad/s, and of travel, heights/s
 STARTS = 3.0  # heights/s^2 of the root, than which no peak is less: in three of four seconds recorded dancers show more
 
 
@@ -242,7 +242,7 @@ class _Gauge:
             usual = np.maximum(self._usual[0] / self._count, usual)
             rare = self._rare.value()
             median = float(np.median(rare[:joints]))
-            least = OF_MEDIAN * median if median > 0.0 else EVERYDAY[0]
+            least = OF_MEDIAN * median if median > SLOWEST_USUAL[0] else EVERYDAY[0]  # at rest there is noise
             fastest = np.maximum(rare, [*[least] * joints, *EVERYDAY[1:]])
             greatest = np.maximum(self._most, np.append(fastest, [EVERYDAY[2], STARTS]))
             slowest = self._seconds.value()

@@ -16,6 +16,7 @@ from motionmind.body.motion import Motion, Posture
 from motionmind.corpus import store
 from motionmind.corpus.corpus import Corpus
 from motionmind.corpus.manifest import SourceManifest, parse_manifest
+from motionmind.credits.credit import Credit, Origin, credit_clip
 from motionmind.errors import MotionMindError, did_you_mean, enumerated, suggestion
 from motionmind.formats import read_motion
 from motionmind.names.spelling import Moment, PostureName, Source, is_file, parse_posture
@@ -53,6 +54,10 @@ class Collection(ABC):
     def posture(self, name: str) -> Posture:
         """Return one of the postures."""
 
+    def credits_of(self, name: str) -> tuple[Credit, ...]:
+        """Return the credits of one of the postures; none where that is not known."""
+        return ()
+
     @abstractmethod
     def motions(self, names: Sequence[str]) -> list[Motion]:
         """Return some of the clips."""
@@ -75,11 +80,14 @@ class Collection(ABC):
         self.check(name)
         if name in self.clips and (as_clip or name not in self.postures):
             return self.motions([name])[0]
-        return replace(self.posture(name).as_motion(), name=name)
+        return replace(self.posture(name).as_motion(), name=name, recorded=self.credits_of(name))
 
     def check(self, name: str) -> None:
         """Raise MotionMindError, which suggests one, if neither a posture nor a clip has this name."""
         if name not in self.postures and name not in self.clips:
+            place, at, moment = name.rpartition("@")
+            if at and (place in self.postures or place in self.clips):
+                raise MotionMindError(_no_moment(f"{self.word}/{place}", moment))
             known = [*self.postures, *self.clips]
             raise MotionMindError(f"{self.word}: no posture or clip {name!r}{suggestion(name, known)}")
 
@@ -158,6 +166,12 @@ class _CorpusCollection(Collection):
 
     def posture(self, name: str) -> Posture:
         return _posture(self._scores[name], name)
+
+    def credits_of(self, name: str) -> tuple[Credit, ...]:
+        if self._written is None:
+            return ()
+        of = self._written
+        return (credit_clip(Origin(of.name, of.title, of.author, of.source, of.licence, of.citation), name),)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:
         corpus = self._corpus
@@ -296,6 +310,9 @@ def check_exists(source: Source, home: Path | None = None) -> None:
         return  # those who read files say what is wrong with one
     if os.path.isdir(word):  # noqa: PTH112 - a name may be too long for any file
         raise MotionMindError(f"{word}: is a folder, and no corpus; give a file, or a corpus's posture or clip")
+    place, at, moment = word.rpartition("@")
+    if at and is_file(place):
+        raise MotionMindError(_no_moment(place, moment))
     first, slash, _ = word.partition("/")
     corpora = list(store.list_corpora(home))
     if slash:
@@ -364,6 +381,11 @@ def select_frames(clip: Path | str, length: int, start: int, end: int) -> range:
     if last < first:
         raise MotionMindError(f"{clip}: the last frame, {end}, lies before the first, {start}")
     return range(first, last + 1)
+
+
+def _no_moment(word: str, moment: str) -> str:
+    """Say that what follows the @ after a movement's name is no moment of it."""
+    return f"{word}: @{moment} is neither a frame, such as @240, nor seconds, such as @2.0s"
 
 
 def _example(source: Source, collection: Collection) -> str:

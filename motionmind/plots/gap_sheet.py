@@ -10,6 +10,7 @@ from PIL import Image
 
 from motionmind.body.motion import Insertion, Motion, Posture
 from motionmind.corpus.corpus import Corpus
+from motionmind.display import displayed
 from motionmind.errors import MotionMindError
 from motionmind.gaps.gaps import Gaps, Place, Recommended
 from motionmind.geometry import rotations as rot
@@ -17,6 +18,7 @@ from motionmind.render.sheet import Row, evenly, row_sheet
 from motionmind.tween.engine import Engine
 
 _BETWEEN = 3  # moments of the way that are drawn
+_CLIP = 24  # characters of a clip's name
 _APART = 1.0  # seconds from the end of one movement to the beginning of the next
 _FLOOR = np.array([1.0, 0.0, 1.0])
 
@@ -39,10 +41,9 @@ def gap_sheet(engine: Engine, gaps: Gaps) -> Image.Image:
         frames = evenly(range(first, first + len(motion)), _BETWEEN + 2)
         blanks = [None] * (_BETWEEN + 2 - len(frames))
         inner = [f"{motion.times[frame - first]:.2f} s" for frame in frames[1:-1]]
-        inner = [f"{motion.times[frame - first]:.2f} s" for frame in frames[1:-1]]
         captions = ["from", *inner, *[""] * len(blanks), "to"]
         less = before - one.energy.cost
-        heading = f"{number}. {_words(one.begin)} to {_words(one.end)}: {less:.2f} nats a tween less"
+        heading = f"{number}. {less:.2f} nats less a tween: {_words(one.begin)} to {_words(one.end)}"
         rows.append(Row(heading, [*frames[:-1], *blanks, frames[-1]], captions))
         first, before = first + len(motion), one.energy.cost
     name = f"{gaps.corpus}: what to record next"
@@ -50,7 +51,7 @@ def gap_sheet(engine: Engine, gaps: Gaps) -> Image.Image:
 
 
 def _words(place: Place) -> str:
-    return f"{place.clip} at {place.seconds:.2f} s"
+    return f"{displayed(place.clip, _CLIP)} at {place.seconds:.2f} s"
 
 
 def _ends(corpus: Corpus, recommended: Recommended) -> tuple[Posture, Posture]:

@@ -287,8 +287,8 @@ def _words(graph: nx.DiGraph, left_out: int) -> tuple[str, str]:
     """Return the heading and the legend."""
     between = sum(a != b for a, b in graph.edges)
     heading = (
-        f"{displayed(graph.graph['joint'])} ({displayed(graph.graph['corpus'])}): {len(graph)} states, "
-        f"{between} transitions between them"
+        f"{displayed(graph.graph['joint'])} ({displayed(graph.graph['corpus'])}): "
+        f"{len(graph)} state{'s' * (len(graph) != 1)}, {between} transition{'s' * (between != 1)} between them"
     )
     if left_out:
         heading += f"; {left_out} that no transition joins left out"

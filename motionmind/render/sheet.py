@@ -46,6 +46,7 @@ _PIXELS = 60e6  # pixels of a sheet, at most: viewers refuse larger pictures
 _NARROW = 100.0  # least width of the side view, pixels, for the words under it
 _TALL = 200.0  # height of a body, pixels
 _LARGEST = 480.0  # greatest width or height of a view, pixels, where a body leaps or lies
+_HEADING = 120  # characters of a heading that fit a row
 _LONGEST = 16  # characters of a caption that fit the narrowest view
 _CAPTION, _LINE = 24, 17  # heights of a caption and of a line of the legend, pixels
 _Phrase = tuple[float, str, Colour]  # x in pixels, words, colour
@@ -226,7 +227,9 @@ class _Sheet:
         at = 0
         for number, row in enumerate(rows):
             x, y = number % columns * width, header + number // columns * height
-            pen.text((x + 6, y + 4), displayed(row.heading), TEXT, ImageFont.load_default(15))
+            heading, large = displayed(row.heading, _HEADING), ImageFont.load_default(15)
+            is_long = large.getlength(heading) > width - 9
+            pen.text((x + 6, y + 4), heading, TEXT, _small() if is_long else large)
             for place, frame in enumerate(row.frames):
                 if frame is not None:
                     self._tile(sheet, pen, at, (x + place * wide, y + _CAPTION))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from motionmind.errors import MotionMindError, NoPathError
 from motionmind.search.problem import Model, Problem, Via, costs_to_go
 from motionmind.search.solve import feasible
 
+MOST_CONFLICTS, MOST_TRIED = 4, 50  # sets of constraints that are named, and in which they are looked for
 FARTHEST = 60  # moves by which a via is moved to see whether that helps
 
 
@@ -96,16 +97,43 @@ def find_conflicts(chains: Sequence[str], model: Model, problem: Problem, constr
     every = list(range(len(names)))
     lines = [f"without {name} there is one" for i, name in enumerate(names) if possible([k for k in every if k != i])]
     if not lines:
-        guilty = every
-        for i in every:
-            if not possible(others := [k for k in guilty if k != i]):
-                guilty = others
-        lines.append(f"{' and '.join(names[i] for i in guilty)} leave{'s' * (len(guilty) == 1)} none")
+        lines += [
+            f"{' and '.join(names[i] for i in guilty)} leave{'s' * (len(guilty) == 1)} none"
+            for guilty in _minimal_conflicts(every, possible)
+        ]
     lines += [f"with via {i + 1} at move {move} there is one" for i, move in _feasible_moves(problem)]
     lines += _blocked_segments(chains, problem)
     number = str(rules.longest) if rules.shortest == rules.longest else f"{rules.shortest} to {rules.longest}"
     first = f"no path from A to B in {number} move{'s' * (rules.longest != 1)} under these constraints:"
     return "\n  ".join([first, *lines])
+
+
+def _minimal_conflicts(every: list[int], possible: Callable[[Sequence[int]], bool]) -> list[list[int]]:
+    """Find up to MOST_CONFLICTS sets of constraints that leave no path, and leave one without any of theirs.
+
+    Each is looked for in what is left without one constraint of every set before it.
+
+    Args:
+        every: all constraints, by number; together they leave no path.
+        possible: whether some of them do leave one.
+    """
+    found: list[list[int]] = []
+    tried = [every]
+    for left in tried:
+        guilty = next((one for one in found if set(one) <= set(left)), None)
+        if guilty is None:
+            if possible(left):
+                continue
+            guilty = left
+            for i in left:
+                if not possible(others := [k for k in guilty if k != i]):
+                    guilty = others
+            found.append(guilty)
+        if len(found) == MOST_CONFLICTS or len(tried) > MOST_TRIED:
+            break
+        shorter = ([k for k in left if k != i] for i in guilty)
+        tried += [one for one in shorter if one not in tried]
+    return found
 
 
 def _feasible_moves(problem: Problem) -> Iterator[tuple[int, int]]:

@@ -6,7 +6,8 @@ import json
 import os
 import shlex
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -142,6 +143,15 @@ class TweenReport(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError(f"it has {len(self.path)} postures and {len(self.times)} times")
 
 
+class NoPathReport(msgspec.Struct, frozen=True):
+    """The report of a tween that was not found: the reason in words, and as plain values where joints move on their
+    own."""
+
+    status: Literal["no path"]
+    message: str
+    diagnosis: dict[str, Any] | None
+
+
 def plain(report: TweenReport) -> dict[str, Any]:
     """Return a report as plain values for JSON, in the order of its fields."""
     values: dict[str, Any] = msgspec.to_builtins(report, enc_hook=np.generic.item)
@@ -169,11 +179,35 @@ def read_report(path: FilePath) -> TweenReport:
     >>> read_report("report.json").status
     'optimal'
     """
+    found = read_any_report(path)
+    if isinstance(found, NoPathReport):
+        raise FormatError("is no report of a tween: it says why none was found", path=path)
+    return found
+
+
+def read_any_report(path: FilePath) -> TweenReport | NoPathReport:
+    """Read the report of a tween, or of one that was not found; arguments and errors as of `read_report`."""
     check_path("path", path)
+    text = read_bytes(path)
     try:
-        return msgspec.json.decode(read_bytes(path), type=TweenReport)
+        return msgspec.json.decode(text, type=NoPathReport)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        pass  # as nearly always
+    try:
+        return msgspec.json.decode(text, type=TweenReport)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        lacks = "Object missing required field"  # as a report of 0.1 from before `explain` does
-        again = f"; write it again: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"
-        fault = str(error).replace(lacks, "there is no key") + again * str(error).startswith(lacks)
-        raise FormatError(f"is no report of a tween: {fault}", path=path) from error
+        raise FormatError(f"is no report of a tween: {_fault(error, Path(os.fsdecode(path)))}", path=path) from error
+
+
+def _fault(error: Exception, path: Path) -> str:
+    """Say what a report lacks or has wrong, and how to write one, not over what is no report at all."""
+    lacks = "Object missing required field"
+    fault = str(error)
+    if not fault.startswith(lacks):
+        return fault
+    if "`status`" in fault:  # as movement does
+        word, path = "tween writes one", path.with_name(f"{path.stem}-report.json")
+    else:  # as a report of 0.1 from before `explain` does
+        word = "write it again"
+    again = f"{word}: motionmind tween A B --corpus NAME --report {shlex.quote(os.fspath(path))}"
+    return f"{fault.replace(lacks, 'there is no key')}; {again}"

@@ -199,6 +199,22 @@ def test_an_unknown_joint_is_answered_with_those_there_are() -> None:
         CHAIN.index("x")
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("left_hand", "left_wrist or left_fingers"),
+        ("right_foot", "right_ankle or right_toes"),
+        ("arm", "left_shoulder or right_shoulder or left_elbow or right_elbow"),
+        ("head", "atlantal"),
+        ("left_head", "left_hip"),
+        ("left_elbwo", "left_elbow"),
+    ],
+)
+def test_an_everyday_word_is_answered_with_the_joints_there(word: str, meant: str) -> None:
+    with pytest.raises(SkeletonError, match=rf"did you mean {meant}\?$"):
+        BODY.index(word)
+
+
 def test_arrays_are_copied_and_frozen() -> None:
     offsets = np.ones((3, 3))
     skeleton = renamed(CHAIN, offsets=offsets)

@@ -162,6 +162,15 @@ def test_a_recording_is_varied_as_the_corpus_learned_it(run: Run) -> None:
     assert "begins at frame" not in run(*vary).err
 
 
+def test_a_recording_that_is_varied_frame_by_frame_is_noticed(run: Run) -> None:
+    write_motion("clip.bvh", clip(fps=30.0))
+    said = "note: clip.bvh: every frame is a posture, 30 a second: --rate 5 takes as many as corpus build does\n"
+    for words, is_said in (((), True), (("--rate", 5), False)):
+        ran = run("vary", "clip.bvh", *words, "-o", "v.json")
+        assert (said in ran.err) is is_said
+    assert "is a posture, " not in run("vary", "ballet/jump", "-o", "v.json").err
+
+
 def test_review_says_which_file_it_wants(run: Run) -> None:
     write_motion("clip.json", clip(fps=10.0))
     assert run("vary", "clip.json", "-o", "v.bvh", "-o", "w.bvh", "-o", "w.json").code == 0

@@ -47,7 +47,10 @@ BAD = [
     ("corpus build mine", r"Missing argument 'FILES\.\.\.'"),
     ("corpus build mine one.json", r"no recording holds two postures"),
     ("corpus build mine clip.bvh cut.bvh --strict-files", r"cut\.bvh:\d+: "),
-    ("corpus build mine clip.bvh stranger.bvh", r"stranger is on another skeleton than clip: "),
+    (
+        "corpus build mine clip.bvh stranger.bvh --strict-files",
+        r"stranger\.bvh: is on another skeleton than clip\.bvh: ",
+    ),
     ("corpus build mine clip.bvh folder", r"'folder' is a directory"),
     ("corpus build mine clip.bvh ./clip.bvh", r"clip\.bvh: given twice"),
     ("corpus build ballet clip.bvh", r"'ballet' is the name of a bundled corpus"),

@@ -132,6 +132,8 @@ def test_flips_are_repaired_kept_or_dropped(run: Run) -> None:
     said = run("corpus", "check", "mine", "--details").out
     assert said.endswith(f"\n{flips}:\n  jump: 2 flips, 1 frame reconstructed (left_hip)\n")
     assert "repaired   1 clip, 0 stretches put back exactly, 1 reconstructed\n" in run("corpus", "info", "mine").out
+    mixed = run("corpus", "build", "mixed", "--mix", "mine", "jump.bvh").out
+    assert f"{flips} (--details lists them)" in mixed  # of its own recordings, and none of those that are mixed
     assert built(run, "jump.bvh", "plain.bvh", "--flip-angle", 180)["faults"] == []
 
 

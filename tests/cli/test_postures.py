@@ -162,7 +162,7 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
         (["no.bvh@3", "B.json"], r"no\.bvh: cannot be read: there is no such file or folder"),
         (
             ["clip.bvh@3x", "B.json"],
-            r"clip\.bvh@3x: there is no such file; frames are spelled clip\.bvh@240 or clip\.bvh@2\.0s",
+            r"clip\.bvh: @3x is neither a frame, such as @240, nor seconds, such as @2\.0s",
         ),
         (["clip.bvh@9~", "B.json", "--before", "clip.bvh@3..9"], r"clip\.bvh@9~: ~ takes .* and so does --before"),
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..99"], r"clip\.bvh: frames are 0 to 36, .* no frame 99"),
@@ -171,7 +171,14 @@ def test_a_frame_of_a_clip_is_passed(run: Run) -> None:
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@3..30"], r"before A does not end in A: \w+ is [\d.]+ degrees"),
         (["B.json", "clip.bvh@9", "--after", "clip.bvh@3..9"], r"after B does not begin in B: \w+ is [\d.]+ degrees"),
         (["clip.bvh@9", "B.json", "--before", "clip.bvh@9..9"], r"has one frame, which shows no velocity"),
-        (["clip.bvh@0", "B.json", "--via", "clip.bvh@15"], r"clip\.bvh: 37 frames, where one posture was expected"),
+        (
+            ["clip.bvh@0", "B.json", "--via", "clip.bvh@15"],
+            r"the last @ is a move, .* write clip\.bvh@15@ for frame 15",
+        ),
+        (
+            ["clip.bvh@0", "B.json", "--via", "ballet/adagio@23"],
+            r"write ballet/adagio@23@ .*, or ballet/adagio@FRAME@23",
+        ),
         (["clip.bvh@0", "B.json", "--via", "clip.bvh@15~"], r"--via clip\.bvh@15~: give a posture and its move"),
         (["clip.bvh@" + "9" * 5000, "B.json"], r"cannot be used|no such file"),
         (["clip.bvh@3", "B.json", "--via", "B.json@" + "9" * 5000], r"cannot be used|no such file"),

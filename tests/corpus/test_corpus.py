@@ -83,6 +83,27 @@ def test_recordings_give_5_postures_a_second_and_keyframes_all_of_theirs(caplog:
     ]
 
 
+@pytest.mark.parametrize(("frames", "words"), [(1, "a frame"), (30, "30 frames")])
+def test_a_posture_that_was_added_before_the_movement_is_noticed(
+    frames: int, words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    plain = swing("plain", 121, fps=60.0)
+    posed = np.concatenate([np.tile(rot.from_axis_angle([1.0, 0.0, 0.0], [1.5] * 3), (frames, 1, 1)), plain.rotations])
+    times = np.arange(len(posed)) / 60.0
+    added = replace(plain, rotations=posed, root=np.tile(plain.root[0], (len(posed), 1)), times=times)
+    said = f"most recordings begin with {words} of another posture (a T-pose?): --skip {frames} (or skip=) drops that"
+    for motions, skip, is_said in (
+        ([added, added, plain], 0, True),
+        ([added, plain], 0, False),
+        ([added, added, plain], frames, False),
+        ([swing("jump", 121, jumps={1: 90.0})], 0, False),
+    ):
+        caplog.clear()
+        with caplog.at_level("INFO", "motionmind"):
+            gather("arms", motions, skip=skip)
+        assert (said in caplog.text) is is_said
+
+
 def test_keyframes_alone_have_no_rate_and_nothing_is_said(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level("INFO", "motionmind"):
         corpus = gather("arms", [swing("slow", 26, fps=12.5)])

@@ -72,7 +72,9 @@ class Client:
     def gather(self, files: dict[Path, str], reading: Reading | None = None) -> Corpus:
         with shards_of("mine", self.home) as folder:
             reading = reading or Reading(TAKING)
-            taken = take_files(files, reading, folder, self.team, on_need=self.need, on_taken=self.taken.append)
+            taken = take_files(
+                files, reading, folder, self.team, on_need=self.need, on_taken=self.taken.append, on_odd=print
+            )
             return gather("mine", taken, mirror=reading.taking.mirror)
 
 
@@ -196,13 +198,27 @@ def test_files_that_cannot_be_read_are_reported(run: Run, files: dict[Path, str]
     ran = run("corpus", "build", "mine", *files, bad, "--workers", 2)
     assert ran.code == 0
     assert f"note: {bad}:1: not a BVH file: it must begin with HIERARCHY; left out\n" in ran.err
-    assert "note: 1 file of 6 cannot be read, and nothing is learned from them\n" in ran.err
+    assert "note: nothing is learned from 1 file of 6\n" in ran.err
     ran = run("corpus", "build", "mine", bad, *files, "--strict-files")
     assert ran.code == 2
     assert ran.err == f"error: {bad}:1: not a BVH file: it must begin with HIERARCHY\n"
     ran = run("corpus", "build", "mine", bad)
     assert ran.code == 2
     assert "error: " in ran.err
+
+
+def test_files_on_other_joints_than_most_are_reported(run: Run, files: dict[Path, str], tmp_path: Path) -> None:
+    odd = tmp_path / "odd.bvh"
+    motion = dance("odd", 1)
+    names = tuple(f"part{number}" for number in range(23))
+    write_motion(odd, replace(motion, skeleton=replace(motion.skeleton, name="odd", names=names)))
+    ran = run("corpus", "build", "mine", odd, *files)
+    assert ran.code == 0
+    assert f"note: {odd}: is on another skeleton than {next(iter(files))}: odd lacks " in ran.err
+    assert "may bring it there); left out\nnote: nothing is learned from 1 file of 6\n" in ran.err
+    assert run("corpus", "info", "mine", "--json").json["joints"][0] == "pelvis"
+    ran = run("corpus", "build", "mine", odd, *files, "--strict-files")
+    assert (ran.code, f"error: {odd}: is on another skeleton than " in ran.err) == (2, True)
 
 
 def test_a_full_disk_is_told_and_what_was_done_is_kept(
@@ -229,7 +245,9 @@ def test_a_disk_that_is_too_small_is_told_before_all_files_are_read(
 def test_shards_that_another_build_removes_are_made_again(files: dict[Path, str], tmp_path: Path) -> None:
     client = Client(tmp_path, this_process())
     with shards_of("mine", tmp_path) as folder:
-        taken = take_files(files, Reading(TAKING), folder, client.team, on_need=client.need, on_taken=print)
+        taken = take_files(
+            files, Reading(TAKING), folder, client.team, on_need=client.need, on_taken=print, on_odd=print
+        )
         first = next(taken)
         shutil.rmtree(folder)
         one = gather("mine", [first, *taken], mirror=True)

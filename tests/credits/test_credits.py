@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from command_line import Run
 from hypothesis import given
 from hypothesis import strategies as st
@@ -413,6 +414,20 @@ def test_a_clip_of_a_corpus_is_the_corpus_s_in_any_file(run: Run, tmp_path: Path
     for name in ("adagio.json", "adagio.glb"):
         assert run("convert", "ballet/adagio", tmp_path / name).code == 0
         assert run("credits", tmp_path / name).out == said
+
+
+def test_a_posture_of_a_corpus_is_the_corpus_s(run: Run, tmp_path: Path) -> None:
+    assert "100%  ballet: arabesque, The MotionMind authors" in run("credits", "ballet/arabesque").out
+    for name in ("ballet/arabesque", "ballet/adagio@3"):
+        for words in (("convert", name, tmp_path / "a.json"), ("posture", name, "-o", tmp_path / "a.json")):
+            assert run(*words).code == 0
+            assert run("credits", tmp_path / "a.json").out == run("credits", name).out
+
+
+def test_given_movement_keeps_its_name_under_another(run: Run, tmp_path: Path) -> None:
+    write_motion(tmp_path / "walk.json", replace(ballet_clip("plies"), name="walk", recorded=()))
+    assert run("convert", tmp_path / "walk.json", tmp_path / "other.glb").code == 0
+    assert "100%  walk, which was given" in run("credits", tmp_path / "other.glb").out
 
 
 def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:

@@ -100,6 +100,13 @@ def test_other_bodies_may_have_any_size(convert: Run) -> None:
 # --- formats --------------------------------------------------------------------------------------------------------
 
 
+def test_the_joints_that_are_told_are_those_in_the_file(convert: Run) -> None:
+    write_motion("in.json", moving(human44()))
+    for suffix in ("npz", "vrma", "glb", "bvh"):
+        ran = convert("in.json", f"out.{suffix}")
+        assert f" {len(read_motion(f'out.{suffix}').skeleton)} joints (" in ran.out
+
+
 @pytest.mark.parametrize("source", SUFFIXES)
 @pytest.mark.parametrize("target", [*SUFFIXES, "glb"])
 def test_a_body_of_known_size_moves_alike_in_all(source: str, target: str, convert: Run) -> None:
@@ -108,6 +115,8 @@ def test_a_body_of_known_size_moves_alike_in_all(source: str, target: str, conve
     ran = convert(f"in.{source}", f"out.{target}", "--source-fps", 20)
     assert ran.code == 0
     assert re.fullmatch(rf"out\.{target}: 8 frames, (23|52) joints \(.*\)\n", ran.out)
+    if target == "npz":
+        assert ran.out == "out.npz: 8 frames, 52 joints (SMPL+H)\n"
     if target != "glb":  # of which tests/test_glb.py reads what is in it
         again = to_human23(read_motion(f"out.{target}", fps=20))
         assert rot.angle(again.rotations, motion.rotations).max() < 1e-5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from bundled_clips import ballet_clip
 from command_line import Run
 from PIL import Image
+from PIL.ImageDraw import ImageDraw
 
 from motionmind.body.motion import Motion
 from motionmind.corpus.corpus import Corpus, Facing
@@ -155,7 +157,14 @@ def test_a_single_posture_has_no_pair() -> None:
         draw_pairs(single, 3, 0)
 
 
-def test_the_command_names_postures_and_draws_them(run: Run, tmp_path: Path) -> None:
+def test_the_command_names_postures_and_draws_them(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = list[str]()
+    write = ImageDraw.text
+    monkeypatch.setattr(
+        ImageDraw,
+        "text",
+        lambda pen, xy, text, *rest, **how: (written.append(text), write(pen, xy, text, *rest, **how)),
+    )
     ran = run("corpus", "gaps", "macarena", "--pairs", 6, "--count", 1, "-o", tmp_path / "gaps.png")
     assert ran.code == 0, ran.err
     assert "record next" in ran.out or "no single move" in ran.out
@@ -167,6 +176,10 @@ def test_the_command_names_postures_and_draws_them(run: Run, tmp_path: Path) -> 
     with Image.open(tmp_path / "gaps.png") as picture:
         assert picture.width > 500
         assert picture.height > 100
+    clip = found["transitions"][0]["begin"]["clip"]
+    assert any(
+        re.match(rf"1\. -?\d+\.\d\d nats less a tween: {clip} at \S+ s to \S+ at \S+ s$", text) for text in written
+    )
 
 
 def test_bad_input_is_one_line(run: Run, tmp_path: Path) -> None:

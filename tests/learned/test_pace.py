@@ -247,6 +247,15 @@ def test_what_never_moves_in_a_corpus_may_move() -> None:
     assert tuple(pace.fastest[-2:]) == EVERYDAY[1:]
 
 
+def test_where_most_joints_rest_they_may_move_as_everyday() -> None:
+    motion = reaches(human23(), [2.0, 1.0], [0.8, 0.8])
+    rotations = np.tile(rot.normalise(np.array([0.1, 0.2, 0.3, 0.4])), (len(motion), len(human23()), 1))
+    rotations[:, ARM] = motion.rotations[:, ARM]
+    rotations *= 1.0 + 1e-15 * np.random.default_rng(0).standard_normal((len(motion), len(human23()), 1))
+    pace = learned(replace(motion, rotations=rotations))
+    assert (np.delete(pace.fastest[:-2], ARM) == EVERYDAY[0]).all()
+
+
 @pytest.mark.parametrize("frames", [2, 3])
 def test_a_corpus_of_a_few_postures_has_the_prior(frames: int) -> None:
     still = reaches(human23(), [1.0], [0.5]).slice(0, frames)

@@ -247,6 +247,7 @@ def test_a_posture_of_a_file_is_a_frame_or_the_frame_nearest_to_a_time() -> None
         ("balet", r"^balet: there is no such file or corpus; did you mean ballet\?$"),
         ("zzz", r"^zzz: there is no such file or corpus; corpora are ballet, .*, a posture of one is CORPUS/NAME$"),
         ("zzz@x", r"^zzz@x: there is no such file; frames are spelled clip\.bvh@240 or clip\.bvh@2\.0s$"),
+        ("ballet/adagio@2x", r"^ballet/adagio: @2x is neither a frame, such as @240, nor seconds, such as @2\.0s$"),
         ("balet/fifth", r"balet/fifth: there is no such file, and no corpus 'balet'; did you mean ballet\?$"),
         ("opera/fifth", r"no corpus 'opera'; there are ballet, hands, "),
         ("ballet/fith", r"^ballet: no posture or clip 'fith'; did you mean fifth\?$"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -10,10 +11,12 @@ from xml.etree import ElementTree
 import networkx as nx
 import numpy as np
 import pytest
+from bundled_clips import ballet_clip
 from command_line import Run
 from PIL import Image
 
 from motionmind.errors import MotionMindError
+from motionmind.formats import write_motion
 from motionmind.plots.canvas import png, svg
 from motionmind.plots.graph_layout import GraphLayout, lay_out
 from motionmind.plots.joint_graph import GRAPHS, graph_plate, write_graph
@@ -193,6 +196,14 @@ def test_the_command_writes_the_same_bytes_again(suffix: str, run: Run) -> None:
         assert (ran.code, ran.err) == (0, "")
         assert ran.out.startswith(f"{name}{suffix}: left_fore_coxa, 9 states, ")
     assert Path(f"one{suffix}").read_bytes() == Path(f"two{suffix}").read_bytes()
+
+
+def test_one_state_is_one(run: Run) -> None:
+    motion = ballet_clip("jump")
+    write_motion("still.json", replace(motion, rotations=np.repeat(motion.rotations[:1], len(motion), axis=0)))
+    assert run("corpus", "build", "still", "still.json").code == 0
+    ran = run("graph", "--corpus", "still", "--joint", "left_hip", "-o", "hip.svg")
+    assert ran.out == "hip.svg: left_hip, 1 state, 1 transition; 1 state that none joins to another\n"
 
 
 def test_what_cannot_be_drawn_is_refused_in_a_line(run: Run, tmp_path: Path) -> None:

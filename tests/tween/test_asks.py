@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 from dataclasses import replace
 from itertools import pairwise, product
@@ -477,6 +478,9 @@ def test_of_restrictions_that_leave_no_path_together_as_few_as_do_so_are_named(e
     with pytest.raises(NoPathError, match=r"in 4 moves(.|\n)*right_elbow") as fault:
         join(engine, avoid=[("left_hip", 1), *every], pin={"right_elbow": "B", "left_knee": "A"}, moves=4, strict=True)
     assert "left_" not in str(fault.value)
+    with pytest.raises(NoPathError) as fault:
+        join(engine, pin={"right_elbow": "B"}, via=[(posture("passe"), 3)], strict=True)
+    assert re.findall(r"(.*) leaves none", str(fault.value)) == ["  via 1 at move 3", "  pin right_elbow=B"]
     with pytest.raises(NoPathError, match=r"in at most 1 move \(allow more moves\)"):  # not for what was asked
         join(engine, pin={"left_knee": "A"}, moves=1)
 

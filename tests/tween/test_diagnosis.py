@@ -162,6 +162,9 @@ def test_the_report_holds_the_diagnosis(run: Run, found: Found, few: Engine) -> 
         fault["gap"]["degrees"] = round(fault["gap"]["degrees"], 3)
     assert report["diagnosis"] == told
     assert not Path("out.json").exists()
+    explained = run("explain", "report.json")
+    assert (explained.code, explained.out) == (0, f"{report['message']}\n")
+    assert run("explain", "report.json", "--json").json == json.loads(Path("report.json").read_text("utf-8"))
     alone = run("tween", "a.json", "b.json", "--corpus", "few", "--strict", "--report", "-")
     assert (alone.code, alone.json["message"]) == (3, report["message"])
     assert "would join them: bridges, without strict (in " in ran.err

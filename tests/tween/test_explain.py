@@ -225,6 +225,12 @@ def test_what_is_no_report_is_refused(bridged: Tween, tmp_path: Path, run: Run) 
     assert run("explain", tmp_path / "gone.json").code == 2
 
 
+def test_advice_for_movement_does_not_write_over_it(run: Run) -> None:
+    assert run("posture", "ballet/first", "-o", "first.json").code == 0
+    ran = run("explain", "first.json")
+    assert ran.err.endswith("tween writes one: motionmind tween A B --corpus NAME --report first-report.json\n")
+
+
 def test_damaged_reports_are_told_or_refused(
     bridged: Tween, tmp_path: Path, mutate: Callable[[str, random.Random], bytes]
 ) -> None:

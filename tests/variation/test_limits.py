@@ -203,6 +203,11 @@ def test_what_cannot_be_reached_is_refused_in_a_line(
     assert ran.code == 0
     assert "kept within 30% inserted, in stretches of 4 postures at least" in ran.out
     assert "insertions take" not in ran.err
+    cut = run("review", "v.json", "--cut", "1..2", "--paste", 8, "-o", "cut.json", "--list")
+    assert "kept within 30% inserted; " in cut.out
+    smoothed = run("review", "cut.json", "--smooth", "ballet", "--list")
+    assert smoothed.code == 0
+    assert "kept" not in smoothed.out
     ran = run("vary", "ballet/promenade", "--alternatives", 1, "-o", "v.json")
     assert " of the time: --inserted 0.3 keeps more of the piece" in ran.err
     assert run("attractor", "--of", "v.json", "-o", "v.svg").code == 0
