@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FORMAT, BUILT = "motionmind-corpus", "motionmind-built-corpus"
-VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7)}  # that can be read; the last is written
+VERSIONS = {FORMAT: (1,), BUILT: (1, 2, 3, 4, 5, 6, 7, 8)}  # that can be read; the last is written
+_FEET = 8  # the first that keeps how fast feet are near the floor
 _COMPLETE = 6  # the first that keeps all that is learned, and the last whose manifest lists clips and faults
 MANIFEST = "manifest.json"
 CHECKED_BY = Path(__file__).parents[1] / "learned" / "validity.py"  # when that changes, arrays are checked again
@@ -286,6 +287,11 @@ class Stored(NamedTuple):
     def is_current(self) -> bool:
         """Whether it is a built corpus that keeps all that this version learns."""
         return self.manifest["format"] == BUILT and self.version >= _COMPLETE
+
+    @property
+    def measures_feet(self) -> bool:
+        """Whether it keeps how fast feet are near the floor; movement from one that does not keeps to no such speed."""
+        return self.version >= _FEET
 
     @property
     def lists_clips(self) -> bool:

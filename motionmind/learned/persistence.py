@@ -170,7 +170,9 @@ def _kept(folder: Path, files: Iterable[Path], learn_it: Callable[[], Learned]) 
 
 def _open(folder: Path, stored: store.Stored) -> Learned:
     """Return what was learned, of what a folder holds; FormatError if something lacks or is not valid."""
-    arrays = stored.arrays
+    arrays: Mapping[str, NDArray[Any]] = stored.arrays
+    if not stored.measures_feet:
+        arrays = {**arrays, "plausibility.slides": np.array([np.nan])}
     corpus, space, states = _read_arrays(folder, stored, arrays, FORMS)
     grammar = Grammar(
         corpus.chains,
@@ -180,8 +182,8 @@ def _open(folder: Path, stored: store.Stored) -> Learned:
         _part(Coordination, "coordination", arrays),
     )
     carriage = replace(_part(Carriage, "carriage", arrays), trees=_trees(arrays, corpus.skeleton))
-    pace, shown = _part(Pace, "pace", arrays), {"plausibility.slides": np.array([np.nan]), **arrays}
-    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", shown))
+    pace = _part(Pace, "pace", arrays)
+    return Learned(corpus, space, states, grammar, carriage, pace, _part(Plausibility, "plausibility", arrays))
 
 
 def _read_movement(folder: Path, stored: store.Stored) -> tuple[Corpus, StateSpace, States]:

@@ -97,6 +97,7 @@ FORMS = {
     "pace.law": _Form("f8", "4", -100.0, 100.0),
     "plausibility.fastest": _Form("f8", "J+2", _SMALL),
     "plausibility.most": _Form("f8", f"{len(MEASURES)}", or_nan=True),
+    "plausibility.slides": _Form("f8", "1", EVERYDAY, or_nan=True),
 }
 
 TREES = {  # of a corpus of many moments, in versions that have them
@@ -108,8 +109,6 @@ TREES = {  # of a corpus of many moments, in versions that have them
     "neighbours.weights": _Form("f8", "parts D", 0.0, 1e15),
     "neighbours.codes": _Form("i1", "codes"),
 }
-
-LATER = {"plausibility.slides": _Form("f8", "1", EVERYDAY, or_nan=True)}  # may lack in corpora that were built before
 
 MOVEMENT = [name for name in FORMS if "." not in name]  # from these, and the clips, all the others can be learned
 ENTRIES = [name for name in FORMS if name.startswith(("clips.", "faults."))]  # listed in the manifest of early versions
@@ -126,7 +125,7 @@ def check_forms(arrays: Mapping[str, NDArray[Any]], skeleton: Skeleton, facing: 
     sizes = {"J": len(skeleton), "L": len(skeleton) + (facing == "free"), "P": len(capsules_of(skeleton).pairs())}
     sizes |= {"parts": len(parts_of(skeleton)), "limbs": len(limbs_of(skeleton))}
     sizes["joints"] = sum(map(len, parts_of(skeleton)))
-    for name, form in (FORMS | TREES | LATER).items():
+    for name, form in (FORMS | TREES).items():
         if name not in arrays:
             continue
         array = arrays[name]
