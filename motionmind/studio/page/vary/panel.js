@@ -64,8 +64,13 @@ export function Panel({ studio }) {
   const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + OFF;
   const told = isFarthest ? `${departs} at most` : departs;
   const vary = async () => {
-    await varying.ask();
-    if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
+    // An edit may still be on its way, and others come while the variation is made: it is of the piece after them.
+    for (let changed; changed !== studio.api.changed; ) {
+      ({ changed } = studio.api);
+      await changed;
+      await varying.ask();
+    }
+    if (varying.edit && !varying.error) await studio.act(() => studio.api.edit(varying.edit));
   };
   return html`<section class="stack vary">
     <h2>Variations</h2>
