@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from piece_page import piece, wait_for
+from scores import BENDS
 
 if TYPE_CHECKING:
     from studio_server import Served
@@ -33,3 +35,47 @@ def test_what_is_varied_is_the_piece_as_it_stands(studio_server: Served, studio_
     page.get_by_test_id("vary").click()
     wait_for(page, "studio.store.state.undo === 'vary the piece'", 20.0)
     assert "ballet/plies" in {block["source"] for block in piece(page)["blocks"]}
+
+
+def test_a_double_click_does_a_thing_once(studio_server: Served, studio_page: Any) -> None:
+    page = studio_page
+    page.get_by_test_id("posture-bow").click()
+    page.get_by_test_id("insert-posture").dblclick()
+    wait_for(page, "piece.blocks.length === 1")
+    page.get_by_test_id("open-pose").click()
+    page.get_by_test_id("handle-pelvis").wait_for()
+    hold_up(page, "**/api/pose/keep")
+    page.get_by_test_id("posture-to-timeline").dblclick()
+    wait_for(page, "piece.blocks.length === 2")
+    page.get_by_test_id("open-vary").click()  # too short for it: whatever was asked for twice has come by now
+    page.wait_for_timeout(400)
+    assert len(piece(page)["blocks"]) == 2
+
+
+def test_a_movement_is_put_on_the_time_line_once(studio_page: Any, tmp_path: Path) -> None:
+    page = studio_page
+    (tmp_path / "bends.score").write_text(BENDS)
+    page.get_by_test_id("open-movement").click()
+    page.get_by_test_id("choose-files").set_input_files(tmp_path / "bends.score")
+    page.get_by_test_id("put").dblclick()
+    wait_for(page, "piece.blocks.length === 1")
+    page.wait_for_timeout(400)
+    assert len(piece(page)["blocks"]) == 1
+    # A moment later the same is another wish.
+    page.get_by_test_id("put").click()
+    wait_for(page, "piece.blocks.length === 2", 10.0)
+
+
+def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
+    page = studio_page
+    for posture in ("arabesque", "fifth"):
+        page.get_by_test_id(f"posture-{posture}").click()
+    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    hold_up(page, "**/api/between/accept")
+    page.keyboard.press("2")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Enter")
+    wait_for(page, "piece.blocks.length === 2 && studio.desk.state === 'idle'")
+    page.wait_for_timeout(400)
+    assert len(piece(page)["blocks"]) == 2
+    assert page.evaluate("[studio.desk.ends.a?.title, studio.desk.ends.b]") == ["fifth", None]

@@ -111,13 +111,15 @@ export class Desk extends EventTarget {
   }
 
   /** Put the chosen alternative onto the line of time. */
-  async accept() {
+  accept() {
+    return this.studio.once("accept", () => this.#accept());
+  }
+
+  async #accept() {
     const { job, chosen } = this;
     if (!this.found[chosen]) return;
-    const { viewer, api, act, store } = this.studio;
-    const done = await act(() => api.post("/api/between/accept", { job, alternative: chosen + 1, window: api.window }));
-    if (!done) return;
-    store.take(done);
+    const { viewer, api, store } = this.studio;
+    store.take(await api.post("/api/between/accept", { job, alternative: chosen + 1, window: api.window }));
     // The next movement goes on from here.
     Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
     viewer.back();

@@ -36,14 +36,14 @@ export function Keep({ studio, editor }) {
       () => {},
     );
   };
-  const doing = (/** @type {() => Promise<any>} */ act) => () => studio.act(act);
+  const doing = (/** @type {string} */ what, /** @type {() => Promise<any>} */ act) => () => studio.once(`${what} a posture`, act);
   return html`<section class="stack" aria-label="Keep the posture">
     <h3>Keep it</h3>
     <form
       class="row"
       onSubmit=${(/** @type {Event} */ event) => {
         event.preventDefault();
-        studio.act(save);
+        doing("save", save)();
       }}
     >
       <input
@@ -58,10 +58,10 @@ export function Keep({ studio, editor }) {
       <button class="button" type="submit" data-testid="save-posture">Save</button>
     </form>
     <div class="row wide">
-      <button class="button" data-testid="use-a" onClick=${doing(end("a"))}>Use as A</button>
-      <button class="button" data-testid="use-b" onClick=${doing(end("b"))}>Use as B</button>
-      <button class="button" data-testid="posture-to-timeline" onClick=${doing(place)}>Onto the time line</button>
-      <button class="button" data-testid="copy-score" onClick=${doing(copy)}>Copy for a score</button>
+      <button class="button" data-testid="use-a" onClick=${doing("begin with", end("a"))}>Use as A</button>
+      <button class="button" data-testid="use-b" onClick=${doing("end with", end("b"))}>Use as B</button>
+      <button class="button" data-testid="posture-to-timeline" onClick=${doing("insert", place)}>Onto the time line</button>
+      <button class="button" data-testid="copy-score" onClick=${doing("copy", copy)}>Copy for a score</button>
     </div>
     ${lines && html`<textarea readonly aria-label="Lines of a score" data-testid="score-lines" value=${lines}></textarea>`}
   </section>`;

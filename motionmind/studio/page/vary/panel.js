@@ -63,15 +63,16 @@ export function Panel({ studio }) {
   const departs = proposal ? departure(proposal.departs) : "";
   const isFarthest = Boolean(proposal) && !varying.asking && wish.nudge === null && wish.depart > proposal.departs + OFF;
   const told = isFarthest ? `${departs} at most` : departs;
-  const vary = async () => {
+  const make = async () => {
     // An edit may still be on its way, and others come while the variation is made: it is of the piece after them.
     for (let changed; changed !== studio.api.changed; ) {
       ({ changed } = studio.api);
       await changed;
       await varying.ask();
     }
-    if (varying.edit && !varying.error) await studio.act(() => studio.api.edit(varying.edit));
+    if (varying.edit && !varying.error) await studio.api.edit(varying.edit);
   };
+  const vary = () => studio.once("vary", make);
   return html`<section class="stack vary">
     <h2>Variations</h2>
     <${AttractorMap} studio=${studio} varying=${varying} piece=${shown} playing=${view.playing} />
