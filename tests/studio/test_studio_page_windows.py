@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -70,6 +71,21 @@ def test_another_window_sees_an_edit_and_takes_back_its_own_alone(
     studio_page.get_by_test_id("undo").click()
     for page in (studio_page, other):
         expect(page.get_by_test_id("block-b1")).to_have_count(0)
+
+
+def test_a_title_that_is_left_as_it_was_is_not_given_again(
+    studio_server: Served, studio_page: Any, expect: Any
+) -> None:
+    title = studio_page.get_by_test_id("title")
+    expect(title).to_have_value("piece")
+    title.click()
+    studio_server.edit(edit="title", title="Swan")
+    expect(studio_page).to_have_title(re.compile("^Swan"))
+    expect(title).to_have_value("piece")  # nobody's words are taken from under their fingers
+    title.press("Tab")
+    expect(title).to_have_value("Swan")
+    studio_page.wait_for_timeout(200)
+    assert studio_server.project()["title"] == "Swan"
 
 
 def test_what_is_edited_while_a_page_opens_is_seen_there(studio_server: Served, studio_page: Any, expect: Any) -> None:
