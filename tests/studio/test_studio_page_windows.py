@@ -155,3 +155,38 @@ def test_a_page_elsewhere_can_neither_read_nor_write(studio_server: Served, stud
     assert tried == dict.fromkeys(tried, "refused")
     assert len(tried) == 5
     assert studio_server.project() == before
+
+
+def test_a_search_is_begun_again_by_the_studio_that_was_started_again(
+    studio_server: Served, browser: Any, expect: Any
+) -> None:
+    studio = studio_server.studio
+
+    def lose() -> None:
+        """What a page sees of it: its stream ends, and its jobs are known no more."""
+        studio.workers._jobs.clear()
+        for stream in studio.events._streams:
+            stream.end()
+
+    context = browser.new_context(
+        viewport={"width": 1024, "height": 768}, device_scale_factor=0.5, reduced_motion="reduce"
+    )
+    page, searches = context.new_page(), list[str]()
+    page.on("request", lambda request: request.url.endswith("/api/between") and searches.append(request.url))
+    page.goto(studio_server.entry)
+    page.get_by_test_id("posture-arabesque").click()
+    with page.expect_response("**/api/between"):
+        page.get_by_test_id("posture-fifth").click()
+    studio.workers._loop.call_soon_threadsafe(lose)
+    with page.expect_response("**/api/between"):
+        pass
+    expect(page.get_by_test_id("alternatives")).to_have_attribute("data-state", "found", timeout=120_000)
+    assert len(searches) == 2
+    # Nobody was there when it was asked for: it is once somebody is.
+    page.route("**/api/between", lambda route: route.abort())
+    page.get_by_label("Exchange A and B").click()
+    expect(page.get_by_test_id("alternatives")).to_contain_text("The studio does not answer")
+    page.unroute("**/api/between")
+    studio.workers._loop.call_soon_threadsafe(lose)
+    expect(page.get_by_test_id("alternatives")).to_have_attribute("data-state", "found", timeout=120_000)
+    context.close()
