@@ -88,6 +88,31 @@ def test_a_title_that_is_left_as_it_was_is_not_given_again(
     assert studio_server.project()["title"] == "Swan"
 
 
+def test_a_posture_that_is_saved_again_is_pictured_again(
+    studio_server: Served, studio_page: Any, expect: Any
+) -> None:
+    def save(source: str) -> str:
+        told = studio_server.post("/api/pose/open", {"key": source})
+        pose = {"key": source, "rotations": told["rotations"], "root": told["root"]}
+        key: str = studio_server.post("/api/pose/keep", {"pose": pose, "name": "mine"})["key"]
+        studio_server.edit(edit="posture", name="mine", posture=key)
+        return key
+
+    picture = studio_page.get_by_test_id("posture-mine").locator("img")
+    shown = "JSON.stringify(studio.viewer.motion.rotations)"
+    before = ""
+    for source in ("ballet/fifth", "ballet/arabesque"):
+        key = save(source)
+        expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
+        studio_page.get_by_test_id("posture-mine").click()
+        expect(studio_page.locator(".caption .name")).to_have_text("mine")
+        studio_page.wait_for_timeout(300)
+        assert studio_page.evaluate(shown) != before
+        before = studio_page.evaluate(shown)
+    studio_page.reload()
+    expect(picture).to_have_attribute("src", f"/api/thumbnails/{key}/0.png?height=96")
+
+
 def test_what_is_edited_while_a_page_opens_is_seen_there(studio_server: Served, studio_page: Any, expect: Any) -> None:
     edited: list[Any] = []
 

@@ -1,6 +1,7 @@
 /** What the page knows: the project as it stands, what is selected, and the jobs that run. It knows no views. */
 
 import { AwayError } from "./api.js";
+import { knowPostures } from "./places.js";
 import { useChange } from "./shell/hooks.js";
 
 const AGAIN = [500, 1000, 2000, 4000]; // milliseconds until a lost connection is tried again
@@ -50,6 +51,7 @@ export class Store extends EventTarget {
   /** Take over a state, unless it is older than the one that is there. @param {any} state */
   take(state) {
     if (this.state && state.sequence < this.state.sequence) return;
+    knowPostures(state.postures);
     this.set({ state });
   }
 

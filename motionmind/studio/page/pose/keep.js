@@ -2,7 +2,6 @@
 
 import { html, useState } from "../vendor/htm-preact-standalone.js";
 import { deskOf } from "../between/desk.js";
-import { forget } from "../movements.js";
 
 /** @param {{studio: any, editor: import("./session.js").Editor}} props */
 export function Keep({ studio, editor }) {
@@ -12,7 +11,6 @@ export function Keep({ studio, editor }) {
   const save = async () => {
     const key = await editor.keep(called);
     const replaced = studio.store.state?.postures?.some((/** @type {{name: string}} */ one) => one.name === called);
-    forget(`own/${called}`);
     await studio.api.edit({ edit: "posture", name: called, posture: key });
     studio.say(replaced ? `${called} is replaced: undo brings the one before back.` : `Saved as ${called}.`);
     return `own/${called}`;
