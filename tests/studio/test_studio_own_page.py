@@ -330,6 +330,11 @@ def test_a_recording_leaves_questions(served: Served, open_page: Open, shared_da
     card.get_by_text("no person is so tall").wait_for()
     card.get_by_test_id("unit").select_option("")
     card.get_by_text("no person is so tall").wait_for(state="detached")
+    rate = card.get_by_test_id("fps")
+    for wrong in ("0", "2000"):
+        rate.fill(wrong)
+        rate.press("Tab")
+        assert rate.input_value() == "120"  # which is in use
     card.get_by_test_id("skip").click()
     card.get_by_text("is being read again").wait_for()
     card.get_by_text("is being read again").wait_for(state="detached")

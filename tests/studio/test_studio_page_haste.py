@@ -79,3 +79,49 @@ def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     page.wait_for_timeout(400)
     assert len(piece(page)["blocks"]) == 2
     assert page.evaluate("[studio.desk.ends.a?.title, studio.desk.ends.b]") == ["fifth", None]
+
+
+def test_every_press_is_a_step(studio_server: Served, studio_page: Any) -> None:
+    page = studio_page
+    studio_server.insert("b1", "ballet/adagio", 0, 40)
+    studio_server.insert("b2", "ballet/plies", 0, 20)
+    page.get_by_test_id("block-b1").click()
+    hold_up(page, "**/api/edits", 60)
+    for key in ["Shift+ArrowLeft"] * 8 + ["Alt+Shift+ArrowRight"] * 3 + ["Shift+ArrowRight"] * 2:
+        page.keyboard.press(key)
+    for _ in range(2):
+        page.keyboard.press("ArrowRight")  # over the seam: what is selected then is not what is trimmed
+    wait_for(page, "piece.blocks[0].first === 3 && piece.blocks[0].last === 34", 10.0)
+    page.keyboard.press("Delete")
+    page.keyboard.press("Delete")  # which finds nothing more to delete, and says nothing
+    wait_for(page, "piece.blocks.length === 1")
+    page.wait_for_timeout(200)
+    assert [(block["id"], block["first"], block["last"]) for block in piece(page)["blocks"]] == [("b1", 3, 34)]
+    assert page.get_by_test_id("toast").count() == 0
+
+
+def test_a_field_shows_what_is_wished(studio_server: Served, studio_page: Any) -> None:
+    page = studio_page
+    page.evaluate("studio.api.delete('/api/seams')")  # nothing is sought
+    for name in ("b1", "b2"):
+        studio_server.insert(name, "ballet/adagio", 0, 10)
+    wait_for(page, "piece.blocks.length === 2")
+    page.evaluate("studio.store.set({ selection: { seam: ['b1', 'b2'] } })")
+    page.get_by_test_id("wishes").click()
+    field = page.get_by_test_id("wish-seconds")
+    for given, shown, wished in (("999", "60", "60"), ("0", "", "null"), ("0.01", "0.1", "0.1")):
+        field.fill(given)
+        field.press("Tab")
+        assert field.input_value() == shown
+        wait_for(page, f"piece.seams[0].ask.seconds === {wished}", 10.0)
+    # What is wished one after another is wished together.
+    hold_up(page, "**/api/edits", 100)
+    for joint in ("left_wrist", "right_wrist"):
+        page.get_by_test_id("wish-joint").select_option(joint)
+        page.get_by_test_id("wish-pin-add").click()
+    wait_for(page, "piece.seams[0].ask.pins.length === 2", 10.0)
+    tempo = page.get_by_test_id("tempo")
+    for given in ("500", "999"):
+        tempo.fill(given)
+        tempo.press("Tab")
+        assert tempo.input_value() == "300"

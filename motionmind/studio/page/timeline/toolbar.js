@@ -1,6 +1,7 @@
 /** The bar above the tracks: what can be done with what is selected, how smoothing goes, tempo and zoom. */
 
 import { html } from "../vendor/htm-preact-standalone.js";
+import { written } from "../shell/fields.js";
 import { selected } from "./items.js";
 import { clock } from "./scale.js";
 
@@ -42,7 +43,11 @@ export function Toolbar({ does, piece, selection, tempo, onTempo, stopped, onSto
         value=${tempo}
         data-testid="tempo"
         aria-label="Tempo, beats a minute"
-        onChange=${(event) => onTempo(Math.min(Math.max(Number(event.target.value) || 120, 20), 300))}
+        onChange=${written((given) => {
+          const beats = Math.min(Math.max(given || 120, 20), 300);
+          onTempo(beats);
+          return beats;
+        })}
       />
     </label>
     <div class="zoom row">
