@@ -136,11 +136,14 @@ def test_a_piece_is_varied_by_mouse(served: Served, open_page: Open, size: str) 
     # Both beside each other, then the variation becomes the piece, one undo.
     page.get_by_test_id("beside").click()
     until(page, "document.querySelectorAll('.stage.two canvas').length === 2")
+    titles = "[studio.viewer.title, studio.viewer.halves[1].dataset.title].join(' | ')"
+    assert page.evaluate(titles) == "The piece | The variation"
     assert piece(served) == ["b1", "b2"]
     page.get_by_test_id("vary").click()
     until(page, "studio.store.state.piece.blocks.length > 2")
     varied = piece(served)
     assert len(varied) == page.locator(".tiles > li").count()
+    until(page, f"{titles} === 'Before | The piece'")
     # Insertions come as they are found.
     until(page, "studio.store.state.piece.seams.some(seam => seam.state === 'inserted')")
     page.locator(".tiles .seam.inserted").first.wait_for()

@@ -181,7 +181,8 @@ function useView(studio, varying, piece) {
     );
     if (varying.proposal !== proposal) return; // another was asked for meanwhile
     const { viewer } = studio;
-    const how = both ? { beside: own, title: "The piece", besideTitle: "The variation" } : { title: "The variation" };
+    const [before, now] = isPiece ? ["Before", "The piece"] : ["The piece", "The variation"];
+    const how = both ? { beside: own, title: before, besideTitle: now } : { title: now };
     viewer.show(both ? original : own, { time, look: !looking, ...how });
   };
   const failed = (/** @type {Error} */ error) => studio.say(error.message, { kind: "error" });
