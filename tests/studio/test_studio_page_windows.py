@@ -214,4 +214,9 @@ def test_a_search_is_begun_again_by_the_studio_that_was_started_again(
     page.unroute("**/api/between")
     studio.workers._loop.call_soon_threadsafe(lose)
     expect(page.get_by_test_id("alternatives")).to_have_attribute("data-state", "found", timeout=120_000)
+    # Whatever else is asked for says the same.
+    page.route("**/api/export/*", lambda route: route.abort())
+    page.get_by_test_id("open-take").click()
+    page.get_by_test_id("export-project").click()
+    expect(page.get_by_test_id("toast")).to_contain_text("The studio does not answer: has it ended?")
     context.close()
