@@ -88,9 +88,7 @@ def test_a_title_that_is_left_as_it_was_is_not_given_again(
     assert studio_server.project()["title"] == "Swan"
 
 
-def test_a_posture_that_is_saved_again_is_pictured_again(
-    studio_server: Served, studio_page: Any, expect: Any
-) -> None:
+def test_a_posture_that_is_saved_again_is_pictured_again(studio_server: Served, studio_page: Any, expect: Any) -> None:
     def save(source: str) -> str:
         told = studio_server.post("/api/pose/open", {"key": source})
         pose = {"key": source, "rotations": told["rotations"], "root": told["root"]}

@@ -225,7 +225,7 @@ def test_a_posture_has_a_name_by_which_it_can_be_asked_for(name):
 def test_what_is_gone_is_said_without_names_that_nobody_gave():
     gone = apply(BEGIN, e.Delete("b1"))
     for edit in (e.Delete("b1"), e.Trim("b1", 2, 7), e.Mirror("b1"), e.Decide("b1", "b2", "locked")):
-        with pytest.raises(MotionMindError, match="^this stretch is not in the piece any more$"):
+        with pytest.raises(MotionMindError, match=r"^this stretch is not in the piece any more$"):
             apply(gone, edit)
 
 

@@ -76,7 +76,7 @@ function OfSeam({ does, seam, sheet }) {
   const locked = decision === "locked";
   return html`<p class="grow cut" data-testid="selected">
       <b>${seam.stands ? `Insertion, ${clock(seam.seconds)} s` : any ? "Insertion, left out" : "Seam"}</b>${" "}
-      <span class="pale">${state === "inserted" ? alternatives[chosen - 1].words : seam.stands ? "another is being sought" : words}</span>
+      <span class="pale">${state === "inserted" ? besideLength(alternatives[chosen - 1].words) : seam.stands ? "another is being sought" : words}</span>
     </p>
     ${any &&
     html`<div class="row flip">
@@ -146,7 +146,12 @@ function Button({ icon, words, does, test, pressed }) {
   </button>`;
 }
 
+/** What there is to know of an insertion beside its length. */
+function besideLength(words) {
+  return words.split("; ").filter((one) => !/^[\d.]+ s$/.test(one)).join("; ");
+}
+
 function hintFor({ blocks, seconds }) {
   if (blocks.length === 0) return "Nothing yet: accept an alternative, or drag a posture here.";
-  return `${blocks.length} stretches, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
+  return `${blocks.length} stretch${blocks.length === 1 ? "" : "es"}, ${clock(seconds)} s. Select one, or press Tab and the arrow keys.`;
 }
