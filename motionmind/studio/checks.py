@@ -50,7 +50,7 @@ def check_names(edit: Edit) -> None:
     """
     for one in each(edit):
         if isinstance(one, SavePosture) and one.posture is not None and {".", ".."} & set(one.name.split("/")):
-            raise MotionMindError(f"a posture cannot be called {displayed(one.name)}: give it another name")
+            raise MotionMindError(f"a posture cannot be called “{displayed(one.name)}”: give it another name")
 
 
 def missing_in(state: State, has_corpus: Callable[[str], bool], marks: Marks) -> list[str]:
