@@ -79,6 +79,14 @@ def test_an_alternative_is_accepted_once_by_keys(studio_page: Any) -> None:
     page.wait_for_timeout(400)
     assert len(piece(page)["blocks"]) == 2
     assert page.evaluate("[studio.desk.ends.a?.title, studio.desk.ends.b]") == ["fifth", None]
+    # Whoever takes it back before it has come takes it back.
+    page.get_by_test_id("posture-bow").click()
+    page.wait_for_selector("[data-testid=alternatives][data-state=found]", timeout=120_000)
+    page.keyboard.press("1")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Control+z")
+    wait_for(page, "studio.store.state.redo !== null", 10.0)
+    assert len(piece(page)["blocks"]) == 2
 
 
 def test_every_press_is_a_step(studio_server: Served, studio_page: Any) -> None:

@@ -70,6 +70,11 @@ export class Api extends EventTarget {
     return this.#change("/api/edits", { edit });
   }
 
+  /** Put an alternative that a search found onto the line of time. @param {string} job @param {number} alternative from 1 */
+  accept(job, alternative) {
+    return this.#change("/api/between/accept", { job, alternative });
+  }
+
   undo() {
     return this.#change("/api/undo");
   }

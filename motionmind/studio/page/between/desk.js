@@ -124,7 +124,7 @@ export class Desk extends EventTarget {
     const { job, chosen } = this;
     if (!this.found[chosen]) return;
     const { viewer, api, store } = this.studio;
-    store.take(await api.post("/api/between/accept", { job, alternative: chosen + 1, window: api.window }));
+    await api.accept(/** @type {string} */ (job), chosen + 1);
     // The next movement goes on from here.
     Object.assign(this, { ends: { a: this.ends.b, b: null }, choice: null, found: [], state: "idle", shown: false, job: null });
     viewer.back();
