@@ -24,9 +24,6 @@ export function Learn({ studio, imports }) {
   const mixed = Object.entries(mix).map(([corpus, weight]) => ({ name: corpus, weight }));
   const ready = name.trim() && (count > 0 || mixed.length > 0) && !busy;
   const learn = async () => {
-    const refusal = imports.refusal(name.trim());
-    setError(refusal);
-    if (refusal) return;
     try {
       setId(await imports.learn({ name: name.trim(), title, mix: mixed, mirror }));
     } catch (failed) {
@@ -41,7 +38,9 @@ export function Learn({ studio, imports }) {
     class="stack learn"
     onSubmit=${(/** @type {Event} */ event) => {
       event.preventDefault();
-      studio.once("learn", learn);
+      const refusal = imports.refusal(name.trim());
+      setError(refusal);
+      if (!refusal) studio.once("learn", learn);
     }}
   >
     <h3>Learn a corpus</h3>
